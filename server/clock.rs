@@ -1,5 +1,4 @@
-//! The clocks, one monotonic and one of the wall. They are parameters everywhere, so that a trial
-//! replays exactly.
+//! The monotonic and the wall clock. They are parameters everywhere, so that a trial replays exactly.
 
 use std::ops::Add;
 use std::sync::Mutex;
@@ -27,7 +26,7 @@ impl Moment {
         self.0
     }
 
-    /// Time from `earlier` to this moment; zero where `earlier` is in fact later.
+    /// Time from `earlier` to this moment; zero if `earlier` is in fact later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
@@ -46,7 +45,7 @@ impl Add<Duration> for Moment {
 pub trait Clock: Send + Sync {
     /// The current time on the monotonic clock.
     fn now(&self) -> Moment;
-    /// The current time on the wall's clock (UTC).
+    /// The current wall-clock time (UTC).
     fn wall(&self) -> Timestamp;
 }
 
@@ -67,7 +66,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// A clock that stands still until it is advanced: for tests and for simulations faster than time.
+/// A clock that stands still until it is advanced: for tests and for simulations faster than real time.
 #[derive(Debug)]
 pub struct ManualClock(Mutex<(Moment, Timestamp)>);
 
@@ -78,14 +77,14 @@ impl ManualClock {
         Self(Mutex::new((Moment(0), wall)))
     }
 
-    /// Moves both clocks on by `step`.
+    /// Advances both clocks by `step`.
     pub fn advance(&self, step: Duration) {
         let mut now = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         now.0 = now.0 + step;
         now.1 = now.1.saturating_add(step).unwrap_or(now.1);
     }
 
-    /// Sets the wall clock to `wall`, as somebody does who sets a machine's clock.
+    /// Sets the wall clock to `wall`, as when somebody sets a machine's clock.
     pub fn set_wall(&self, wall: Timestamp) {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).1 = wall;
     }

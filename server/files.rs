@@ -6,13 +6,13 @@ use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or
-/// a pipe is written to, never replaced.
+/// Writes a file with these bytes to `path`, as [`replace_with`] does. If `path` is a symbolic link, its target is
+/// replaced. A device or a pipe is written to, never replaced.
 ///
 /// # Errors
-/// When it cannot be written; then no part of it is left.
+/// If it cannot be written. No part of it is left then.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A path that a shell lends, such as /dev/stdout, may lead to a plain file that others hold open.
+    // A path such as /dev/stdout may lead to a plain file that other processes hold open.
     let lent = path.starts_with("/dev") || path.starts_with("/proc");
     if lent || fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return fs::write(path, bytes);
@@ -21,24 +21,24 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     replace_with(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), |writer| writer.write_all(bytes))
 }
 
-/// Puts a file with the output of `fill` at `path`. It is written beside it first, so that the old file
-/// stays until all of the new one is on the disk.
+/// Writes a file with the output of `fill` to `path`. It is first written under another name in the same folder, so
+/// that the old file stays until all of the new one is on the disk.
 ///
 /// # Errors
-/// When it cannot be written; then no part of it is left.
+/// If it cannot be written. No part of it is left then.
 pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let beside = partial(path);
     let written = File::create(&beside).and_then(|file| fill_through(file, fill));
     put_in_place(&beside, path, written)
 }
 
-/// Puts a file with these bytes at `path` as [`replace_with`] does. At no moment can other accounts read it.
+/// Writes a file with these bytes to `path`, as [`replace_with`] does. Other accounts can never read it.
 ///
 /// # Errors
-/// When it cannot be written; then no part of it is left.
+/// If it cannot be written. No part of it is left then.
 pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let beside = partial(path);
-    // One that a killed process left behind could be open elsewhere.
+    // A partial file that a killed process left behind could be open in another process.
     let _ = fs::remove_file(&beside);
 
     let created = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&beside);
@@ -46,13 +46,13 @@ pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put_in_place(&beside, path, written)
 }
 
-/// Where a file is written before it is moved to `path`.
+/// The path at which a file is written before it is moved to `path`.
 fn partial(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.partial"))
 }
 
-/// Moves what was `written` at `beside` to `path`, or removes it if writing or moving failed.
+/// Moves the file at `beside` to `path`, or removes it if writing (`written`) or moving failed.
 fn put_in_place(beside: &Path, path: &Path, written: io::Result<()>) -> io::Result<()> {
     let moved = written.and_then(|()| fs::rename(beside, path));
 
@@ -67,7 +67,7 @@ fn put_in_place(beside: &Path, path: &Path, written: io::Result<()>) -> io::Resu
 /// Writes a file and waits until the disk has it.
 ///
 /// # Errors
-/// When it cannot be written; then a part of it may be left.
+/// If it cannot be written. A part of it may be left then.
 pub fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fill_through(File::create(path)?, |writer| writer.write_all(bytes))
 }
@@ -80,19 +80,19 @@ fn fill_through(opened: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Res
     writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
 }
 
-/// Waits until the disk has the name of `path`: a renamed file may otherwise have its old name after a
-/// power cut. The file is whole under either name, so a folder that cannot be read, or a file system that
-/// cannot do this, is not a failure.
+/// Waits until the disk has the name of `path`. Otherwise a renamed file may have its old name after a power cut. The
+/// file is whole under either name, so it is not an error if the folder cannot be read or the file system cannot do
+/// this.
 pub fn sync_folder_of(path: &Path) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// Takes access to the file or folder `path` away from all other accounts.
+/// Removes all other accounts' access to the file or folder `path`.
 ///
 /// # Errors
-/// When it does not exist or is not ours, or when it is a folder that all accounts share, such as /tmp,
-/// which must stay theirs too.
+/// If it does not exist or is not ours, or if it is a folder that all accounts share, such as /tmp. Such a folder must
+/// stay open to them.
 pub fn make_private(path: &Path) -> io::Result<()> {
     const OTHERS: u32 = 0o077;
     const SHARED: u32 = 0o1000;
@@ -111,10 +111,10 @@ pub fn make_private(path: &Path) -> io::Result<()> {
     fs::set_permissions(path, Permissions::from_mode(mode & !OTHERS & 0o7777))
 }
 
-/// The files in `folder` and in the folders within it, in order, each by its path from there.
+/// All files below `folder`, at any depth: their paths relative to `folder`, sorted.
 ///
 /// # Errors
-/// When a folder cannot be read.
+/// If a folder cannot be read.
 pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![PathBuf::new()];
@@ -134,7 +134,7 @@ pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Whether a process killed in [`replace`] may have left a file of this `name`.
+/// Whether `name` is that of a file which a process killed in [`replace`] may have left.
 #[must_use]
 pub fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(".partial")
@@ -153,7 +153,7 @@ mod tests {
             assert_eq!(fs::read_to_string(&file).unwrap(), text);
         }
 
-        // A folder of that name: it cannot be written, and stays.
+        // A folder with that name cannot be replaced, and stays.
         let occupied = folder.path().join("figure.svg");
         fs::create_dir(&occupied).unwrap();
         assert!(replace(&occupied, b"").is_err());

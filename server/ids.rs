@@ -43,6 +43,6 @@ identifier!(
     DeviceId
 );
 identifier!(
-    /// Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
+    /// Made by a browser for one comment or answer, which is kept once, however often it is sent.
     IdempotencyKey
 );

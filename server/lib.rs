@@ -1,7 +1,7 @@
 //! parfocal: keeps a handheld hyperspectral video exoscope in focus, shows the live view in a browser, and runs
 //! blinded usability trials of its autofocus policies.
 //!
-//! Rooms, from the ground up; each uses only rooms listed before it (see ARCHITECTURE.md).
+//! Rooms, roughly from the ground up. ARCHITECTURE.md says which room may use which.
 
 pub mod clock;
 pub mod files;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// Invalid options; says which and why.
+/// Invalid options. The message says which and why.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct BadOptions(String);
 
-/// The options behind a specification's `?`. Take each that is known, then [`Options::finish`].
+/// The options after a specification's `?`. Take each known option, then call [`Options::finish`].
 #[derive(Debug)]
 pub struct Options<'a> {
     spec: &'a str,
@@ -21,7 +21,7 @@ impl<'a> Options<'a> {
     /// Splits `spec` into the part before `?` and its options.
     ///
     /// # Errors
-    /// When an option is not `NAME=VALUE`, or is given twice.
+    /// If an option is not `NAME=VALUE`, or is given twice.
     pub fn split(spec: &'a str) -> Result<(&'a str, Self), BadOptions> {
         let (device, text) = spec.split_once('?').unwrap_or((spec, ""));
         let mut values = BTreeMap::new();
@@ -41,7 +41,7 @@ impl<'a> Options<'a> {
     /// The value of option `name`, if it was given.
     ///
     /// # Errors
-    /// When its value cannot be read.
+    /// If its value cannot be parsed.
     pub fn take<T: FromStr<Err: Display>>(&mut self, name: &'static str) -> Result<Option<T>, BadOptions> {
         self.known.push(name);
         let parse = |value: &str| {
@@ -53,7 +53,7 @@ impl<'a> Options<'a> {
     /// Rejects unknown options.
     ///
     /// # Errors
-    /// When an option was not taken.
+    /// If an option was not taken.
     pub fn finish(self) -> Result<(), BadOptions> {
         match self.values.keys().next() {
             None => Ok(()),

@@ -4,32 +4,32 @@ use std::fmt::Write as _;
 
 /// Width of a plot.
 const WIDTH: f64 = 900.0;
-/// Left end of panels and keys: room for the numbers of the upright axis.
+/// Left end of panels and keys: leaves room for the numbers of the vertical axis.
 const LEFT: f64 = 55.0;
 /// Right end of panels and keys.
 const RIGHT: f64 = WIDTH - 15.0;
 /// Height of a panel.
 const PANEL: f64 = 230.0;
-/// From one panel to the next: room for the words above a panel and below it.
+/// Gap between panels: leaves room for the words below one panel and above the next.
 const GAP: f64 = 50.0;
 /// Height of a row of keys.
 const ROW: f64 = 18.0;
 /// Longest name in the key, in characters; a longer one loses its beginning.
 const LONGEST_NAME: usize = 80;
 
-/// One direction of a panel.
+/// The horizontal or vertical axis of a panel.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis<'a> {
-    /// What is along it, with its unit.
+    /// Name of the quantity, with its unit.
     pub label: &'a str,
-    /// Value at its beginning: left, or below.
+    /// Value at its start: left or bottom.
     pub from: f64,
-    /// Value at its end: right, or above.
+    /// Value at its end: right or top.
     pub to: f64,
 }
 
 impl Axis<'_> {
-    /// How far along the axis `value` lies: 0 at its beginning, 1 at its end.
+    /// Position of `value` along the axis: 0 at its start, 1 at its end; clamped to these.
     fn share(&self, value: f64) -> f64 {
         let length = self.to - self.from;
         if length == 0.0 { 0.0 } else { ((value - self.from) / length).clamp(0.0, 1.0) }
@@ -41,7 +41,7 @@ impl Axis<'_> {
 pub struct Plot {
     panels: usize,
     body: String,
-    /// Name and colour of each series, in the order in which they came.
+    /// Name and colour of each series, in drawing order.
     keys: Vec<(String, String)>,
 }
 
@@ -54,7 +54,7 @@ pub struct Panel<'a> {
 }
 
 impl Plot {
-    /// Begins a panel below those that are there.
+    /// Begins a panel below the existing ones.
     pub fn panel<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
         let panel = self.frame(across, up);
         let bottom = panel.top + PANEL;
@@ -63,7 +63,7 @@ impl Plot {
         panel
     }
 
-    /// Begins a panel whose places across are things with these names: the first at 1, the second at 2, and so on.
+    /// Begins a panel whose horizontal axis has named places: the first at 1, the second at 2, and so on.
     pub fn panel_of<'a>(&'a mut self, label: &'a str, names: &[String], up: Axis<'a>) -> Panel<'a> {
         let across = Axis { label: "", from: 0.5, to: names.len() as f64 + 0.5 };
         let panel = self.frame(across, up);
@@ -76,7 +76,7 @@ impl Plot {
         panel
     }
 
-    /// The frame of a panel, with its labels and the numbers of its upright axis.
+    /// Draws the frame of a panel, with its labels and the numbers of its vertical axis.
     fn frame<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
         let top = 20.0 + self.panels as f64 * (PANEL + GAP);
         self.panels += 1;
@@ -127,7 +127,7 @@ impl Plot {
         let _ = writeln!(self.body, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>");
     }
 
-    /// Puts `name` into the key, once.
+    /// Adds `name` to the key, if it is not there yet.
     fn key(&mut self, name: &str, colour: &str) {
         let key = (shortened(name), colour.to_owned());
         if !self.keys.contains(&key) {
@@ -137,7 +137,7 @@ impl Plot {
 }
 
 impl Panel<'_> {
-    /// A line through `points` (across, up), with its name in the key.
+    /// Draws a line through `points` (across, up), with its name in the key.
     pub fn line(&mut self, name: &str, colour: &str, points: impl IntoIterator<Item = (f64, f64)>) {
         let mut places = String::new();
         for (x, y) in points.into_iter().map(|point| self.place(point)) {
@@ -153,13 +153,13 @@ impl Panel<'_> {
         self.plot.key(name, colour);
     }
 
-    /// A line through `values`, one at each whole number across, from the axis's beginning on.
+    /// Draws a line through `values`, spaced by 1 across, from the start of the axis.
     pub fn values(&mut self, name: &str, colour: &str, values: &[f64]) {
         let from = self.across.from;
         self.line(name, colour, values.iter().enumerate().map(|(index, &value)| (from + index as f64, value)));
     }
 
-    /// A dot at each of `points` (across, up), with their name in the key. Those outside the panel are left out.
+    /// Draws a dot at each of `points` (across, up), with their name in the key. Points outside the panel are left out.
     pub fn dots(&mut self, name: &str, colour: &str, points: impl IntoIterator<Item = (f64, f64)>) {
         let within = |axis: &Axis<'_>, value: f64| (axis.from..=axis.to).contains(&value);
         let _ = writeln!(self.plot.body, "<g fill=\"{colour}\" fill-opacity=\"0.6\">");
@@ -174,7 +174,7 @@ impl Panel<'_> {
         self.plot.key(name, colour);
     }
 
-    /// A level line at `up` across the panel, with its number on the left.
+    /// Draws a horizontal line at `up` across the panel, with its number on the left.
     pub fn level(&mut self, up: f64) {
         let (_, y) = self.place((self.across.from, up));
         let _ = writeln!(
@@ -184,7 +184,8 @@ impl Panel<'_> {
         self.plot.text(LEFT - 5.0, y + 4.0, "end", &up.to_string());
     }
 
-    /// A thick bar at each of `points` (across, up), with their name in the key: `half` is half its width, across.
+    /// Draws a thick bar at each of `points` (across, up), with their name in the key. `half` is half the width of a
+    /// bar, in units of the horizontal axis.
     pub fn bars(&mut self, name: &str, colour: &str, half: f64, points: impl IntoIterator<Item = (f64, f64)>) {
         for (across, up) in points {
             let (from, y) = self.place((across - half, up));
@@ -197,7 +198,7 @@ impl Panel<'_> {
         self.plot.key(name, colour);
     }
 
-    /// Where a point lies on the picture; one outside the panel lies on its edge.
+    /// Coordinates of a point in the picture; a point outside the panel is moved to its edge.
     fn place(&self, (across, up): (f64, f64)) -> (f64, f64) {
         let x = LEFT + self.across.share(across) * (RIGHT - LEFT);
         let y = self.top + (1.0 - self.up.share(up)) * PANEL;
@@ -210,13 +211,13 @@ fn key_width(name: &str) -> f64 {
     30.0 + 7.5 * name.chars().count() as f64
 }
 
-/// The end of a name that is too long for a row, as of a file deep in folders.
+/// The name, or only its end if it is too long for a row, as the path of a file deep in folders can be.
 fn shortened(name: &str) -> String {
     let extra = name.chars().count().saturating_sub(LONGEST_NAME);
     if extra == 0 { name.to_owned() } else { format!("…{}", name.chars().skip(extra).collect::<String>()) }
 }
 
-/// `text` as it may stand in XML.
+/// `text` escaped for XML.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
@@ -227,7 +228,7 @@ mod tests {
 
     const UNIT: Axis<'static> = Axis { label: "", from: 0.0, to: 1.0 };
 
-    /// Where each key stands: left end, base line, name.
+    /// Left end, base line and name of each key.
     fn keys(svg: &str) -> Vec<(f64, f64, String)> {
         let lines: Vec<&str> = svg.lines().collect();
         let swatches = lines.windows(2).filter(|pair| pair[0].contains("height=\"4\""));

@@ -73,24 +73,24 @@ pub const LONGEST_RUN: Duration = Duration::from_secs(2);
 /// The signal that the kernel sends after a longer run.
 pub const OVERRUN: i32 = libc::SIGXCPU;
 
-/// Flag for threads that a thread starts: they begin at ordinary priority. It cannot be cleared without
-/// special rights, so it stays set whatever the policy.
+/// Flag that makes the threads which a thread starts begin at ordinary priority. It cannot be cleared without
+/// special rights, so it stays set under every scheduling policy.
 const ALONE: i32 = libc::SCHED_RESET_ON_FORK;
 
 /// Niceness without real-time priority.
 const PREFERRED: i32 = -10;
 /// Niceness of work that the loop must not wait for.
 const BEHIND: i32 = 5;
-/// Niceness of work that those must not wait for either.
+/// Niceness of work that threads at [`BEHIND`] must not wait for either.
 const FURTHER_BEHIND: i32 = 10;
 /// Niceness of work that nobody waits for.
 const LAST: i32 = 19;
 
 static WITHDRAWN: AtomicBool = AtomicBool::new(false);
 
-/// Puts the calling thread before others, as far as the process may: at real-time priority (root,
-/// `CAP_SYS_NICE` or an `rtprio` limit), else at a lower niceness (root, or a raised limit). Threads that
-/// it starts do not inherit this.
+/// Raises the calling thread as far as the process may: to real-time priority (root, `CAP_SYS_NICE` or an
+/// `rtprio` limit), otherwise to a lower niceness (root, or a raised limit). Threads that it starts do not
+/// inherit the real-time priority.
 #[allow(clippy::must_use_candidate, reason = "only the loop tells how it stands")]
 pub fn raise(place: Place) -> Standing {
     if withdrawn() {
@@ -104,7 +104,7 @@ pub fn raise(place: Place) -> Standing {
     if nice(PREFERRED) { Standing::Preferred } else { Standing::Ordinary }
 }
 
-/// The same, also for the threads that the calling one starts: for a library's own threads, whose
+/// Like [`raise`], but threads that the calling one starts inherit the priority. For a library's own threads, whose
 /// priority nobody else can set.
 pub fn raise_with_children(place: Place) {
     if withdrawn() || !set(None, libc::SCHED_FIFO, place as i32) {
@@ -112,12 +112,12 @@ pub fn raise_with_children(place: Place) {
     }
 }
 
-/// Prefers the calling thread slightly where that is allowed; others set its real-time priority.
+/// Lowers the calling thread's niceness, if that is allowed. Other threads set its real-time priority.
 pub fn prefer() {
     nice(PREFERRED);
 }
 
-/// Puts the calling thread behind others: for work that the control loop must not wait for. Needs no
+/// Puts the calling thread behind others: for work that the control loop must not wait for. Needs no special
 /// rights.
 pub fn lower() {
     nice(BEHIND);
@@ -128,8 +128,7 @@ pub fn lower_further() {
     nice(FURTHER_BEHIND);
 }
 
-/// Puts `thread`, one of this process, at the real-time priority of `place`; returns whether that is
-/// allowed.
+/// Gives `thread`, a thread of this process, the real-time priority of `place`; returns whether that was allowed.
 #[must_use]
 pub fn raise_thread(thread: Pid, place: Place) -> bool {
     !withdrawn() && set(Some(thread), libc::SCHED_FIFO | ALONE, place as i32)
@@ -147,17 +146,17 @@ pub fn abandon_thread(thread: Pid) {
 }
 
 /// Makes the kernel send [`OVERRUN`] when a thread at real-time priority has kept a processor for
-/// [`LONGEST_RUN`]. A handler must be in place before: else the signal ends the process.
+/// [`LONGEST_RUN`]. A handler must be installed first; otherwise the signal ends the process.
 pub fn bound_runs() {
     let bound = u64::try_from(LONGEST_RUN.as_micros()).unwrap_or(u64::MAX);
     let maximum = getrlimit(Resource::Rttime).maximum;
     let current = maximum.map_or(bound, |most| most.min(bound));
 
-    // Where this is refused, the kernel's own limit remains.
+    // If this is refused, the kernel's own limit remains.
     let _ = setrlimit(Resource::Rttime, Rlimit { current: Some(current), maximum });
 }
 
-/// Takes every thread's real-time priority away, and grants no more.
+/// Removes real-time priority from every thread, and grants it to none from then on.
 pub fn withdraw() {
     // First, so that no thread is raised while the others are lowered.
     WITHDRAWN.store(true, Ordering::Relaxed);
@@ -176,12 +175,11 @@ pub fn withdrawn() -> bool {
     WITHDRAWN.load(Ordering::Relaxed)
 }
 
-/// Keeps the program's present and future memory from being swapped out, page by page as it is used, where
-/// memory is not limited; returns whether it did. With a limit it does not even try: beyond the limit
-/// memory would be refused.
+/// Locks the program's present and future memory against being swapped out, page by page as it is used; returns
+/// whether it did. If locked memory is limited, it does not even try: allocations beyond the limit would fail.
 #[must_use]
 pub fn lock_memory() -> bool {
-    // Without ONFAULT all of libtorch would be read in, of which the policies need little.
+    // Without ONFAULT all of libtorch would be read in, though the policies need little of it.
     may_lock_memory() && mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT).is_ok()
 }
 
@@ -207,7 +205,7 @@ fn nice(value: i32) -> bool {
     rustix::process::setpriority_process(None, value).is_ok()
 }
 
-/// Gives `thread`, or the calling one, a scheduling policy; returns whether that is allowed.
+/// Sets the scheduling policy of `thread`, or of the calling one if `None`; returns whether that was allowed.
 fn set(thread: Option<Pid>, policy: i32, priority: i32) -> bool {
     let parameters = libc::sched_param { sched_priority: priority };
     let thread = thread.map_or(0, Pid::as_raw_pid);

@@ -1,6 +1,6 @@
-//! How the reference benchmark's scans were chosen: several kinds of disturbance at several
-//! strengths, on validation pictures, judged by `fixed` and the hill-climbers alone against the
-//! paper's simulated column. The least largest deviation wins. `cargo bench --bench calibrate`
+//! Shows how the reference benchmark's scans were chosen. Several kinds of disturbance at several strengths are tried
+//! on validation pictures. Only `fixed` and the hill-climbers are compared with the paper's simulated column. The
+//! candidate whose largest deviation is the least wins. `cargo bench --bench calibrate`
 
 use std::sync::Arc;
 

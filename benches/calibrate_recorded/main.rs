@@ -1,8 +1,7 @@
-//! How the hand that moves over the recorded benchmark's phantom was chosen: several speeds along
-//! the surface and towards it, on brains that the benchmark does not use, judged by `fixed` and the
-//! hill-climbers alone against the paper's robotic column. The least largest deviation wins; the
-//! last line is the benchmark itself. `cargo bench --bench calibrate_recorded`, with `-- frozen`
-//! for that line alone.
+//! Shows how the hand that moves over the recorded benchmark's phantom was chosen. Several speeds along the surface and
+//! towards it are tried on brains that the benchmark does not use. Only `fixed` and the hill-climbers are compared with
+//! the paper's robotic column. The candidate whose largest deviation is the least wins. The last line is the benchmark
+//! itself. `cargo bench --bench calibrate_recorded`, with `-- frozen` for that line alone.
 
 use std::sync::Arc;
 
@@ -14,7 +13,7 @@ use parfocal::simulation::phantom::{Haste, Trajectory};
 
 /// The paper's robotic column: policy and mean absolute error.
 const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];
-/// Brains tried at each speed, and poses over each.
+/// Number of brains tried at each speed, and of poses over each.
 const TRIED: (u64, usize) = (3, 400);
 
 fn main() {

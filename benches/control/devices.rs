@@ -1,9 +1,9 @@
 //! The loop on the bench's devices: Aravis's fake GigE Vision camera on the loopback, and the
 //! Optotune driver on an emulated unit behind a pseudo-terminal.
 //!
-//! The end of the exposure is known by the camera's clock, and so by the first packet. The transfer
-//! comes after it, and is the link's doing: it is told apart, and the loop's own latency counts
-//! from the moment the last packet was in.
+//! The end of the exposure is known from the camera's clock. The first packet leaves then. The transfer comes after it
+//! and depends on the link. So it is shown separately, and the loop's own latency counts from the moment when the last
+//! packet arrived.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -19,11 +19,11 @@ use parfocal::lens::{self, FocalPower, Lens, LensDynamics, LensError, LensHealth
 use crate::fake_camera::{FakeCamera, NAME};
 use crate::watch_loop;
 
-/// Until the camera's clock is known well.
+/// Steps that are left out, until the camera's clock is known well.
 const WARM_UP: usize = 50;
 const STEPS: usize = 750;
 
-/// When the last packet of each frame was in.
+/// When the last packet of each frame arrived, by frame number.
 type Arrivals = Arc<Mutex<HashMap<u64, Moment>>>;
 /// When each command was given to the driver.
 type Commands = Arc<Mutex<Vec<Moment>>>;
@@ -67,7 +67,8 @@ fn scenario(format: &str, fps: f64) {
     print("lens command to the wire's far end", to_wire(&commands.lock().expect("no panic"), &emulator.commands()));
 }
 
-/// From each command to the moment that the unit read it. A command that the next one overtook was never sent.
+/// Time from each command to the moment when the unit read it. A command that was overtaken by the next one was never
+/// sent.
 fn to_wire(given: &[Moment], read: &[(Moment, i16)]) -> impl Iterator<Item = Duration> {
     given.iter().enumerate().filter_map(move |(index, &at)| {
         let next = given.get(index + 1).copied().unwrap_or(Moment::from_nanos(u64::MAX));
@@ -82,7 +83,7 @@ fn print(what: &str, times: impl Iterator<Item = Duration>) {
     println!("  {what:<35} p50 {p50:>6}  p99 {p99:>6}  worst {:>6}  of {steps}", micros.last().unwrap_or(&0));
 }
 
-/// A camera whose arrivals are noted.
+/// A camera that notes when each frame is complete.
 struct Watched {
     camera: GigeCamera,
     arrivals: Arrivals,
@@ -106,7 +107,7 @@ impl Camera for Watched {
     }
 }
 
-/// A lens whose commands are noted.
+/// A lens that notes when each command is given.
 struct Timed {
     lens: Box<dyn Lens>,
     commands: Commands,

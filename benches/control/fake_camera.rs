@@ -8,14 +8,14 @@ use parfocal::clock::{Clock, SystemClock};
 
 const PROGRAM: &str = "arv-fake-gv-camera-0.8";
 
-/// Its name in `gige:`.
+/// The fake camera's name in `gige:`.
 pub const NAME: &str = "Aravis-Fake-BENCH";
 
 /// A running fake camera; ended when dropped.
 pub struct FakeCamera(Child);
 
 impl FakeCamera {
-    /// Starts it and waits until it answers. `None` where the program is not installed.
+    /// Starts it and waits until it answers. `None` if the program is not installed.
     pub fn start() -> Option<Self> {
         let mut command = Command::new(PROGRAM);
         command.args(["-i", "127.0.0.1", "-s", "BENCH"]).stdout(Stdio::null()).stderr(Stdio::null());

@@ -1,7 +1,6 @@
-//! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop;
-//! and how long the loop takes from exposure to lens command. `cargo bench --features aravis
-//! --bench control loop` measures the loop alone, with the phantom, and with Aravis's fake GigE
-//! Vision camera and the emulated lens driver.
+//! Measures what a focus step costs: the metrics, each policy's step, and a whole step of the control loop. Also
+//! measures how long the loop takes from exposure to lens command. `cargo bench --features aravis --bench control loop`
+//! measures the loop alone, with the phantom, and with Aravis's fake GigE Vision camera and the emulated lens driver.
 #![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
 #[cfg(feature = "aravis")]
@@ -59,7 +58,7 @@ fn policies(criterion: &mut Criterion) {
     }
 }
 
-/// From a mosaic in memory to the lens command, the hop to the policy's thread and back included.
+/// From a mosaic in memory to the lens command, including the hop to the policy's thread and back.
 fn steps(criterion: &mut Criterion) {
     let samples = (0..2048 * 1088).map(|index| texture(index) as u16).collect();
     let image = FrameImage::Mosaic(Arc::new(MosaicFrame::new(2048, 1088, samples).expect("fits")));
@@ -94,8 +93,8 @@ fn latency(_: &mut Criterion) {
     println!("loop/phantom  {steps} steps at 50 a second: exposure to lens command p50 {p50} µs, p99 {p99} µs");
 }
 
-/// What the whole loop did in `steps` steps, the MGM hill-climber in charge: telemetry is drained, and a thread makes a
-/// picture of each frame meanwhile, as the live view does.
+/// Records of `steps` steps of the whole loop, driven by the MGM hill-climber. Telemetry is drained, and a thread makes
+/// a picture of each frame meanwhile, as the live view does.
 fn watch_loop(camera: Box<dyn Camera>, lens: Box<dyn Lens>, fps: f64, steps: usize) -> Vec<StepRecord> {
     let mut reconstructor = Reconstructor::default();
     let clock = Arc::new(SystemClock);
@@ -133,7 +132,7 @@ fn bench_devices(_: &mut Criterion) {
     devices::measure();
 }
 
-/// Cameras are a feature.
+/// Real cameras need the feature `aravis`.
 #[cfg(not(feature = "aravis"))]
 fn bench_devices(_: &mut Criterion) {
     println!("loop/gige  skipped: built without the feature aravis");

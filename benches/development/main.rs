@@ -1,7 +1,7 @@
-//! Development at each size on one thread, in copies of the mosaic: each round times a plain copy
-//! and everything else, and the table has the medians over the rounds. Then the pictures as JPEG, made
-//! as they are developed for it and from RGB. Times are the thread's own,
-//! without what other programs take meanwhile. `cargo bench --bench development`
+//! Measures development at each size on one thread, in multiples of a plain copy of the mosaic. Each round times a copy
+//! and everything else, and the table has the medians over the rounds. Then measures JPEG encoding of the pictures, as
+//! developed for JPEG and from RGB. Times are processor time of the thread, so they leave out what other programs take
+//! meanwhile. `cargo bench --bench development`
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -37,7 +37,7 @@ fn per_pixel() -> Calibration {
     Calibration { dark: reference(30), white: reference(900), ..Calibration::default() }
 }
 
-/// The fastest of some runs.
+/// Time of the fastest of [`RUNS`] runs.
 fn time(mut run: impl FnMut()) -> Duration {
     let fastest = (0..RUNS).map(|_| {
         let begin = of_this_thread();
@@ -47,7 +47,7 @@ fn time(mut run: impl FnMut()) -> Duration {
     fastest.min().unwrap_or_default()
 }
 
-/// Time that this thread has run.
+/// Processor time of this thread so far.
 fn of_this_thread() -> Duration {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
@@ -59,7 +59,7 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 fn main() {
-    // `cargo test --benches` only wants to see that it builds.
+    // `cargo test --benches` only checks that it starts.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

@@ -1,8 +1,7 @@
-//! What a policy could gain from finer luminance: how often the mean gradient magnitude tells a step
-//! towards focus from one away, of the middle of the picture seen coarsely (32x32) and twice as fine
-//! (64x64). Each step lies within three planes of the sharpest one; the scene stands still, or drifts
-//! between the two pictures as it does below a hand. `cargo bench --bench finer -- DIR...`, with a
-//! focal stack in each folder.
+//! Measures what a policy could gain from finer luminance: how often the mean gradient magnitude tells a step towards
+//! focus from a step away from it. It looks at squares of the picture, coarsely (32x32) and twice as fine (64x64). Each
+//! step lies within three planes of the sharpest one. The scene stands still, or drifts between the two pictures as it
+//! does below a hand. `cargo bench --bench finer -- DIR...`, with a focal stack in each folder.
 
 use std::path::Path;
 
@@ -14,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Places looked at in each stack.
 const PLACES: usize = 400;
-/// Furthest drift between two pictures, along either side, in coarse pixels.
+/// Furthest drift between two pictures, along each axis, in coarse pixels.
 const DRIFT: i32 = 5;
 /// Furthest step from the sharpest plane.
 const NEAR: usize = 3;
@@ -25,7 +24,7 @@ struct Stack {
     coarse: Vec<GrayImage>,
 }
 
-/// Steps told right, and all.
+/// Steps whose direction was told correctly, and all steps.
 #[derive(Default, Clone, Copy)]
 struct Count {
     right: usize,
@@ -69,7 +68,7 @@ fn read(folder: &Path) -> Stack {
     Stack { fine, coarse }
 }
 
-/// Steps told right: coarse and fine, standing still; coarse and fine, drifting.
+/// Counts of correct steps: coarse and fine, standing still; coarse and fine, drifting.
 fn counts(stack: &Stack) -> [Count; 4] {
     let mut counts = [Count::default(); 4];
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -82,7 +81,7 @@ fn counts(stack: &Stack) -> [Count; 4] {
         let coarse: Vec<f64> = stack.coarse.iter().map(|picture| sharpness(picture, 1, x, y)).collect();
         let fine: Vec<f64> = stack.fine.iter().map(|picture| sharpness(picture, 2, x, y)).collect();
 
-        // Only places where both agree on the sharpest plane, so that neither has the truth of its own.
+        // Uses only places where both scales agree on the sharpest plane, so that they are judged by the same truth.
         let best = largest(&coarse);
         if best.abs_diff(largest(&fine)) > 1 {
             continue;

@@ -1,4 +1,4 @@
-//! Imaging at the sensor's full size, beside a plain copy of the same mosaic.
+//! Imaging at the sensor's full size, compared with a plain copy of the same mosaic.
 
 #![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 

@@ -1,4 +1,4 @@
-//! What a frame of the simulated cameras costs, beside a plain copy of the phantom's mosaic.
+//! What a frame of the simulated cameras costs, compared with a plain copy of the phantom's mosaic.
 
 #![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
@@ -12,7 +12,7 @@ use parfocal::clock::{ManualClock, Moment};
 use parfocal::lens::{FocalPower, Optics};
 use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH, Scene};
 
-/// Glass that never moves.
+/// A lens that never moves.
 struct Still;
 
 impl Optics for Still {

@@ -1,5 +1,5 @@
-//! A slow link: hands on what the server sends at so many bits a second, and holds no more than a
-//! packet itself.
+//! A slow link: forwards what the server sends at a given number of bits a second, and holds no more than a packet
+//! itself.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, copy};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::time::{Instant, sleep_until};
 
-/// Bytes handed on at a time, about a packet.
+/// Bytes forwarded at a time, about a packet.
 const PACKET: usize = 1460;
 
 /// Address of a link to `server` that carries `bits` a second downwards.
@@ -26,9 +26,9 @@ pub async fn slow(server: SocketAddr, bits: u64) -> SocketAddr {
 
 async fn carry(client: TcpStream, server: SocketAddr, bits: u64) {
     let socket = TcpSocket::new_v4().expect("a socket");
-    // Before connecting, when both are agreed on. Segments as on a network: loopback's own, of 64
-    // KB, never fit the small buffer, and would leave only when a timer ran out. The queue is to
-    // stand where it would: in the server's kernel.
+    // Set before connecting, because both are agreed on then. Segments must be as small as on a network: those of
+    // loopback, of 64 KB, never fit the small buffer and would leave only when a timer ran out. So the queue stands
+    // where it would on a slow network: in the server's kernel.
     SockRef::from(&socket).set_tcp_mss(PACKET as u32).expect("small segments");
     SockRef::from(&socket).set_recv_buffer_size(PACKET * 8).expect("a small buffer");
     let upstream = socket.connect(server).await.expect("the server");

@@ -1,10 +1,10 @@
-//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers,
-//! of pictures of each size, over a slow link, and beside four processes that keep every processor busy, with real-time
-//! priority and without.
+//! Measures the whole system: the real server in its own process, watched by up to 16 viewers, with pictures of each
+//! size, over a slow link, and next to four processes that keep every processor busy, with real-time priority and
+//! without.
 //!
 //! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` (or `recorded`) for the rows of that name.
-//! One table; what is worth comparing is compared within one run. Ages are exact: the server's
-//! record of each frame's exposure and the viewers' clock are the same monotonic clock.
+//! Prints one table. Compare only figures of the same run. Ages are exact: the server's record of each frame's exposure
+//! and the viewers' clock are the same monotonic clock.
 
 mod link;
 mod process;
@@ -19,21 +19,21 @@ use process::{Busy, Server, Usage};
 use sqlx::{Connection, SqliteConnection};
 use viewer::Seen;
 
-/// Each row is measured for so long, after so long a start.
+/// How long each row is measured, after [`WARM_UP`].
 const MEASURED: Duration = Duration::from_secs(10);
 const WARM_UP: Duration = Duration::from_secs(3);
 
 /// One row of the table.
 struct Scenario {
     name: &'static str,
-    /// The camera, and what its colour picture is made of.
+    /// The simulated camera.
     camera: Camera,
     viewers: usize,
-    /// Pixels that the picture is wide on the first viewer's screen; the others' show the smallest size.
+    /// Width of the picture on the first viewer's screen, in pixels. The other viewers' screens show the smallest size.
     screen: u32,
     /// Bits a second of the viewers' link, if it is a slow one.
     link: Option<u64>,
-    /// Beside what else it runs.
+    /// What runs beside the server.
     beside: Beside,
 }
 
@@ -42,33 +42,33 @@ struct Scenario {
 enum Beside {
     /// Nothing of ours.
     Nothing,
-    /// A recording of every mosaic, for `RECORDED`, of a camera at 25 frames a second.
+    /// A recording of every mosaic from a camera at 25 frames a second, for [`RECORDED`].
     Recording,
-    /// Processes that keep every processor busy, while a policy drives the lens; and whether the server may have
-    /// real-time priority where this user may.
+    /// Processes that keep every processor busy, while a policy drives the lens. `real_time` says whether the server
+    /// may have real-time priority, if this user may give it.
     Busy { real_time: bool },
 }
 
 #[derive(Clone, Copy)]
 enum Camera {
     Phantom,
-    /// Colour pictures as they are: what is left is JPEG and serving.
+    /// Colour pictures, which need no development: only JPEG and serving are left.
     Picture,
 }
 
 const WITHOUT: Beside = Beside::Busy { real_time: false };
 const WITH: Beside = Beside::Busy { real_time: true };
 
-/// The row with a recording is measured for so long.
+/// How long the row with a recording is measured.
 const RECORDED: Duration = Duration::from_mins(1);
 
-/// Processes that keep the processors busy.
+/// Number of processes that keep the processors busy.
 const BUSY: usize = 4;
 
 /// Bytes of a mosaic whose samples are packed, four of 10 bit into five bytes.
 const PACKED: f64 = 2048.0 * 1088.0 * 1.25;
 
-/// Screens on which a picture of each size is as wide as it has pixels.
+/// Screen widths, in pixels, that each size of the picture fills exactly.
 const CELL: u32 = 512;
 const HALF: u32 = 1024;
 const FULL: u32 = 2048;
@@ -176,7 +176,7 @@ const SCENARIOS: [Scenario; 16] = [
     Scenario { name: "the same, rt", camera: Camera::Picture, viewers: 4, screen: CELL, link: None, beside: WITH },
 ];
 
-/// What a row says.
+/// The figures of a row.
 struct Row {
     first_answer: Duration,
     usage: Usage,
@@ -187,7 +187,7 @@ struct Row {
     recorded: Option<Recorded>,
 }
 
-/// What became of a recording.
+/// The result of a recording.
 struct Recorded {
     frames: usize,
     missing: u64,
@@ -197,7 +197,7 @@ struct Recorded {
 
 #[tokio::main(flavor = "multi_thread", worker_threads = 2)]
 async fn main() {
-    // `cargo test --benches` only asks whether it starts.
+    // `cargo test --benches` only checks that it starts.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

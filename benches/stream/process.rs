@@ -1,4 +1,4 @@
-//! The server in a process of its own, and what it uses.
+//! The server in its own process, and the resources that it uses.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -14,18 +14,18 @@ use tempfile::TempDir;
 pub struct Server {
     process: Child,
     started: Moment,
-    /// Where it is reached.
+    /// Its address.
     pub address: SocketAddr,
     /// The operator's key.
     pub key: String,
     data: TempDir,
 }
 
-/// Processes that do nothing, as fast as they can; ended when dropped.
+/// Processes that only keep a processor busy; ended when dropped.
 pub struct Busy(Vec<Child>);
 
 impl Busy {
-    /// So many.
+    /// Starts this many processes.
     pub fn start(processes: usize) -> Self {
         let start = |_| Command::new("sh").args(["-c", "while :; do :; done"]).spawn().expect("a shell");
         Self((0..processes).map(start).collect())
@@ -41,7 +41,8 @@ impl Drop for Busy {
     }
 }
 
-/// The program; without the right to real-time priority where it is not to be `preferred` and root starts it.
+/// The command that starts the program. If root starts it and it is not `preferred`, it has no right to real-time
+/// priority.
 fn program(preferred: bool) -> Command {
     let program = env!("CARGO_BIN_EXE_parfocal");
     if preferred || !rustix::process::geteuid().is_root() {
@@ -53,7 +54,7 @@ fn program(preferred: bool) -> Command {
 }
 
 impl Server {
-    /// A server with `camera` at so many frames a second, with real-time priority if it is to be `preferred`.
+    /// Starts a server with `camera` at this many frames a second. It may have real-time priority if it is `preferred`.
     pub fn start(camera: &str, frames_a_second: u32, preferred: bool) -> Self {
         let data = tempfile::tempdir().expect("a folder");
         let started = SystemClock.now();
@@ -75,7 +76,7 @@ impl Server {
         Self { process, started, address: SocketAddr::from(([127, 0, 0, 1], port)), key, data }
     }
 
-    /// Has `policy` drive the lens.
+    /// Lets `policy` drive the lens.
     pub async fn put_in_charge(&self, policy: &str) {
         self.order("focus", &serde_json::json!({ "policy": policy })).await;
     }
@@ -92,19 +93,19 @@ impl Server {
         answer.and_then(reqwest::Response::error_for_status).expect("done");
     }
 
-    /// From the start of the process to its first answer.
+    /// Time from the start of the process to its first answer.
     pub async fn first_answer(&self) -> Duration {
         let client = reqwest::Client::builder().no_proxy().build().expect("a client");
         client.get(format!("http://{}/healthz", self.address)).send().await.expect("an answer");
         SystemClock.now().since(self.started)
     }
 
-    /// What it has used so far.
+    /// Processor time and memory that it has used so far.
     pub fn usage(&self) -> Counted {
         Counted::of(self.process.id())
     }
 
-    /// Ends it as a service manager would; what it kept is left.
+    /// Ends it as a service manager would. Returns its data folder.
     pub fn end(&mut self) -> TempDir {
         kill_process(Pid::from_child(&self.process), Signal::TERM).expect("a signal");
         self.process.wait().expect("its end");
@@ -126,9 +127,9 @@ pub struct Usage {
     pub control: f64,
     /// The imaging threads: colour, JPEG, content area.
     pub imaging: f64,
-    /// The threads that serve.
+    /// The threads that serve pages and streams.
     pub serving: f64,
-    /// Resident memory.
+    /// Resident memory, in MB.
     pub resident_mb: u64,
 }
 
@@ -143,7 +144,7 @@ impl Counted {
                 name if name.starts_with("tokio") => &mut counted.serving,
                 _ => continue,
             };
-            // Nanoseconds on a processor come first.
+            // The first number is the nanoseconds on a processor.
             let text = fs::read_to_string(task.path().join("schedstat")).unwrap_or_default();
             *kind += text.split(' ').next().and_then(|time| time.parse::<f64>().ok()).unwrap_or_default() / 1e9;
         }
@@ -168,8 +169,8 @@ fn resident_mb(process: u32) -> u64 {
     line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or_default() / 1024
 }
 
-/// A picture for the footage camera, whose window shows three quarters of it, 512 by 272: with as
-/// much detail as makes a JPEG of about 30 KB.
+/// A picture for the footage camera, whose window shows three quarters of it, 512 by 272. It has enough detail for a
+/// JPEG of about 30 KB.
 pub fn picture(folder: &TempDir) -> String {
     let width = 683;
     let height = 363;

@@ -1,4 +1,4 @@
-//! A viewer that draws at once: acknowledges each frame as soon as it is there.
+//! A viewer that draws at once: acknowledges each frame as soon as it arrives.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -11,11 +11,11 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 
 /// A frame that arrived.
 pub struct Seen {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u64,
-    /// When it was complete, monotonic nanoseconds.
+    /// When its message arrived whole, in monotonic nanoseconds.
     pub at: u64,
-    /// Bytes of its message.
+    /// Size of its message, in bytes.
     pub bytes: usize,
 }
 

@@ -1,10 +1,10 @@
-//! How long the pages and commands take on the data of a whole study, and how much memory: the list of sessions, a
+//! Measures how much time and memory the pages and commands take on the data of a whole study: the list of sessions, a
 //! session's timeline, the study's export, its analysis.
 //!
 //! `cargo bench --bench study_size` makes a small study; `cargo bench --bench study_size -- 100 100000` makes one of
-//! 100 sessions of 100,000 steps of telemetry each, in a temporary folder (`TMPDIR`) that needs about 4 GB, and takes
-//! minutes to do so. Goals are for that size; that of the analysis is the longest that a page may take to answer. An
-//! export runs behind everything else, so measure it on a machine that does nothing else.
+//! 100 sessions of 100,000 steps of telemetry each, in a temporary folder (`TMPDIR`) that needs about 4 GB. That takes
+//! minutes. Goals are for that size. The analysis's goal is the longest that a page may take to answer. An export lets
+//! everything else go first, so measure it on a machine that does nothing else.
 
 mod measuring;
 mod study;
@@ -22,7 +22,7 @@ use parfocal::trial::role::Role;
 use measuring::{Measured, measured};
 use study::STUDY;
 
-/// Points of a setting's focal path that the researcher's page asks for.
+/// Points of a setting's focal path that the researcher's page requests.
 const POINTS: u32 = 600;
 
 fn main() {
@@ -70,7 +70,7 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
     let out = data.join(if unblinded { "unblinded" } else { "blinded" });
     let recorder = made.trial.recorder();
 
-    // When the last session was done, in nanoseconds from the start.
+    // When the last session was exported, in nanoseconds from the start.
     let begun = SystemClock.now();
     let exported_after = Arc::new(AtomicU64::new(0));
     let heard = Arc::clone(&exported_after);
@@ -93,7 +93,7 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
     );
     println!("| its size | | {:.0} MB | |", size_mb(&out));
 
-    // Of what `parfocal verify` checks, one session alone: all of them take as long as the export.
+    // Only one session is verified, as `parfocal verify` does: all of them take as long as the export.
     let session = out.join("sessions").join(made.sessions[0].to_string());
     let checks = parfocal::store::export::verify::verify(&session, None);
     assert!(checks.iter().all(|check| !matches!(check.verdict, Verdict::Failed(_))), "{checks:?}");

@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use parfocal::clock::{Clock, SystemClock};
 
-/// What a piece of work gave and took.
+/// Result and cost of a piece of work.
 pub struct Measured<T> {
-    /// What it gave.
+    /// The work's result.
     pub value: T,
-    /// Time.
+    /// How long the work took.
     pub took: Duration,
-    /// The most memory that the process had meanwhile, in MB: its own and that of the files it maps.
+    /// Peak memory of the process meanwhile, in MB: its own and that of the files it maps.
     pub peak_mb: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A study of many sessions, made by the server's own code on clocks that are moved by hand: its sessions, what is said
+//! A study of many sessions, made by the server's own code on clocks that are moved by hand: its sessions, the comments
 //! in them, and telemetry chained as often as in theatre.
 
 #[path = "../../tests/trial/fixture.rs"]
@@ -32,7 +32,7 @@ pub const STUDY: &str = "size";
 const SITE: &str = "leeds";
 const PERSON: &str = "Dr Lead";
 
-/// Settings of a session.
+/// Number of settings in a session.
 const SETTINGS: usize = 6;
 
 /// Steps that are chained together: 16 s at 50 a second, as a server does.
@@ -58,7 +58,7 @@ low = "blurred"
 high = "sharp"
 "#;
 
-/// The study.
+/// A study that was made, and unblinded.
 pub struct Made {
     /// The server that made it.
     pub trial: Trial,
@@ -154,13 +154,13 @@ async fn telemetry(trial: &Trial, segment: SegmentId, begun: Moment, steps: usiz
             };
             sender.try_send(record).expect("there is room for them");
         }
-        // The writer ends with the last of them, and chains them.
+        // The writer ends after the last record, and chains them.
         drop(sender);
         run_writer(trial.store.clone(), records).await;
     }
 }
 
-/// Folds the database's log in, as a server does every 16 s.
+/// Folds the database's write-ahead log into it, as a server does every 16 s.
 async fn fold_log(data: &Path) {
     let file = format!("sqlite://{}", data.join("parfocal.db").display());
     let mut connection = SqliteConnection::connect(&file).await.expect("the database is there");

@@ -1,6 +1,5 @@
-//! What training costs: environment steps, replay memory, and updates beside the same loop in
-//! `PyTorch` (`peer.py`). `cargo bench --bench training`; for the peer, set PYTHON to a Python that
-//! has `PyTorch` 2.11.
+//! Measures what training costs: environment steps, replay memory, and updates compared with the same loop in `PyTorch`
+//! (`peer.py`). `cargo bench --bench training`; for the peer, set PYTHON to a Python that has `PyTorch` 2.11.
 
 use std::hint::black_box;
 use std::process::Command;
@@ -25,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 /// Transitions in a window.
 const TRANSITIONS: usize = 16;
 
-/// Runs `work` a little to warm up, and then `times` times; how often a second it ran.
+/// Runs `work` a few times to warm up, and then `times` times. Returns how often a second it ran.
 fn rate(times: u32, mut work: impl FnMut()) -> f64 {
     (0..=times / 10).for_each(|_| work());
     let begin = SystemClock.now();
@@ -64,7 +63,7 @@ fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u
     println!("ours {name}, {batch} transitions: {rate:.1} updates a second, {:.0} transitions", rate * batch as f64);
 }
 
-/// Updates a second of a whole training, frames played too: on one thread, and on one for each core.
+/// Updates a second of a whole training, including the frames that it plays: on one thread, and on one for each core.
 fn trainings(clips: &[Arc<Clip>]) {
     for threads in [1, 0] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -1,19 +1,19 @@
-//! Why something was not done with an account.
+//! Why a request about an account failed.
 
 use crate::store::StoreError;
 use crate::trial::account::{Account, AccountName};
 use crate::trial::refusal::Refusal;
 
-/// Why something was not done with an account. Nothing was changed.
+/// Why a request about an account failed. Nothing was changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AccountError {
-    /// Name and passphrase do not belong together, or the account is disabled.
-    #[error("Name and passphrase do not belong together, or the account is disabled. Try again, or ask a lead.")]
+    /// The name and the passphrase do not match, or the account is disabled.
+    #[error("The name and the passphrase do not match, or the account is disabled. Try again, or ask a lead.")]
     WrongPassphrase,
-    /// The passphrase that was asked for once more is wrong.
+    /// The passphrase that was given as confirmation is wrong.
     #[error("This is not your passphrase. Nothing was changed; try again.")]
     WrongConfirmation,
-    /// A lead set the passphrase, and the person has to choose another.
+    /// A lead set the passphrase, so the person has to choose another one.
     #[error(
         "A lead set this passphrase. Choose one that only you know, on the page /sign-in: then only you can sign with \
          your name."
@@ -22,16 +22,16 @@ pub enum AccountError {
     /// Too many attempts failed.
     #[error("Too many attempts failed. Wait {seconds} seconds, then try again.")]
     TooMany {
-        /// How long to wait.
+        /// Seconds to wait.
         seconds: u64,
     },
-    /// There is one like it.
+    /// The account's name or display name is already taken.
     #[error("{0}")]
     Taken(String),
-    /// There is no such account.
+    /// No account has this name.
     #[error("{0}")]
     Unknown(String),
-    /// The rules refuse.
+    /// The rules refuse the request.
     #[error("{0}")]
     Refused(Refusal),
     /// The disk or database failed.

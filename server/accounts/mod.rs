@@ -1,4 +1,4 @@
-//! Personal accounts: making and changing them, signing in, and the browsers that are signed in. The rules stand in
+//! Personal accounts: making and changing them, signing in, and the browsers that are signed in. The rules are in
 //! [`crate::trial::account`].
 
 mod error;
@@ -28,31 +28,31 @@ use crate::trial::account::{
 use crate::trial::refusal::Refusal;
 use throttle::Throttle;
 
-/// A sign-in is noted as used at most so often: each note is a write to the disk.
+/// How often the use of a sign-in is recorded at most: each time is a write to the disk.
 const NOTED_EVERY: Duration = Duration::from_mins(1);
 
-/// Accounts, and what is done with them. Clone freely.
+/// The accounts, and all operations on them. Cheap to clone.
 #[derive(Clone)]
 pub struct Accounts {
     book: AccountBook,
     clock: Arc<dyn Clock>,
     cost: Cost,
     throttle: Arc<Mutex<Throttle>>,
-    /// One passphrase is hashed at a time: each takes 19 MiB and a core.
+    /// Only one passphrase is hashed at a time, because each takes 19 MiB and a core.
     hashing: Arc<Semaphore>,
 }
 
 impl Accounts {
-    /// Those of the server.
+    /// The accounts of the running server.
     #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>, cost: Cost) -> Self {
         Self::new(AccountBook::of_server(store, Arc::clone(&clock)), clock, cost)
     }
 
-    /// Those of data folder `folder`, for a command, whether or not a server has it open.
+    /// Opens the accounts of the data folder `folder` for a command. A server may have the folder open too.
     ///
     /// # Errors
-    /// When there is no database, it is not of this version, or it cannot be written.
+    /// If there is no database, it is not of this version, or it cannot be written.
     pub async fn open(folder: &Path, clock: Arc<dyn Clock>, cost: Cost) -> Result<Self, StoreError> {
         Ok(Self::new(AccountBook::open(folder, Arc::clone(&clock)).await?, clock, cost))
     }
@@ -62,13 +62,13 @@ impl Accounts {
         Self { book, clock, cost, throttle: Arc::default(), hashing }
     }
 
-    /// For reading.
+    /// The reader of the accounts' database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {
         self.book.reader()
     }
 
-    /// Ends its connections where it has its own.
+    /// Closes the database connections, if it has its own.
     pub async fn close(&self) {
         self.book.close().await;
     }
@@ -76,23 +76,23 @@ impl Accounts {
     /// All accounts, by name.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn all(&self) -> Result<Vec<Account>, AccountError> {
         Ok(self.reader().accounts().await?)
     }
 
-    /// All accounts, by name, as a lead sees them.
+    /// All accounts, by name, with the details that a lead sees.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn lines(&self) -> Result<Vec<AccountLine>, AccountError> {
         Ok(self.reader().account_lines().await?)
     }
 
-    /// Makes an account. `by`: the lead who makes it; none for the command line.
+    /// Makes an account. `by` is the lead who makes it; none on the command line.
     ///
     /// # Errors
-    /// When there is one of this name or this display name, or the disk failed.
+    /// If the name or the display name is already taken, the display name is not valid, or the disk failed.
     pub async fn add(
         &self,
         account: AccountName,
@@ -106,7 +106,7 @@ impl Accounts {
             if known.account == new.account {
                 return Err(AccountError::Taken(format!("there is an account '{}' already", new.account)));
             }
-            // A signature shows the display name alone.
+            // Signatures show only the display name, so it must be unique.
             if known.display == new.display {
                 let text = format!("account '{}' has the display name '{}' already", known.account, known.display);
                 return Err(AccountError::Taken(text));
@@ -118,10 +118,10 @@ impl Accounts {
         Ok(new)
     }
 
-    /// Changes an account.
+    /// Changes an account. `by` is the lead who changes it; none on the command line.
     ///
     /// # Errors
-    /// When there is none of this name, it is the last that leads, or the disk failed.
+    /// If no account has this name, the change would remove the last lead, or the disk failed.
     pub async fn change(
         &self,
         name: &AccountName,
@@ -138,7 +138,7 @@ impl Accounts {
     /// Replaces the passphrase of an account, and ends its sign-ins.
     ///
     /// # Errors
-    /// When there is none of this name, or the disk failed.
+    /// If no account has this name, or the disk failed.
     pub async fn replace_passphrase(
         &self,
         name: &AccountName,
@@ -153,13 +153,13 @@ impl Accounts {
         Ok(self.book.replace_passphrase(name, &hash, by).await?)
     }
 
-    /// Signs a browser of `peer` in: its token, which is kept nowhere. Replaces the passphrase by `chosen` first, where
-    /// there is one.
+    /// Signs in a browser at the address `peer`, and returns its token, which the server does not store. Replaces the
+    /// passphrase by `chosen` first, if one is given.
     ///
     /// # Errors
-    /// When name and passphrase do not belong together, the account is disabled, a lead set the passphrase and the
-    /// person chose no other, there were too many failed attempts, or the disk failed. The first two have the same
-    /// words: nobody can find out who has an account.
+    /// If the name and the passphrase do not match, the account is disabled, a lead set the passphrase and the person
+    /// chose no other, there were too many failed attempts, or the disk failed. The first two give the same message, so
+    /// that nobody can find out who has an account.
     pub async fn sign_in(
         &self,
         name: &str,
@@ -197,7 +197,7 @@ impl Accounts {
         }
     }
 
-    /// Replaces the passphrase `before` of whoever is signing in.
+    /// Replaces the passphrase `before` by `chosen` for the person who is signing in.
     async fn choose_passphrase(
         &self,
         name: &AccountName,
@@ -205,17 +205,17 @@ impl Accounts {
         chosen: Passphrase,
     ) -> Result<(), AccountError> {
         if chosen.is(before) {
-            let text = "the new passphrase is the one before; choose another".to_owned();
+            let text = "the new passphrase is the same as the old one; choose another".to_owned();
             return Err(AccountError::Refused(Refusal::Invalid(text)));
         }
         let hash = self.hash(chosen).await?;
         Ok(self.book.replace_passphrase(name, &hash, Some(name)).await?)
     }
 
-    /// Checks the passphrase of whoever is signed in once more, before something that cannot be undone.
+    /// Checks the passphrase of a signed-in person again, before an action that cannot be undone.
     ///
     /// # Errors
-    /// When it is wrong, there were too many failed attempts, or the disk failed.
+    /// If the passphrase is wrong, there were too many failed attempts, or the disk failed.
     pub async fn confirm(&self, account: &Account, passphrase: &str, peer: Peer) -> Result<(), AccountError> {
         let name = account.account.as_str();
         self.wait_for_turn(name, peer).await?;
@@ -229,16 +229,16 @@ impl Accounts {
         Err(AccountError::WrongConfirmation)
     }
 
-    /// The account that the browser with `token` is signed in to, if it is and that has not expired.
+    /// The account to which the browser with `token` is signed in; none if it is not, or the sign-in has expired.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn signed_in(&self, token: &Token) -> Result<Option<Account>, AccountError> {
         let token_sha256 = token.sha256();
         let Some(found) = self.reader().sign_in(&token_sha256).await? else { return Ok(None) };
         let StoredSignIn { account, began, used } = found;
 
-        // A clock that was set back makes nothing last longer.
+        // The absolute difference, so that a clock that was set back does not extend a sign-in.
         let now = self.clock.wall();
         let since = |earlier| now.duration_since(earlier).unsigned_abs();
         if account.disabled || since(began) > SIGN_IN_LIMIT || since(used) > IDLE_LIMIT {
@@ -247,7 +247,8 @@ impl Accounts {
 
         if since(used) > NOTED_EVERY {
             let book = self.book.clone();
-            // Not awaited: whoever wants to stop the lens waits for no disk, and a full one keeps nobody out.
+            // Not awaited, so that a request to stop the lens does not wait for the disk, and a full disk locks nobody
+            // out.
             tokio::spawn(async move {
                 if let Err(error) = book.note_use(&token_sha256).await {
                     tracing::warn!("a sign-in's use could not be noted: {error}");
@@ -257,11 +258,11 @@ impl Accounts {
         Ok(Some(account))
     }
 
-    /// Whether the sign-in with `token` was ended, or is too old: what goes on by itself, such as a live view, ends
-    /// then. That it was not used for a while ends nothing that goes on.
+    /// Whether the sign-in with `token` was ended, or is too old. Streams such as a live view end then. A sign-in that
+    /// was only unused for a while does not end them.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn has_ended(&self, token: &Token) -> Result<bool, AccountError> {
         let found = self.reader().sign_in(&token.sha256()).await?;
         let now = self.clock.wall();
@@ -271,10 +272,10 @@ impl Accounts {
         Ok(!found.is_some_and(goes_on))
     }
 
-    /// Ends the sign-in of the browser with `token`. One that has ended stays so.
+    /// Ends the sign-in of the browser with `token`. Does nothing if it has already ended.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or the database failed.
     pub async fn sign_out(&self, token: &Token) -> Result<(), AccountError> {
         let token_sha256 = token.sha256();
         if let Some(found) = self.reader().sign_in(&token_sha256).await? {
@@ -288,7 +289,7 @@ impl Accounts {
         self.hashing(move || passphrase.hash(cost)).await?
     }
 
-    /// Whether `given` is the passphrase of `hash`. Takes as long where there is no account.
+    /// Whether `given` is the passphrase of `hash`. It takes equally long if there is no account, and so no hash.
     async fn fits(&self, given: &str, hash: Option<&PassphraseHash>) -> Result<bool, AccountError> {
         let given = given.to_owned();
         let hash = hash.cloned();
@@ -296,14 +297,14 @@ impl Accounts {
         self.hashing(move || passphrase::fits(&given, hash.as_ref(), cost)).await?
     }
 
-    /// Runs `work` on a thread of its own: it would hold up the streams.
+    /// Runs `work` on a thread where it may block, because it would delay the streams.
     async fn hashing<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Result<T, AccountError> {
         let stopped = || AccountError::Storage("the server was stopped meanwhile; try again".to_owned());
         let _turn = self.hashing.acquire().await.map_err(|_| stopped())?;
         tokio::task::spawn_blocking(work).await.map_err(|_| stopped())
     }
 
-    /// Waits as long as earlier failures ask for.
+    /// Waits as long as earlier failures require.
     async fn wait_for_turn(&self, name: &str, peer: Peer) -> Result<(), AccountError> {
         let wait = self.throttle().reserve(name, peer, self.clock.now())?;
         if !wait.is_zero() {

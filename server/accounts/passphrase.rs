@@ -1,7 +1,8 @@
-//! Passphrases: what one may be, and its argon2id hash.
+//! Passphrases: which ones are allowed, and their argon2id hashes.
 //!
-//! By NIST SP 800-63B-4 there are no rules on which characters a passphrase has: blanks and all of Unicode are allowed.
-//! It is brought to normalization form NFC before it is hashed, so that é is é on every keyboard.
+//! Following NIST SP 800-63B-4, there are no rules about the characters of a passphrase: blanks and all of Unicode are
+//! allowed. A passphrase is converted to the normalization form NFC before it is hashed, so that é is the same on every
+//! keyboard.
 
 use argon2::{Algorithm, Argon2, Params, Version};
 use subtle::ConstantTimeEq;
@@ -15,30 +16,30 @@ use crate::trial::refusal::Refusal;
 const SALT_BYTES: usize = 16;
 const HASH_BYTES: usize = 32;
 
-/// What a hash costs whoever guesses.
+/// The cost of computing a hash, and so of each guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cost {
-    /// Memory, KiB.
+    /// Memory in KiB.
     pub memory_kib: u32,
-    /// Passes over it.
+    /// Number of passes over the memory.
     pub passes: u32,
 }
 
 impl Default for Cost {
-    /// The first choice of OWASP's Password Storage Cheat Sheet for argon2id: 19 MiB, 2 passes, 1 lane.
+    /// The first choice for argon2id in OWASP's Password Storage Cheat Sheet: 19 MiB, 2 passes, 1 lane.
     fn default() -> Self {
         Self { memory_kib: 19 * 1024, passes: 2 }
     }
 }
 
-/// A passphrase that an account may have.
+/// A passphrase of allowed length, in the normalization form NFC.
 pub struct Passphrase(String);
 
 impl Passphrase {
-    /// The passphrase `text`.
+    /// Checks `text` and makes it a passphrase.
     ///
     /// # Errors
-    /// When it is too short or too long.
+    /// If it is too short or too long.
     pub fn new(text: &str) -> Result<Self, Refusal> {
         let normalized: String = text.nfc().collect();
         if (SHORTEST_PASSPHRASE..=LONGEST_PASSPHRASE).contains(&normalized.chars().count()) {
@@ -50,7 +51,7 @@ impl Passphrase {
         )))
     }
 
-    /// Whether this is the passphrase `text`.
+    /// Whether `text` is this passphrase.
     pub(super) fn is(&self, text: &str) -> bool {
         text.nfc().eq(self.0.chars())
     }
@@ -63,9 +64,9 @@ impl Passphrase {
     }
 }
 
-/// Whether `given` is the passphrase of `hash`. Without one it takes as long as with one of `cost`.
+/// Whether `given` is the passphrase of `hash`. If there is no hash, it takes as long as for a hash of `cost`.
 pub(super) fn fits(given: &str, hash: Option<&PassphraseHash>, cost: Cost) -> Result<bool, AccountError> {
-    // What is longer belongs to no account, and would only take time.
+    // A longer text belongs to no account, and would only take time.
     let given: String = given.nfc().take(LONGEST_PASSPHRASE + 1).collect();
     let Some(hash) = hash else {
         argon2id(&given, &[0; SALT_BYTES], cost)?;
@@ -93,7 +94,7 @@ mod tests {
 
     #[test]
     fn it_is_argon2id_as_the_reference_program_computes_it() {
-        // src/test.c of github.com/P-H-C/phc-winner-argon2: argon2id, version 0x13.
+        // From src/test.c of github.com/P-H-C/phc-winner-argon2: argon2id, version 0x13.
         let hash = argon2id("password", b"somesalt", Cost { memory_kib: 256, passes: 2 }).unwrap();
         let expected = "9dfeb910e80bad0311fee20f9c0e2b12c17987b4cac90c2ef54d5b3021c68bfe";
         assert_eq!(hex::encode(hash), expected);

@@ -1,10 +1,10 @@
-//! The token that shows that a browser is signed in. The database keeps its SHA-256 alone.
+//! The token that proves that a browser is signed in. The database keeps only its SHA-256.
 
 use sha2::{Digest, Sha256};
 
 use super::AccountError;
 
-/// Bytes of a token: 256 bits cannot be guessed.
+/// Number of bytes in a token. 256 bits cannot be guessed.
 const BYTES: usize = 32;
 
 /// A token, in hexadecimal.
@@ -12,27 +12,27 @@ const BYTES: usize = 32;
 pub struct Token(String);
 
 impl Token {
-    /// A new one.
+    /// Makes a new random token.
     pub(super) fn random() -> Result<Self, AccountError> {
         let mut bytes = [0; BYTES];
         getrandom::fill(&mut bytes).map_err(|error| AccountError::Storage(format!("no random numbers: {error}")))?;
         Ok(Self(hex::encode(bytes)))
     }
 
-    /// The token that a browser sent; none where it cannot be one.
+    /// The token in `text`, which a browser sent; none if it does not have the form of a token.
     #[must_use]
     pub fn sent(text: &str) -> Option<Self> {
         let is_token = text.len() == BYTES * 2 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
         is_token.then(|| Self(text.to_owned()))
     }
 
-    /// As the browser sends it.
+    /// The token as the browser sends it: 64 hexadecimal digits.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// What is kept of it.
+    /// The token's SHA-256 in hexadecimal, which the database keeps.
     pub(super) fn sha256(&self) -> String {
         hex::encode(Sha256::digest(&self.0))
     }

@@ -1,5 +1,5 @@
-//! One outcome compared between policies: summaries, tests, agreement of repeats, effect of position. Every figure that
-//! cannot be had has a sentence in its place.
+//! One outcome compared between policies: summaries, tests, agreement of repeats, effect of position. If a figure
+//! cannot be computed, a sentence says why.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,29 +15,29 @@ use super::words::{counted, decimals, interval_words, method_words, p_words};
 use crate::evaluation::statistics::{Method, bootstrap_statistic, holm, mean, wilcoxon};
 use crate::ids::SessionId;
 
-/// p below which something counts as shown.
+/// Significance level: a p below it counts as shown.
 pub const LEVEL: f64 = 0.05;
 
-/// Fewest surgeons of whom resamples are drawn: of fewer there are hardly any different ones.
+/// Fewest surgeons for bootstrap intervals: with fewer, hardly any resamples differ.
 const FEWEST_RESAMPLED: usize = 5;
 
 /// An outcome compared between policies.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Comparison {
-    /// What is compared.
+    /// The outcome that is compared.
     #[serde(flatten)]
     pub outcome: Outcome,
     /// Each policy's values over all settings.
     pub policies: Vec<PolicySummary>,
     /// Each surgeon's mean of each policy.
     pub surgeons: Vec<SurgeonMeans>,
-    /// Surgeons of whom no value is missing: those that the tests use.
+    /// Number of surgeons without a missing value; the tests use these.
     pub complete: usize,
-    /// Surgeons who are left out of the tests, because a value is missing.
+    /// Number of surgeons left out of the tests because a value is missing.
     pub left_out: usize,
     /// Whether the policies differ.
     pub difference: Difference,
-    /// Each policy with each other.
+    /// Every pair of policies.
     pub pairs: Vec<Pair>,
     /// How far repeats of a policy agree.
     pub repeats: Repeats,
@@ -45,14 +45,14 @@ pub struct Comparison {
     pub position: Position,
 }
 
-/// A policy's values in short.
+/// Summary of a policy's values.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PolicySummary {
     /// The policy.
     pub policy: String,
-    /// Settings without a value.
+    /// Number of settings without a value.
     pub missing: usize,
-    /// Its values over all settings.
+    /// Summary of its values over all settings.
     #[serde(flatten)]
     pub summary: Summary,
 }
@@ -62,7 +62,7 @@ pub struct PolicySummary {
 pub struct SurgeonMeans {
     /// The surgeon's code.
     pub surgeon: String,
-    /// The mean over the settings of each policy, in the order of `policies`; none where a value is missing.
+    /// The mean over the settings of each policy, in the order of `policies`; none if a value is missing.
     pub means: Vec<Option<f64>>,
 }
 
@@ -80,13 +80,13 @@ pub struct Difference {
 /// Two policies compared by the surgeons' means.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Pair {
-    /// One policy.
+    /// The first policy.
     pub a: String,
-    /// The other.
+    /// The second policy.
     pub b: String,
-    /// Surgeons compared.
+    /// Number of surgeons compared.
     pub n: usize,
-    /// Surgeons whose means differ; the others tell nothing in a signed-rank test.
+    /// Number of surgeons whose means differ; a signed-rank test ignores the others.
     pub differing: usize,
     /// Sum of the ranks where `a` is higher.
     pub positive: f64,
@@ -94,15 +94,15 @@ pub struct Pair {
     pub negative: f64,
     /// Two-sided p of Wilcoxon's signed-rank test.
     pub p: f64,
-    /// How it was computed.
+    /// How `p` was computed.
     pub method: Method,
-    /// The same, corrected by Holm's method for the pairs of this outcome.
+    /// `p` corrected by Holm's method for the pairs of this outcome.
     pub p_holm: f64,
-    /// Rank-biserial correlation, -1..=1: above 0 where `a` is higher; none where no surgeon differs.
+    /// Rank-biserial correlation, -1..=1: above 0 if `a` is higher; none if no surgeon's means differ.
     pub rank_biserial: Option<f64>,
     /// Its 95 % bootstrap interval over surgeons.
     pub rank_biserial_interval: Option<Interval>,
-    /// Mean of `a` less mean of `b`.
+    /// Mean of `a` minus mean of `b`.
     pub mean_difference: f64,
     /// Its 95 % bootstrap interval over surgeons.
     pub mean_difference_interval: Option<Interval>,
@@ -117,9 +117,9 @@ pub struct Pair {
 pub struct Repeats {
     /// The finding in a sentence, or why there is none.
     pub said: String,
-    /// Policies of sessions of which all repeats have a value.
+    /// Number of subjects; a subject is a policy in a session without missing values.
     pub subjects: usize,
-    /// The agreement.
+    /// The agreement; none if it cannot be computed.
     pub agreement: Option<Agreement>,
 }
 
@@ -128,11 +128,11 @@ pub struct Repeats {
 pub struct Position {
     /// The finding in a sentence, or why there is none.
     pub said: String,
-    /// Sessions without a missing value.
+    /// Number of sessions without a missing value.
     pub sessions: usize,
     /// The mean over these sessions at each position.
     pub means: Vec<f64>,
-    /// Page's test for a trend.
+    /// Page's test for a trend; none if it cannot be computed.
     pub trend: Option<Trend>,
 }
 
@@ -162,7 +162,7 @@ fn policy_summary(policy: &str, observations: &[Observation]) -> PolicySummary {
     PolicySummary { policy: policy.to_owned(), missing: own.len() - values.len(), summary: summary(&values) }
 }
 
-/// Each surgeon's mean of each policy: of all settings, or none.
+/// Each surgeon's mean of each policy over all its settings, or `None` if a value is missing.
 fn surgeon_means(policies: &[String], observations: &[Observation]) -> Vec<SurgeonMeans> {
     let names: BTreeSet<&str> = observations.iter().map(|one| one.surgeon.as_str()).collect();
     let mean_of = |surgeon: &str, policy: &String| {
@@ -177,7 +177,7 @@ fn surgeon_means(policies: &[String], observations: &[Observation]) -> Vec<Surge
     names.into_iter().map(line).collect()
 }
 
-/// The observations of each session in which no value is missing, by position.
+/// The observations of each session without a missing value, ordered by position.
 fn complete_sessions(observations: &[Observation]) -> Vec<Vec<&Observation>> {
     let mut sessions: BTreeMap<SessionId, Vec<&Observation>> = BTreeMap::new();
     for one in observations {
@@ -251,7 +251,7 @@ fn pairs(policies: &[String], blocks: &[Vec<f64>], seed: u64) -> Vec<Pair> {
 }
 
 fn pair([a, b]: [&String; 2], of_a: &[f64], of_b: &[f64], seed: u64) -> Pair {
-    // Means of the same ratings in another order differ by rounding, which is no difference.
+    // Means of the same ratings in another order differ only by rounding; treat them as equal.
     let difference = |(a, b): (&f64, &f64)| {
         let difference = a - b;
         if difference.abs() <= 1e-12 * a.abs().max(b.abs()) { 0.0 } else { difference }
@@ -293,8 +293,8 @@ fn pair_words(pair: &Pair) -> String {
         format!("{} is lower than {}", pair.a, pair.b)
     };
     format!(
-        "{finding}: Wilcoxon signed-rank, {} ({}), {} by Holm; rank-biserial r = {}{}; mean difference {}{}; {}, of \
-         whom {} differ.",
+        "{finding}: Wilcoxon signed-rank, {} ({}), {} by Holm; rank-biserial r = {}{}; mean difference {}{}; {}; \
+         the means of {} of them differ.",
         p_words(pair.p),
         method_words(pair.method),
         p_words(pair.p_holm),
@@ -374,7 +374,7 @@ fn position(sessions: &[Vec<&Observation>]) -> Position {
     Position { said, sessions: blocks.len(), means, trend: Some(found) }
 }
 
-/// The 95 % bootstrap interval of `statistic` over `count` surgeons; none of too few.
+/// The 95 % bootstrap interval of `statistic` over `count` surgeons; `None` if there are too few.
 fn interval(count: usize, seed: u64, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<Interval> {
     if count < FEWEST_RESAMPLED {
         return None;

@@ -1,29 +1,29 @@
-//! Why there is no analysis.
+//! Errors of the analysis.
 
 use crate::store::StoreError;
 use crate::store::export::ExportError;
 use crate::trial::study::stage::Stage;
 
-/// Why there is no analysis.
+/// The reason why there is no analysis.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalysisError {
     /// There is no such study.
     #[error("there is no study '{study}'; there are: {known}")]
     NoStudy {
-        /// The study asked for.
+        /// The requested study.
         study: String,
-        /// The studies there are.
+        /// Names of the existing studies.
         known: String,
     },
-    /// It is not unblinded.
+    /// The study is not unblinded.
     #[error(
         "study '{study}' is {stage}: it can be analysed once all of it is unblinded, which the people named in its \
          definition can do after it was locked", stage = stage.name()
     )]
     StillBlinded {
-        /// The study.
+        /// Name of the study.
         study: String,
-        /// How far it has come.
+        /// Its stage.
         stage: Stage,
     },
     /// The tables could not be written.

@@ -1,15 +1,15 @@
-//! Figures of an analysis as SVG, for the page and for print: black and gray, told apart by form.
+//! Figures of an analysis as SVG, for the page and for print: black and gray, told apart by shape.
 
 use super::comparison::Comparison;
 use super::statistics::median;
 use crate::plot::{Axis, Plot};
 
-/// What stands for one surgeon.
+/// Colour for one surgeon.
 const SURGEON: &str = "#767676";
-/// What stands for all.
+/// Colour for all surgeons.
 const ALL: &str = "#000000";
 
-/// The surgeons' means by policy, and the means by position below; `None` where there are no values.
+/// The surgeons' means by policy, and below them the means by position; `None` if there are no values.
 #[must_use]
 pub fn figure(compared: &Comparison) -> Option<String> {
     let means = || compared.surgeons.iter().flat_map(|line| line.means.iter().flatten().copied());
@@ -41,23 +41,23 @@ pub fn figure(compared: &Comparison) -> Option<String> {
     Some(plot.svg())
 }
 
-/// Values as points, the first at 1.
+/// Values as points whose first coordinate counts from 1; missing values are skipped.
 fn places(values: &[Option<f64>]) -> impl Iterator<Item = (f64, f64)> + '_ {
     values.iter().zip(1..).filter_map(|(value, place)| Some((f64::from(place), (*value)?)))
 }
 
-/// The upright axis: from one round number to another.
+/// The vertical axis, from one round number to another.
 #[derive(Debug, Clone, Copy)]
 struct Scale {
-    /// Distance of its levels: 1, 2 or 5 times a power of ten.
+    /// Distance between levels: 1, 2 or 5 times a power of ten.
     step: f64,
-    /// Its lower end, in steps.
+    /// Lower end, in steps.
     from: i64,
-    /// Its upper end, in steps.
+    /// Upper end, in steps.
     to: i64,
-    /// The lowest possible value: the scale does not go below it.
+    /// The lowest possible value; the scale does not go below it.
     lowest: Option<f64>,
-    /// The highest possible value: the scale does not go above it.
+    /// The highest possible value; the scale does not go above it.
     highest: Option<f64>,
 }
 
@@ -70,7 +70,7 @@ impl Scale {
         }
         let (low, high) = ends?;
 
-        // Values that are all the same get a scale about themselves.
+        // If all values are the same, the scale extends around their size.
         let spread = if high > low { high - low } else { high.abs().max(1.0) };
         let rough = spread / 4.0;
         let power = 10_f64.powf(rough.log10().floor());
@@ -82,7 +82,7 @@ impl Scale {
         Some(Self { step, from, to, lowest: None, highest: None })
     }
 
-    /// The same without what no value can reach.
+    /// The same scale, limited to values that are possible.
     const fn within(self, lowest: Option<f64>, highest: Option<f64>) -> Self {
         Self { lowest, highest, ..self }
     }
@@ -101,13 +101,13 @@ impl Scale {
         Axis { label, from: self.from(), to: self.to() }
     }
 
-    /// The levels between its ends.
+    /// The levels strictly between the ends.
     fn levels(self) -> impl Iterator<Item = f64> {
         let levels = (self.from + 1..self.to).map(move |level| self.at(level));
         levels.filter(move |level| (self.from()..self.to()).contains(level) && *level > self.from())
     }
 
-    /// A level as it is written: without what binary fractions add to it.
+    /// The value of a level, rounded to six decimals to remove binary rounding errors.
     fn at(&self, level: i64) -> f64 {
         let value = level as f64 * self.step;
         format!("{value:.6}").parse().unwrap_or(value)

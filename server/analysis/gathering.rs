@@ -1,4 +1,4 @@
-//! What of a study's sessions is analysed, read from the database: numbers by setting, and words.
+//! Reads from the database what is analysed of a study's sessions: numbers by setting, and words.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,17 +15,17 @@ use crate::trial::question::{AnswerValue, Question, QuestionKind};
 use crate::trial::remark::Said;
 use crate::trial::study::places::Enrolled;
 
-/// A session that counts, with what it gives to the analysis.
+/// A session that counts, with its contribution to the analysis.
 pub struct Gathered {
     /// The session.
     pub session: SessionId,
-    /// The surgeon's code, as it was corrected.
+    /// The surgeon's code, corrected if it was.
     pub surgeon: String,
-    /// Its settings, in order.
+    /// The session's settings, in order.
     pub settings: Vec<GatheredSetting>,
     /// Numbers about the whole session, by outcome.
     pub whole: BTreeMap<String, f64>,
-    /// What was said.
+    /// Comments and answers in words.
     pub words: Vec<SettingWords>,
 }
 
@@ -33,16 +33,16 @@ pub struct Gathered {
 pub struct GatheredSetting {
     /// The policy that ran.
     pub policy: String,
-    /// Which of the policy's settings in the session, from 1.
+    /// Number of this setting among the policy's settings in the session, from 1.
     pub repeat: usize,
-    /// Its numbers, by outcome.
+    /// Numbers of the setting, by outcome.
     pub values: BTreeMap<String, f64>,
 }
 
-/// What `session`, as its study knows it, is to the analysis: its line, and what it gives if it counts.
+/// The analysis's line for `session`, as its study knows it, and its contribution if it counts.
 ///
 /// # Errors
-/// When the database failed or holds what this version cannot read.
+/// If the database failed, or holds something that this version cannot read.
 pub async fn gather(
     reader: &Reader,
     clocks: &RunClocks,
@@ -56,7 +56,7 @@ pub async fn gather(
         counts,
         remark,
     };
-    // A withdrawn session gives nothing, not even whose it was.
+    // A withdrawn session contributes nothing, not even the surgeon's code.
     if session.withdrawn {
         return Ok((line(None, false, Some("withdrawn".to_owned())), None));
     }
@@ -77,13 +77,13 @@ pub async fn gather(
     Ok((line(Some(surgeon), true, remark), Some(gathered)))
 }
 
-/// Whether the session was unblinded by itself: in an emergency.
+/// Whether the session was unblinded alone, in an emergency.
 fn unblinded_before(stored: &StoredSession) -> bool {
     let mut kinds = stored.events.iter().map(|(_, event)| &event.kind);
     kinds.any(|kind| matches!(kind, EventKind::Unblinded { emergency: true, .. }))
 }
 
-/// A session being gathered.
+/// A session whose contribution is being read.
 struct Gathering<'a> {
     protocol: &'a Protocol,
     segments: Vec<SegmentId>,
@@ -131,10 +131,10 @@ impl<'a> Gathering<'a> {
             let text = match comment.said {
                 Said::Text(text) | Said::Quick(text) => text,
                 Said::Mark => "Marked a moment".to_owned(),
-                // What was said aloud can be read once it was typed out.
+                // A voice comment can be read once it is transcribed.
                 Said::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
             };
-            // The sound may be gone while its words were typed out.
+            // The sound may be erased while its transcript is kept.
             let erased = !is_typed && erased.contains(&(Erasable::Comment, comment.key.to_string()));
             self.take_words(comment.segment, Words { question: None, text, late: comment.late, erased });
         }
@@ -152,7 +152,7 @@ impl<'a> Gathering<'a> {
         Ok(self.gathered)
     }
 
-    /// The place of `segment` among the settings, from 0.
+    /// Index of `segment` among the settings, from 0.
     fn place(&self, segment: Option<SegmentId>) -> Option<usize> {
         self.segments.iter().position(|known| Some(*known) == segment)
     }
@@ -165,7 +165,7 @@ impl<'a> Gathering<'a> {
     }
 
     fn take_words(&mut self, segment: Option<SegmentId>, words: Words) {
-        // What belongs to no setting comes last.
+        // Words that belong to no setting come last.
         let place = self.place(segment).unwrap_or(self.segments.len());
         self.gathered.words[place].words.push(words);
     }

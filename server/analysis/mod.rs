@@ -1,5 +1,5 @@
-//! Analysis of a study after it was unblinded: outcomes by policy, tests, agreement, words side by side; its figures
-//! and tables.
+//! Analysis of a study after it was unblinded: outcomes by policy, tests, agreement, words side by side, figures and
+//! tables.
 
 mod comparison;
 mod error;

@@ -1,4 +1,4 @@
-//! Outcomes: what is compared between the policies of a protocol, as a number for each setting.
+//! Outcomes: the numbers of each setting that are compared between the policies of a protocol.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -9,29 +9,29 @@ use crate::trial::instruments::{Measure, measures};
 use crate::trial::protocol::Protocol;
 use crate::trial::question::{AnswerValue, Question, QuestionKind};
 
-/// Changes of direction a second.
+/// Name of the outcome: changes of direction per second.
 pub const TURNS: &str = "turns";
-/// Way a second.
+/// Name of the outcome: distance that the focal power travels per second.
 pub const TRAVEL: &str = "travel";
-/// Distance from the optimum.
+/// Name of the outcome: mean distance from the optimum.
 pub const FOCAL_ERROR: &str = "focal-error";
-/// Share of frames near the optimum.
+/// Name of the outcome: share of frames near the optimum.
 pub const IN_FOCUS: &str = "in-focus";
 
-/// Something that each setting has a number of.
+/// A quantity that has a number in each setting.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Outcome {
-    /// Its name: question and measure, or what of the focal power.
+    /// Name: question and measure, or a quantity of the focal power.
     pub outcome: String,
-    /// What it is, for reading.
+    /// Label for people.
     pub label: String,
-    /// Its unit or scale.
+    /// Unit or scale.
     pub unit: String,
-    /// Which end is better, where that is known: `higher` or `lower`.
+    /// Which end is better, if known: `higher` or `lower`.
     pub better: Option<&'static str>,
-    /// Its lowest possible value, where there is one.
+    /// Lowest possible value, if there is one.
     pub lowest: Option<f64>,
-    /// Its highest possible value, where there is one.
+    /// Highest possible value, if there is one.
     pub highest: Option<f64>,
 }
 
@@ -40,20 +40,20 @@ pub struct Outcome {
 pub struct Observation {
     /// The session.
     pub session: SessionId,
-    /// The surgeon's code, as it was corrected.
+    /// The surgeon's code, corrected if it was.
     pub surgeon: String,
-    /// The setting, from 1: its position in the session.
+    /// Position of the setting in the session, from 1.
     pub setting: usize,
     /// The policy that ran.
     pub policy: String,
-    /// Which of the policy's settings in the session, from 1.
+    /// Number of this setting among the policy's settings in the session, from 1.
     pub repeat: usize,
-    /// The value; none where it is missing.
+    /// The value; none if it is missing.
     pub value: Option<f64>,
 }
 
-/// The outcomes that the questions of `protocol` give: each single answer, each score of a questionnaire after a
-/// setting, and the rank of each setting.
+/// The outcomes from the questions of `protocol`: each single answer, each score of a questionnaire after a setting,
+/// and the rank of each setting.
 #[must_use]
 pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
     let after_setting = protocol.after_segment.iter().flat_map(of_question);
@@ -63,13 +63,13 @@ pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
     after_setting.chain(rankings).collect()
 }
 
-/// The numbers of closing questions that are about the session as a whole.
+/// The outcomes of closing questions about the session as a whole.
 #[must_use]
 pub fn asked_of_session(protocol: &Protocol) -> Vec<Outcome> {
     protocol.closing.iter().filter(|question| !is_ranking(question)).flat_map(of_question).collect()
 }
 
-/// The outcomes that telemetry gives.
+/// The outcomes from telemetry.
 #[must_use]
 pub fn driven() -> Vec<Outcome> {
     let outcome = |outcome: &str, label: &str, unit: &str, better, highest| Outcome {
@@ -89,7 +89,8 @@ pub fn driven() -> Vec<Outcome> {
     ]
 }
 
-/// What `motion` has of each outcome of [`driven`]. The optimum must be known of at least half of the frames.
+/// The values of the outcomes of [`driven`] in `motion`. Those that need the optimum are left out unless it is known
+/// for at least half of the frames.
 #[must_use]
 pub fn of_motion(motion: &Motion) -> Vec<(&'static str, f64)> {
     let mut values = Vec::new();
@@ -104,26 +105,26 @@ pub fn of_motion(motion: &Motion) -> Vec<(&'static str, f64)> {
     values
 }
 
-/// What an answer to `question` has of each of its outcomes.
+/// The values of the outcomes of `question` in an answer to it.
 #[must_use]
 pub fn of_answer(question: &Question, value: &AnswerValue) -> Vec<(String, f64)> {
     let counted = measures(&question.kind, value).into_iter().filter(|measure| is_outcome(&question.kind, measure));
     counted.filter_map(|measure| Some((name(question, &measure), measure.value?))).collect()
 }
 
-/// The rank of each setting that a ranking gives, in the order of the settings; none where it ranks nothing.
+/// The rank that a ranking gives each setting, in the order of the settings; `None` for a setting without a rank.
 #[must_use]
 pub fn of_ranks(question: &Question, value: &AnswerValue) -> Vec<Option<f64>> {
     measures(&question.kind, value).into_iter().map(|measure| measure.value).collect()
 }
 
-/// Whether `question` has all settings put in order.
+/// Whether `question` asks to rank all settings.
 #[must_use]
 pub const fn is_ranking(question: &Question) -> bool {
     matches!(question.kind, QuestionKind::Ranking { .. })
 }
 
-/// The name of the outcome that a ranking gives.
+/// The name of the outcome of a ranking.
 #[must_use]
 pub fn rank_name(question: &Question) -> String {
     format!("{}/rank", question.id)
@@ -141,7 +142,7 @@ fn of_ranking(question: &Question, settings: usize) -> Outcome {
 }
 
 fn of_question(question: &Question) -> Vec<Outcome> {
-    // An answer without any item has the names of all measures.
+    // `measures` names all measures even for an answer without any item.
     let nothing = match &question.kind {
         QuestionKind::Sus => AnswerValue::Points(vec![0; crate::trial::instruments::sus::ITEMS]),
         QuestionKind::NasaTlx { scales } => AnswerValue::Points(vec![0; scales.len()]),
@@ -153,7 +154,7 @@ fn of_question(question: &Question) -> Vec<Outcome> {
     counted.map(|measure| outcome(question, &measure)).collect()
 }
 
-/// Of a questionnaire its scores count, not each item.
+/// Whether a measure is an outcome. Of a questionnaire only the scores are, not the items.
 fn is_outcome(kind: &QuestionKind, measure: &Measure) -> bool {
     let questionnaire = matches!(kind, QuestionKind::Sus | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. });
     if questionnaire { measure.score && !measure.name.starts_with("weight-of-") } else { !is_order(kind) }

@@ -1,4 +1,4 @@
-//! The analysis of a study as it is told: on the page, as JSON, in tables.
+//! The analysis of a study as it is shown: on the page, as JSON, in tables.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -9,54 +9,54 @@ use super::outcomes::Outcome;
 use super::statistics::Summary;
 use crate::ids::SessionId;
 
-/// The analysis of a study that was unblinded.
+/// The analysis of an unblinded study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Analysis {
-    /// The study.
+    /// Name of the study.
     pub study: String,
-    /// Its title.
+    /// Title of the study.
     pub title: String,
-    /// SHA-256 of its definition.
+    /// SHA-256 of the study's definition.
     pub definition_sha256: String,
-    /// How its definition says that it is analysed.
+    /// The planned analysis, as in the definition.
     pub planned: String,
-    /// When it was unblinded, by the server's wall clock.
+    /// When the study was unblinded, by the server's wall clock.
     #[schema(value_type = String)]
     pub unblinded: Timestamp,
-    /// The sites of it that this database runs.
+    /// Names of the study's sites that this database runs.
     pub sites: Vec<String>,
-    /// What resamples and permutations are drawn from: the first 16 digits of `definition_sha256`.
+    /// Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`.
     pub seed: String,
-    /// What a reader must know of all figures.
+    /// Notes that apply to all figures.
     pub notes: Vec<String>,
-    /// Each of its protocols by itself.
+    /// One analysis per protocol.
     pub protocols: Vec<ProtocolAnalysis>,
 }
 
-/// The sessions of a protocol analysed.
+/// The analysis of a protocol's sessions.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ProtocolAnalysis {
-    /// The protocol.
+    /// Name of the protocol.
     pub protocol: String,
-    /// Its title for researchers.
+    /// Title of the protocol for researchers.
     pub researcher_title: String,
-    /// Its policies.
+    /// Names of the policies.
     pub policies: Vec<String>,
-    /// Settings of each policy in a session.
+    /// Number of settings of each policy in a session.
     pub repeats: usize,
-    /// Surgeons whose sessions count.
+    /// Number of surgeons whose sessions count.
     pub surgeons: usize,
-    /// The sessions made by it, and whether each counts.
+    /// The sessions with this protocol, and whether each counts.
     pub sessions: Vec<AnalysedSession>,
-    /// What a reader must know of this protocol's figures.
+    /// Notes that apply to this protocol's figures.
     pub notes: Vec<String>,
-    /// What is compared between the policies.
+    /// The outcomes, compared between the policies.
     pub outcomes: Vec<Comparison>,
-    /// Answers about sessions as a whole, which no policy can be given.
+    /// Answers about sessions as a whole, which cannot be assigned to a policy.
     pub whole_sessions: Vec<WholeSessions>,
-    /// What surgeons said.
+    /// Comments and answers in words.
     pub words: Vec<SurgeonWords>,
-    /// Each value that was compared.
+    /// Every value that was compared.
     pub values: Vec<Value>,
 }
 
@@ -65,59 +65,59 @@ pub struct ProtocolAnalysis {
 pub struct AnalysedSession {
     /// The session.
     pub session: SessionId,
-    /// The surgeon's code, as it was corrected; none of a withdrawn session.
+    /// The surgeon's code, corrected if it was; none for a withdrawn session.
     pub surgeon: Option<String>,
-    /// Its site.
+    /// Name of the site.
     pub site: String,
     /// Whether it counts.
     pub counts: bool,
-    /// Why it does not count; or what is to be known of it though it does.
+    /// Why it does not count, or a remark on a session that counts.
     pub remark: Option<String>,
 }
 
-/// A closing question's answers.
+/// The answers to a closing question.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WholeSessions {
-    /// What was asked.
+    /// The question as an outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
-    /// Sessions without an answer.
+    /// Number of sessions without an answer.
     pub missing: usize,
-    /// The answers.
+    /// Summary of the answers.
     #[serde(flatten)]
     pub summary: Summary,
 }
 
-/// What a surgeon said in the sessions that count.
+/// A surgeon's words in the sessions that count.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct SurgeonWords {
     /// The surgeon's code.
     pub surgeon: String,
-    /// By setting; those beside all settings come last.
+    /// The words by setting; those outside settings come last in each session.
     pub settings: Vec<SettingWords>,
 }
 
-/// What was said in a setting, or beside all settings of a session.
+/// The words in a setting, or outside all settings of a session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct SettingWords {
     /// The session.
     pub session: SessionId,
-    /// The setting, from 1; none beside all settings.
+    /// The setting, from 1; none outside settings.
     pub setting: Option<usize>,
-    /// The policy that ran.
+    /// The policy that ran; none outside settings.
     pub policy: Option<String>,
-    /// What was said, in order.
+    /// The words, in order.
     pub words: Vec<Words>,
 }
 
-/// Something that was said.
+/// A comment or an answer in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Words {
-    /// The question that it answers; none of a comment.
+    /// The question that it answers; none for a comment.
     pub question: Option<String>,
-    /// The words, empty where they were erased.
+    /// The words; empty if they were erased.
     pub text: String,
-    /// Whether it arrived after the time in which what a surgeon's device held counted.
+    /// Whether it arrived after the time in which what a surgeon's device held still counted.
     pub late: bool,
     /// Whether its words were erased.
     pub erased: bool,
@@ -129,16 +129,16 @@ pub struct Words {
 pub struct Value {
     /// The session.
     pub session: SessionId,
-    /// The surgeon's code, as it was corrected.
+    /// The surgeon's code, corrected if it was.
     pub surgeon: String,
     /// The setting, from 1.
     pub setting: usize,
     /// The policy that ran.
     pub policy: String,
-    /// Which of the policy's settings in the session, from 1.
+    /// Number of this setting among the policy's settings in the session, from 1.
     pub repeat: usize,
-    /// The outcome.
+    /// Name of the outcome.
     pub outcome: String,
-    /// The value; none where it is missing.
+    /// The value; none if it is missing.
     pub value: Option<f64>,
 }

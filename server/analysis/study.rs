@@ -1,4 +1,4 @@
-//! A whole study analysed, once it was unblinded.
+//! Analyses a whole study after it was unblinded.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,13 +17,13 @@ use crate::trial::study::event::StudyEventKind;
 use crate::trial::study::places::Enrolled;
 use crate::trial::study::stage::Stage;
 
-/// Sessions that are read at a time: as many as a reader has connections.
+/// Number of sessions that are read at a time: as many as a reader has connections.
 const AT_A_TIME: usize = 3;
 
-/// Analyses study `name` of the database that `reader` reads.
+/// Analyses study `name` in the database of `reader`.
 ///
 /// # Errors
-/// When there is no such study, it is not unblinded, or the database failed.
+/// If there is no such study, it is not unblinded, or the database failed.
 pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisError> {
     let study = check(reader, name).await?;
     let unblinding = study.events.iter().rev().find(|event| matches!(event.kind, StudyEventKind::Unblinded));
@@ -40,7 +40,7 @@ pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisEr
             study.sessions.iter().filter(|session| session.protocol == protocol.name).collect();
         let (lines, gathered) = gather_all(reader, &clocks, protocol, sessions).await?;
         let protocol = protocol.clone();
-        // Permutations take the processor's time: not on the thread of anything that waits.
+        // Permutations need much processor time, so keep them off the asynchronous threads.
         let analysed = tokio::task::spawn_blocking(move || analyse_protocol(&protocol, lines, &gathered, number));
         protocols.push(analysed.await.map_err(|error| crate::store::StoreError::Damaged(error.to_string()))?);
     }
@@ -58,10 +58,10 @@ pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisEr
     })
 }
 
-/// The study, if it can be analysed.
+/// Study `name`, if it can be analysed.
 ///
 /// # Errors
-/// When there is no such study, it is not unblinded, or the database failed.
+/// If there is no such study, it is not unblinded, or the database failed.
 pub async fn check(reader: &Reader, name: &str) -> Result<StoredStudy, AnalysisError> {
     let Some(study) = reader.study(name).await? else {
         let names = reader.study_names().await?;
@@ -171,14 +171,14 @@ fn words(gathered: &[Gathered]) -> Vec<SurgeonWords> {
 
 fn notes() -> Vec<String> {
     [
-        "Sessions count that were completed and not withdrawn. Answers count as they do everywhere: the one given \
-         last, as it was corrected, unless it arrived too late.",
-        "A surgeon is one unit of every test: the mean over all settings of a policy. A surgeon of whom one value is \
-         missing is left out of the tests of that outcome, and its number is told.",
+        "Only sessions that were completed and not withdrawn count. Of several answers to a question, the one given \
+         last counts, with its correction, unless it arrived too late.",
+        "A surgeon is one unit of every test: the mean over all settings of a policy. A surgeon with a missing value \
+         is left out of the tests of that outcome; the number of such surgeons is given.",
         "p values are two-sided. Holm's correction covers the pairs of one outcome. Nothing is corrected for the \
          number of outcomes: choose the main one before there are data.",
-        "Intervals cover 95 %. Those of differences and effect sizes are percentile bootstrap intervals over surgeons, \
-         and there are none of fewer than five surgeons.",
+        "Intervals cover 95 %. Those of differences and effect sizes are percentile bootstrap intervals over \
+         surgeons. They are not given for fewer than five surgeons.",
     ]
     .map(str::to_owned)
     .to_vec()

@@ -28,7 +28,7 @@ table! {
     description: "Every value that was compared: one for each outcome and setting of the sessions that count",
     key: [session, setting, outcome],
     row:
-    /// A value.
+    /// A value of an outcome in a setting.
     #[derive(Debug, Clone)]
     ValueRow {
         session: SessionId = means("Session's random id"),
@@ -47,12 +47,12 @@ table! {
     description: "Each outcome by policy, over all settings",
     key: [protocol, outcome, policy],
     row:
-    /// A policy's values in short.
+    /// Summary of a policy's values.
     #[derive(Debug, Clone)]
     PolicyRow {
         protocol: String = means("Protocol's name"),
-        outcome: String = means("Outcome: question and measure, or what of the focal power"),
-        label: String = means("What it is, for reading"),
+        outcome: String = means("Outcome: question and measure, or a quantity of the focal power"),
+        label: String = means("The outcome in words"),
         unit: String = means("Its unit or scale"),
         better: Option<&'static str> = means("Which end is better, higher or lower, where that is known"),
         policy: String = means("Policy"),
@@ -74,7 +74,7 @@ table! {
     TestRow {
         protocol: String = means("Protocol's name"),
         outcome: String = means("Outcome; see analysis_policies"),
-        surgeons: usize = means("Surgeons of whom no value is missing: those that are tested"),
+        surgeons: usize = means("Surgeons without a missing value: those that are tested"),
         left_out: usize = means("Surgeons who are left out because a value is missing"),
         friedman_chi_square: Option<f64> = means("Friedman's statistic, corrected for ties; empty where not tested"),
         friedman_df: Option<usize> = means("Its degrees of freedom"),
@@ -83,10 +83,10 @@ table! {
         permutations: Option<String> = means("exact: over all of them; monte-carlo: over 9999 that were drawn"),
         kendalls_w: Option<f64> = means("Kendall's W, 0 to 1: how far the surgeons agree on an order of policies"),
         kendalls_w_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        kendalls_w_high: Option<f64> = means("Upper end of the same"),
+        kendalls_w_high: Option<f64> = means("Upper end of that interval"),
         icc: Option<f64> = means("ICC(A,1) of the repeats of a policy in a session; empty without repeats"),
         icc_low: Option<f64> = means("Lower end of its 95 % interval"),
-        icc_high: Option<f64> = means("Upper end of the same"),
+        icc_high: Option<f64> = means("Upper end of that interval"),
         icc_subjects: usize = means("Policies of sessions that it compares"),
         page_l: Option<f64> = means("Page's L over the positions in the session; empty where not tested"),
         page_l_expected: Option<f64> = means("What L is on average without a trend"),
@@ -119,10 +119,10 @@ table! {
         p_holm: f64 = means("p corrected by Holm's method for the pairs of the outcome"),
         rank_biserial: Option<f64> = means("Rank-biserial correlation, -1 to 1: above 0 where a is higher"),
         rank_biserial_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        rank_biserial_high: Option<f64> = means("Upper end of the same"),
+        rank_biserial_high: Option<f64> = means("Upper end of that interval"),
         mean_difference: f64 = means("Mean of a less mean of b, in the outcome's unit"),
         mean_difference_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        mean_difference_high: Option<f64> = means("Upper end of the same"),
+        mean_difference_high: Option<f64> = means("Upper end of that interval"),
         median_difference: f64 = means("Median of the surgeons' differences, in the outcome's unit"),
     }
 }
@@ -132,12 +132,12 @@ table! {
     description: "Closing questions about whole sessions, which no policy can be given",
     key: [protocol, outcome],
     row:
-    /// A closing question's answers in short.
+    /// Summary of the answers to a closing question.
     #[derive(Debug, Clone)]
     WholeRow {
         protocol: String = means("Protocol's name"),
         outcome: String = means("Question and measure"),
-        label: String = means("What it is, for reading"),
+        label: String = means("The outcome in words"),
         unit: String = means("Its unit or scale"),
         n: usize = means("Sessions with an answer"),
         missing: usize = means("Sessions without one"),
@@ -152,7 +152,7 @@ table! {
     description: "What surgeons said, with the policy that ran",
     key: [session, number],
     row:
-    /// Something that was said.
+    /// A comment or an answer in words.
     #[derive(Debug, Clone)]
     WordsRow {
         session: SessionId = means("Session's random id"),
@@ -179,7 +179,7 @@ pub const TABLES: [Table; 7] = [
     ValueRow::TABLE,
 ];
 
-/// The rows of `row` for each protocol of `analysis`.
+/// The rows that `row` makes for each protocol of `analysis`.
 pub fn rows<R>(analysis: &Analysis, row: impl Fn(&ProtocolAnalysis) -> Vec<R>) -> Vec<R> {
     analysis.protocols.iter().flat_map(row).collect()
 }
@@ -335,7 +335,7 @@ impl ProtocolAnalysis {
     }
 }
 
-/// A name as it stands in JSON.
+/// A name as it is written in JSON.
 fn kebab(name: &impl serde::Serialize) -> String {
     serde_json::to_value(name).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Simulated studies whose effects are known, beside what SciPy says of them: `tests/vectors/analysis.py`.
+//! Compares the analysis of simulated studies with known effects with SciPy's: `tests/vectors/analysis.py`.
 
 use serde::Deserialize;
 use uuid::Uuid;
@@ -190,7 +190,7 @@ fn an_effect_is_told_where_there_is_one_and_not_where_there_is_none() {
 /// A surgeon's values.
 type Row<'a> = &'a [Option<f64>];
 
-/// Values of one outcome: a row for each surgeon, who has one session with each policy once.
+/// Values of one outcome, a row per surgeon. Each surgeon has one session, in which each policy runs once.
 fn simple(rows: &[&[Option<f64>]]) -> (Vec<String>, Vec<Observation>) {
     let policies: Vec<String> = (0..rows[0].len()).map(|place| format!("policy-{place}")).collect();
     let observation = |number: usize, place: usize, value: &Option<f64>| Observation {
@@ -229,7 +229,7 @@ fn where_there_is_nothing_to_compute_a_sentence_says_so_and_json_has_no_odd_numb
         assert!(!found.repeats.said.is_empty() && !found.position.said.is_empty(), "{name}: {found:?}");
         assert!(found.pairs.iter().all(|pair| !pair.said.is_empty()), "{name}: {found:?}");
 
-        // A number that is none becomes null where no null may be.
+        // NaN would become null in fields that must not be null.
         let json = serde_json::to_value(&found).unwrap();
         for pair in json["pairs"].as_array().unwrap() {
             for field in ["p", "p_holm", "positive", "negative", "mean_difference", "median_difference"] {

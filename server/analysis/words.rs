@@ -1,9 +1,9 @@
-//! Numbers as they stand in sentences.
+//! Numbers as they are written in sentences.
 
 use super::statistics::Interval;
 use crate::evaluation::statistics::Method;
 
-/// `value` to `places` decimal places, with a minus sign as it is printed.
+/// `value` to `places` decimal places, with a typographic minus sign.
 #[must_use]
 pub fn decimals(value: f64, places: usize) -> String {
     let text = format!("{value:.places$}");
@@ -11,13 +11,13 @@ pub fn decimals(value: f64, places: usize) -> String {
     if is_zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
 }
 
-/// A p value.
+/// A p value in words.
 #[must_use]
 pub fn p_words(p: f64) -> String {
     if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
 }
 
-/// How a p value was computed.
+/// How a p value was computed, in words.
 #[must_use]
 pub const fn method_words(method: Method) -> &'static str {
     match method {
@@ -26,7 +26,7 @@ pub const fn method_words(method: Method) -> &'static str {
     }
 }
 
-/// An interval after its statistic; nothing where there is none.
+/// An interval as it follows its statistic; empty for `None`.
 #[must_use]
 pub fn interval_words(interval: Option<&Interval>, places: usize) -> String {
     interval.map_or_else(String::new, |Interval { low, high }| {
@@ -34,7 +34,7 @@ pub fn interval_words(interval: Option<&Interval>, places: usize) -> String {
     })
 }
 
-/// `count` of a thing whose plural ends in s.
+/// `count` and the name of the thing; its plural must end in s.
 #[must_use]
 pub fn counted(count: usize, thing: &str) -> String {
     if count == 1 { format!("1 {thing}") } else { format!("{count} {thing}s") }

@@ -1,4 +1,5 @@
-//! The analysis as a folder or a ZIP file: tables with their data dictionary, all of it as JSON, figures, checksums.
+//! The analysis as a folder or a ZIP file: tables with their data dictionary, the whole analysis as JSON, figures,
+//! checksums.
 
 use std::path::Path;
 
@@ -10,29 +11,30 @@ use super::report::{Analysis, ProtocolAnalysis};
 use super::tables::rows;
 use crate::store::export::{Folder, TEXTS_IN_CSV, ZipStream};
 
-/// What a folder is.
+/// What the folder contains, for its description.
 const ABOUT: &str = "The analysis of an unblinded study, as parfocal computed it: docs/analysis.md of its sources \
-    explains each figure. analysis.json has all of it; the tables have the same by rows; analysis_values.csv has every \
-    value, so that all of it can be computed again elsewhere.";
+    explains each figure. analysis.json contains everything; the tables contain the same as rows; analysis_values.csv \
+    contains every value, so that other programs can repeat the computation.";
 
 impl Analysis {
-    /// Writes the folder `out`, which must be new or empty. It appears whole or not at all. Its files come back.
+    /// Writes the folder `out`, which must be new or empty. It appears complete or not at all. Returns the names of its
+    /// files.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub async fn into_folder(&self, out: &Path) -> Result<Vec<String>, AnalysisError> {
         self.write(Folder::beside(out)?).await
     }
 
-    /// Sends the same files into `zip`.
+    /// Writes the same files into `zip`.
     ///
     /// # Errors
-    /// When they are no longer taken.
+    /// If the receiver stops reading.
     pub async fn into_zip(&self, zip: ZipStream) -> Result<(), AnalysisError> {
         self.write(Folder::zipped(zip)).await.map(|_| ())
     }
 
-    /// Name for a folder or file, without an ending.
+    /// Name for a folder or file, without an extension.
     #[must_use]
     pub fn folder_name(study: &str) -> String {
         format!("parfocal-{study}-analysis")

@@ -1,5 +1,5 @@
-//! The policy `parfocal`: tracks a belief about where the optimum is, holds it against the sharpness
-//! seen lately, goes where the lens is most likely in focus, and looks around where that is in doubt.
+//! The policy `parfocal`. It tracks a belief about the optimum, corrects it by the sharpness seen lately, and goes to
+//! where the picture is most likely in focus. If that is in doubt, it moves to find out more.
 
 use std::sync::LazyLock;
 
@@ -13,20 +13,18 @@ use super::weights::{self, WeightsError};
 use super::{BlurRate, Decision, FieldOfView, IN_FOCUS, Observation, Policy};
 use crate::imaging::{Patch, View, WIDER};
 
-/// Most focal power a frame: a lens can jump, but a surgeon should not see it.
+/// Largest change of focal power per frame. The lens could jump, but the surgeon should not see it.
 pub const MAX_MOVE: f64 = 0.1;
-/// Moves below this are not worth the eye's attention.
+/// Smallest change of focal power. Smaller ones would only make the picture restless.
 pub const LEAST_MOVE: f64 = 0.02;
-/// A tracker less sure than this of being in focus looks for the optimum: standing still reveals
-/// little.
+/// Below this probability of being in focus, the tracker searches for the optimum: standing still reveals little.
 const ASSURANCE: f64 = 0.85;
-/// Least focal power a frame when looking: enough for a change of blur to show, and not enough to go
-/// out of focus.
+/// Least change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
 const LOOK: f64 = 0.06;
-/// Focal power that a test of the belief moves the lens by.
+/// Change of focal power when the belief is tested.
 const TEST: f64 = 0.1;
 
-/// Blur in pixels a unit of focal power that the network meets as 0: in the middle of what optics have.
+/// Blur rate, in pixels per unit of focal power, that the network gets as 0: a usual value for optics.
 const USUAL_BLUR: f64 = 6.0;
 
 /// Changes of focal power below this do not count as a move.
@@ -35,35 +33,37 @@ const STILL: f32 = 0.005;
 /// The tracker's memory of the frame before.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
-    /// How fast the optic blurs, where that is known.
+    /// Blur rate of the optics, if known.
     blur: Option<BlurRate>,
+    /// The last frame seen.
     last: Option<Box<Frame>>,
+    /// The focal power last asked for.
     asked: Option<f32>,
     stand: Stand,
     sharpness: SharpnessMemory,
 }
 
-/// How sharp the picture has been since the lens last moved.
+/// The sharpness of the picture since the lens last moved.
 #[derive(Debug, Clone, Copy, Default)]
 struct Stand {
-    /// Frames since then.
+    /// Frames since the lens last moved.
     frames: u32,
     /// The logarithm of the mean gradient magnitude, smoothed over a few frames.
     sharpness: f32,
-    /// The greatest that has been.
+    /// The greatest such value since the lens last moved.
     sharpest: f32,
 }
 
 impl Stand {
-    /// Share of the smoothed sharpness that each frame brings.
+    /// Weight of a new frame in the smoothed sharpness.
     const FRESH: f32 = 0.3;
-    /// Frames that the lens may stand still though the picture gets worse: a second at the 25 frames
-    /// a second of scans.
+    /// Frames for which the lens may stand still while the picture gets worse: one second at the 25 frames per second
+    /// of scans.
     const PATIENCE: u32 = 25;
-    /// How much worse, as a difference of logarithms.
+    /// Loss of sharpness that counts as worse, as a difference of logarithms.
     const LOSS: f32 = 0.15;
 
-    /// Takes in a frame of `sharpness`, before which the lens `moved` or did not.
+    /// Takes in a frame of `sharpness`. `moved`: whether the lens moved since the frame before.
     fn see(&mut self, sharpness: f32, moved: bool) {
         if moved {
             *self = Self { frames: 0, sharpness, sharpest: sharpness };
@@ -74,8 +74,7 @@ impl Stand {
         self.sharpest = self.sharpest.max(self.sharpness);
     }
 
-    /// Whether the lens has stood still long enough, while the picture got worse, for the belief to
-    /// be put to the test.
+    /// Whether the belief should be tested: the lens has stood still long enough, and the picture got worse.
     fn is_doubtful(&self) -> bool {
         self.frames >= Self::PATIENCE && self.sharpest - self.sharpness > Self::LOSS
     }
@@ -88,7 +87,7 @@ struct Frame {
     focal_power: f32,
 }
 
-/// One patch and what is measured on it.
+/// One patch and the measurements on it.
 #[derive(Debug, Clone)]
 struct Look {
     patch: Patch,
@@ -102,8 +101,8 @@ impl Look {
         Self { patch: *patch, features: features(patch, &spectrum), spectrum }
     }
 
-    /// Puts the features of this patch, how they differ from those of the patch `before`, and how
-    /// the blur changed over what both show, into `input`; returns the rest of it.
+    /// Writes to `input` the features of this patch, their change since the patch `before`, and the change of blur over
+    /// the texture that both show. Returns the rest of `input`.
     fn describe<'a>(&self, before: &Self, input: &'a mut [f32]) -> &'a mut [f32] {
         let (appearance, rest) = input.split_at_mut(FEATURES);
         appearance.copy_from_slice(&self.features);
@@ -121,7 +120,7 @@ impl Look {
 }
 
 impl Frame {
-    /// Whether a patch of any scale shows something to focus on.
+    /// Whether the patch of at least one scale shows something to focus on.
     fn shows_detail(&self) -> bool {
         let mut looks = std::iter::once(&self.near).chain(self.wider.iter().flatten());
         looks.any(|look| look.spectrum.shows_detail())
@@ -129,13 +128,13 @@ impl Frame {
 }
 
 impl Trace {
-    /// A trace of nothing yet, seen through an optic that is known to blur as fast as `blur` says.
+    /// An empty trace. `blur` is the blur rate of the optics, if known.
     #[must_use]
     pub fn knowing(blur: Option<BlurRate>) -> Self {
         Self { blur, ..Self::default() }
     }
 
-    /// The network's input for a frame that shows `view`, seen at `focal_power`.
+    /// Takes in a frame with `view`, seen at `focal_power`, and returns the network's input for it.
     pub fn input(&mut self, view: &View, focal_power: f64) -> [f32; BELIEF_INPUT] {
         let focal_power = focal_power as f32;
         let look = |patch: &Patch| Look::at(patch);
@@ -158,7 +157,7 @@ impl Trace {
         moved[2] = 10.0 * (self.asked.unwrap_or(focal_power) - focal_power);
 
         for (index, part) in wider.chunks_exact_mut(WIDER_INPUT).enumerate() {
-            // Where there is no such patch all is 0, which the network meets in training too.
+            // Without such a patch all inputs are 0, as in some scans of the training.
             if let Some(look) = &now.wider[index] {
                 let before = before.wider[index].as_ref().unwrap_or(look);
                 let rest = look.describe(before, part);
@@ -175,13 +174,13 @@ impl Trace {
         input
     }
 
-    /// Holds the network's `belief` (one value a bin) against the sharpness that was seen lately.
+    /// Corrects the network's `belief` (one value per bin) by the sharpness seen lately.
     pub fn reconsider(&self, belief: &mut [f32]) {
         self.sharpness.weigh(belief);
     }
 
-    /// Where to go from `focal_power` under `belief` (see [`target`]); nowhere while the latest frame
-    /// shows nothing that focus could be told by, such as a glove or glare.
+    /// Where to go from `focal_power` under `belief` (see [`target`]). Stays while the latest frame shows nothing to
+    /// judge focus by, such as a glove or glare.
     #[must_use]
     pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
         let blind = self.last.as_ref().is_some_and(|frame| !frame.shows_detail());
@@ -194,13 +193,13 @@ impl Trace {
         if stands && self.stand.is_doubtful() { look_aside(focal_power, belief) } else { aim }
     }
 
-    /// Notes the focal power that was asked for after the frame.
+    /// Records the focal power that was asked for after the frame.
     pub const fn ask(&mut self, target: f64) {
         self.asked = Some(target as f32);
     }
 }
 
-/// Shares one unit between the two bins around `place` (0..=1), so that the bins' mean is `place`.
+/// Adds one unit to the two bins around `place` (0..=1), divided so that its mean is `place`.
 pub fn spread_over_bins(place: f64, bins: &mut [f32]) {
     let last = bins.len() - 1;
     let at = place.clamp(0.0, 1.0) * last as f64;
@@ -209,20 +208,19 @@ pub fn spread_over_bins(place: f64, bins: &mut [f32]) {
     bins[lower + 1] += (at - lower as f64) as f32;
 }
 
-/// Places considered in [`best`], as many to a bin's width.
+/// Places per width of a bin that [`best`] considers.
 const FINENESS: usize = 10;
 const PLACES: usize = (BINS - 1) * FINENESS + 1;
 
-/// What it is worth to stand `distance` from the optimum: 1 in focus, 0 out of it, with a soft edge.
-/// It falls with distance, so that a tracker that does not know where the optimum is goes to the
-/// middle of where it may be.
+/// Value of being `distance` from the optimum: about 1 in focus and 0 out of focus, with a soft edge. It also falls
+/// slightly with distance, so that a tracker that does not know the optimum goes to the middle of where it may be.
 fn worth(distance: f64) -> f64 {
     const SOFTNESS: f64 = 0.04;
     const SLOPE: f64 = 0.3;
     1.0 / (1.0 + ((distance - IN_FOCUS) / SOFTNESS).exp()) - SLOPE * distance
 }
 
-/// The worth of each place from one range's length below the optimum to one above it.
+/// [`worth`] at each place, from a whole range below the optimum to a whole range above it.
 static WORTH: LazyLock<[f32; 2 * PLACES - 1]> = LazyLock::new(|| {
     std::array::from_fn(|index| {
         let distance = index.abs_diff(PLACES - 1) as f64 / (PLACES - 1) as f64;
@@ -230,9 +228,9 @@ static WORTH: LazyLock<[f32; 2 * PLACES - 1]> = LazyLock::new(|| {
     })
 });
 
-/// The focal power that is worth most in expectation under `belief`, whose bin `i` of [`BINS`] stands
-/// for `i / (BINS - 1)`. Compared with the belief's median this turns less often, and is in focus as
-/// often or more: where the belief has two peaks, it goes to one.
+/// The focal power with the highest expected `worth` under `belief`, whose bin `i` of [`BINS`] stands for
+/// `i / (BINS - 1)`. Compared with the belief's median, it reverses less often and is in focus at least as often: if
+/// the belief has two peaks, it goes to one of them.
 #[must_use]
 pub fn best(belief: &[f32]) -> f64 {
     let mut values = [0.0f32; PLACES];
@@ -247,8 +245,8 @@ pub fn best(belief: &[f32]) -> f64 {
     top.unwrap_or(PLACES / 2) as f64 / (PLACES - 1) as f64
 }
 
-/// A place [`TEST`] away from `focal_power` to test the belief at: on the side where the optimum is
-/// likelier under `belief`, or on the other where the range ends.
+/// A place at which to test the belief, [`TEST`] away from `focal_power`. It is on the side where the optimum is
+/// likelier under `belief`, or on the other side if the range ends there.
 fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
     let mut below = 0.0;
     let mut above = 0.0;
@@ -263,9 +261,9 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
     if up { focal_power + TEST } else { focal_power - TEST }
 }
 
-/// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most
-/// [`MAX_MOVE`] a frame and not for less than [`LEAST_MOVE`]; or, where the tracker is not assured of
-/// being in focus, [`LOOK`] at least, towards the likelier side.
+/// Where to go from `focal_power` under `belief`: to the [`best`] place, by at most [`MAX_MOVE`] per frame, and not at
+/// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and would move by less than
+/// [`LOOK`], it moves by [`LOOK`] towards the likelier side instead.
 #[must_use]
 fn target(focal_power: f64, belief: &[f32]) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
@@ -294,22 +292,22 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
 
-/// Fills `store`, which holds a belief network, from safetensors `bytes`. Also takes weights of a
-/// network that saw the patch alone, or that was told nothing of the optic: what it did not have then
-/// counts for nothing, and the network computes what it computed before.
+/// Fills `store`, which holds a belief network, from safetensors `bytes`. Also accepts weights of a network that saw
+/// only the patch, or that did not get the blur rate. Its new inputs get the weight 0, so the network computes the same
+/// as before.
 ///
 /// # Errors
-/// When the bytes are damaged or another network's.
+/// If the bytes are damaged or belong to another network.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
     weights::load_widening(store, bytes, "memory.weight_ih_l0", &[NEAR_INPUT, SEEN_INPUT])
 }
 
-/// The belief tracker as a policy. One instance follows one scan.
+/// The belief tracker as a policy. Use one instance per scan.
 pub struct BeliefTracker {
     network: BeliefNetwork,
     memory: Tensor,
     trace: Trace,
-    // Keeps the variables alive that the network's layers share.
+    // Keeps alive the variables that the network's layers use.
     _store: nn::VarStore,
 }
 
@@ -317,7 +315,7 @@ impl BeliefTracker {
     /// A tracker with the weights in `bytes` (safetensors).
     ///
     /// # Errors
-    /// When the weights are damaged or another network's.
+    /// If the weights are damaged or belong to another network.
     pub fn new(bytes: &[u8]) -> Result<Self, WeightsError> {
         let store = nn::VarStore::new(Device::Cpu);
         let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
@@ -372,11 +370,12 @@ mod tests {
         };
 
         assert!((belief(&[(20, 1.0)]) - 0.5).abs() < 1e-9);
-        // Two neighbours alike: anywhere between them is in focus of both, and as far from both together.
+        // Two equally likely neighbours: every place between them is in focus for both, and the sum of the distances to
+        // both is the same.
         assert!((0.5..=0.525).contains(&belief(&[(20, 0.5), (21, 0.5)])));
-        // Two places too far apart to be in focus of both: the likelier one.
+        // Two places too far apart to be in focus for both: the likelier one.
         assert!((belief(&[(10, 0.6), (30, 0.4)]) - 0.25).abs() < 0.01);
-        // Anything may be: the middle.
+        // All places equally likely: the middle.
         assert!((best(&[1.0 / BINS as f32; BINS]) - 0.5).abs() < 0.01);
     }
 
@@ -390,7 +389,7 @@ mod tests {
         }
     }
 
-    /// Certain that the optimum is at `place`.
+    /// A belief that is certain of the optimum at `place`.
     fn certain(place: f64) -> [f32; BINS] {
         let mut belief = [0.0; BINS];
         spread_over_bins(place, &mut belief);
@@ -418,9 +417,9 @@ mod tests {
             (0..frames).map(aim).collect()
         };
 
-        // As sharp as ever: it stands, for ever so long.
+        // While the picture stays sharp, the lens stands still, however long.
         assert!(aims(40.0, 200).iter().all(|aim| (aim - 0.5).abs() < 1e-9));
-        // A third less sharp: once that shows, it looks aside.
+        // A third less sharp: once the smoothed sharpness shows this, it looks aside.
         let after = aims(27.0, 10);
         assert!((after[0] - 0.5).abs() < 1e-9 && (after[9] - 0.5).abs() > 0.05, "{after:?}");
     }
@@ -449,7 +448,7 @@ mod tests {
         assert!(alone[NEAR_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
         let both = input([Some(fine), Some(coarse)]);
         assert_eq!(both[..NEAR_INPUT], alone[..NEAR_INPUT]);
-        // The same patch at the middle scale has the same features; another one at the coarsest has others.
+        // The same patch at the middle scale has the same features. Another patch at the coarsest scale has others.
         assert_eq!(both[NEAR_INPUT..][..FEATURES], alone[..FEATURES]);
         let coarsest = &both[NEAR_INPUT + WIDER_INPUT..];
         assert!(coarsest[0] > alone[0] && (coarsest[WIDER_INPUT - 1] - 1.0).abs() < f32::EPSILON);
@@ -495,7 +494,7 @@ mod tests {
             belief
         };
 
-        // The middle is best under both, and yet nothing would be learned there.
+        // The middle is the best place under both beliefs, but nothing would be learned there.
         assert!((target(0.5, &likelier(33)) - 0.56).abs() < 1e-9);
         assert!((target(0.5, &likelier(7)) - 0.44).abs() < 1e-9);
         assert!((0.0..=1.0).contains(&target(0.01, &likelier(7))));

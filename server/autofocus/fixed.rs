@@ -3,10 +3,10 @@
 use super::{Decision, FieldOfView, Observation, Policy};
 use crate::lens::FocalPower;
 
-/// Stays at the focal power it was started at, whatever it sees.
+/// Stays at the focal power of its first frame, whatever it sees.
 #[derive(Debug, Clone, Default)]
 pub struct Fixed {
-    /// Remembered rather than read from each frame, so that an error of the reading cannot make the lens creep.
+    /// Remembered instead of read from each frame, so that errors of the reading cannot make the lens creep.
     start: Option<FocalPower>,
 }
 

@@ -1,18 +1,17 @@
-//! The hill-climber: keeps one direction for as long as a focus metric rises, and turns back when it
-//! does not.
+//! The hill-climber: keeps its direction as long as a focus metric rises, and turns back otherwise.
 
 use super::{Decision, FieldOfView, Observation, Policy, STEP};
 use crate::imaging::Patch;
 
-/// Distance to a bound that counts as being on it: sums of 0.05 miss 0 and 1 by their rounding.
+/// Distance to a bound that counts as being on it: because of rounding, sums of 0.05 miss 0 and 1 slightly.
 const ON_BOUND: f64 = 1e-9;
 
-/// The traditional optimiser of Budd et al., MICCAI 2023: one step of 0.05 a frame, in the last direction if
+/// The traditional optimiser of Budd et al., MICCAI 2023. It takes one step of 0.05 per frame: in the last direction if
 /// `0 < f < 1` and the metric rose since the last frame, else in the opposite one.
 ///
-/// The paper leaves the first move open. Here the direction before it is upwards, and the first
-/// frame, which has nothing to compare with, counts as a rise. At a bound the direction always
-/// reverses, even where that asks for a step outwards; the frame after puts it right.
+/// The paper does not define the first move. Here the initial direction is upwards, and the first frame counts as a
+/// rise, since there is nothing to compare it with. At a bound the direction always reverses, even if that means a step
+/// outwards; the next frame corrects this.
 #[derive(Debug, Clone)]
 pub struct HillClimber {
     metric: fn(&Patch) -> f64,
@@ -21,7 +20,7 @@ pub struct HillClimber {
 }
 
 impl HillClimber {
-    /// A climber on `metric`, which is greater the sharper a patch is.
+    /// A climber on `metric`, which must be greater the sharper a patch is.
     #[must_use]
     pub const fn new(metric: fn(&Patch) -> f64) -> Self {
         Self { metric, last_metric: f64::NEG_INFINITY, direction: 1.0 }
@@ -54,12 +53,12 @@ mod tests {
     use crate::imaging::PATCH_SIDE;
     use crate::lens::FocalPower;
 
-    /// The patch's first value stands for the metric, so that a sequence can be written down.
+    /// Uses the patch's first value as the metric, so that a test can give a sequence of metrics.
     fn first_value(patch: &Patch) -> f64 {
         f64::from(patch.0[0])
     }
 
-    /// Feeds metrics to a climber whose lens obeys at once; returns where it went, in steps of 0.05.
+    /// Feeds metrics to a climber whose lens obeys at once. Returns its focal powers, in steps of 0.05.
     fn walk(start: f64, metrics: &[f32]) -> Vec<f64> {
         let mut climber = HillClimber::new(first_value);
         let mut focal_power = FocalPower::new(start).unwrap();
@@ -77,7 +76,7 @@ mod tests {
 
     #[test]
     fn climbs_while_the_metric_rises_and_turns_where_it_falls() {
-        // First move up; 2 > 1 on; 3 > 2 on; 2 < 3 back; 3 > 2 on (down); 2 < 3 back up.
+        // First move: up. 2 > 1: continue. 3 > 2: continue. 2 < 3: turn down. 3 > 2: continue down. 2 < 3: turn up.
         assert_eq!(walk(0.5, &[1.0, 2.0, 3.0, 2.0, 3.0, 2.0]), [11.0, 12.0, 13.0, 12.0, 11.0, 12.0]);
     }
 
@@ -88,21 +87,21 @@ mod tests {
 
     #[test]
     fn reverses_at_the_upper_bound_whatever_the_metric_does() {
-        // At 19 up to the bound; there it reverses although 3 > 2; 4 > 3 goes on down.
+        // From 19 steps up to the bound. There it reverses although 3 > 2. 4 > 3: continue down.
         assert_eq!(walk(0.9, &[1.0, 2.0, 3.0, 4.0]), [19.0, 20.0, 19.0, 18.0]);
     }
 
     #[test]
     fn a_start_on_a_bound_reverses_the_direction_it_begins_with() {
-        // Upwards before the first move: at 1 the reversal leads inside; at 0 it leads out, is cut off,
-        // and reverses again.
+        // The initial direction is upwards. At 1 the reversal leads inside. At 0 it leads outside and is clamped; then
+        // the direction reverses again.
         assert_eq!(walk(1.0, &[1.0, 2.0, 3.0]), [19.0, 18.0, 17.0]);
         assert_eq!(walk(0.0, &[1.0, 2.0, 3.0]), [0.0, 1.0, 2.0]);
     }
 
     #[test]
     fn finds_a_bound_in_spite_of_rounding() {
-        // Ten steps down from 0.5 end at 2.8e-17, not at 0; a step further out would cost a frame.
+        // Ten steps down from 0.5 end at 2.8e-17, not at 0. Another step outwards would cost a frame.
         let metrics = [2.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0];
         assert_eq!(walk(0.5, &metrics)[9..], [2.0, 1.0, 0.0, 1.0, 2.0]);
     }

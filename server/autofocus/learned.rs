@@ -1,4 +1,5 @@
-//! The paper's learned policies: action values from the latest eight frames, the best action taken.
+//! The paper's learned policies: a network gives action values for the latest eight frames, and the best action is
+//! taken.
 
 use std::collections::VecDeque;
 
@@ -9,7 +10,7 @@ use super::weights::{self, WeightsError};
 use super::{Decision, FieldOfView, Observation, Policy, STEP, mgm, mlr};
 use crate::imaging::Patch;
 
-/// What a learned policy knows of each frame besides the focal power.
+/// What a learned policy sees of each frame besides the focal power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sight {
@@ -17,12 +18,12 @@ pub enum Sight {
     Mgm,
     /// The mean local ratio.
     Mlr,
-    /// The patch, through the encoder.
+    /// The whole patch, through the encoder.
     Patch,
 }
 
 impl Sight {
-    /// Numbers a frame that the head gets, without the focal power.
+    /// Numbers per frame in the head's input, without the focal power.
     #[must_use]
     pub const fn width(self) -> usize {
         match self {
@@ -31,7 +32,7 @@ impl Sight {
         }
     }
 
-    /// The focus metric, if this sight is one.
+    /// The focus metric of `patch`; `None` if this sight is the whole patch.
     #[must_use]
     pub fn metric(self, patch: &Patch) -> Option<f64> {
         match self {
@@ -41,7 +42,7 @@ impl Sight {
         }
     }
 
-    /// A metric as the network takes it: its logarithm, centred and scaled to the order of 1.
+    /// A metric as an input of the network: its logarithm, centred and scaled to the order of 1.
     #[must_use]
     pub fn scaled(self, metric: f64) -> f32 {
         match self {
@@ -51,7 +52,7 @@ impl Sight {
     }
 }
 
-/// The change of focal power that an action stands for.
+/// The change of focal power of an action: 0 is a step down, 1 none, 2 a step up.
 #[must_use]
 pub const fn action_step(action: usize) -> f64 {
     match action {
@@ -61,16 +62,16 @@ pub const fn action_step(action: usize) -> f64 {
     }
 }
 
-/// A focal power as the networks take it.
+/// A focal power as an input of the networks: from -1 to 1.
 #[must_use]
 pub const fn scaled_focal_power(focal_power: f64) -> f32 {
     2.0 * (focal_power as f32 - 0.5)
 }
 
-/// A policy's network: an encoder where it sees patches, and the head.
+/// A policy's network: the head, and an encoder if the policy sees patches.
 #[derive(Debug)]
 pub struct ValueNetwork {
-    /// What it sees.
+    /// What the policy sees of each frame.
     pub sight: Sight,
     encoder: Option<Encoder>,
     /// Computes action values from the histories.
@@ -78,7 +79,7 @@ pub struct ValueNetwork {
 }
 
 impl ValueNetwork {
-    /// A fresh network whose weights live under `path`.
+    /// A network with random weights under `path`.
     #[must_use]
     pub fn new(path: &nn::Path<'_>, sight: Sight) -> Self {
         let encoder = (sight == Sight::Patch).then(|| Encoder::new(&(path / "encoder")));
@@ -86,7 +87,7 @@ impl ValueNetwork {
         Self { sight, encoder, head }
     }
 
-    /// Frames `[N, 1024]` (gray) or `[N, 1]` (scaled metric) as the head takes them: `[N, width]`.
+    /// Encodes frames, `[N, 1024]` (gray) or `[N, 1]` (scaled metric), as inputs of the head: `[N, width]`.
     pub fn encode(&self, frames: &Tensor) -> Tensor {
         self.encoder.as_ref().map_or_else(|| frames.shallow_clone(), |encoder| encoder.forward(frames))
     }
@@ -98,12 +99,13 @@ impl ValueNetwork {
     }
 }
 
-/// A learned policy with its memory of eight frames. Before eight were seen, the first counts for those missing.
+/// A learned policy with its memory of eight frames. Before it has seen eight, the first frame fills the places of
+/// those missing.
 pub struct Learned {
     network: ValueNetwork,
     encodings: VecDeque<Vec<f32>>,
     focal_powers: VecDeque<f32>,
-    // Keeps the variables alive that the network's layers share.
+    // Keeps alive the variables that the network's layers use.
     _store: nn::VarStore,
 }
 
@@ -111,7 +113,7 @@ impl Learned {
     /// A policy with the weights in `bytes` (safetensors).
     ///
     /// # Errors
-    /// When the weights are damaged or another network's.
+    /// If the weights are damaged or belong to another network.
     pub fn new(sight: Sight, bytes: &[u8]) -> Result<Self, WeightsError> {
         let store = nn::VarStore::new(Device::Cpu);
         let network = ValueNetwork::new(&store.root(), sight);
@@ -168,7 +170,7 @@ impl Policy for Learned {
     }
 }
 
-/// The action of highest value; standing still where it ties with a move.
+/// The action of highest value. Standing still wins a tie with a move.
 #[must_use]
 pub fn best_action(values: &[f32]) -> usize {
     [1, 0, 2].into_iter().reduce(|best, other| if values[other] > values[best] { other } else { best }).unwrap_or(1)

@@ -21,15 +21,15 @@ const PADDED: usize = PATCH_SIDE + 2;
 type Row = [f32; PATCH_SIDE];
 type Square = [Row; PATCH_SIDE];
 
-/// Mean gradient magnitude: mean over the patch of `sqrt(Ix² + Iy²)`, where `Ix` and `Iy` are the responses of the
-/// 3x3 Sobel operators, not normalised (a slope of 1 a pixel responds with 8). Gray levels; 0 for a flat patch.
+/// Mean gradient magnitude: mean over the patch of `sqrt(Ix² + Iy²)`, where `Ix` and `Iy` are the responses of the 3x3
+/// Sobel operators, not normalised (a slope of 1 per pixel gives 8). In gray levels; 0 for a flat patch.
 #[must_use]
 pub fn mgm(patch: &Patch) -> f64 {
     mean(&gradient_magnitude_sums(&patch.0))
 }
 
 /// Mean local ratio: mean over the patch of `max((G+1)/(I+1), (I+1)/(G+1))`, where `G` is `I` blurred by a Gaussian of
-/// sigma 4 cut at 4 sigma. No unit; 1 for a flat patch, else above 1. Gray values must not be below 0.
+/// sigma 4, truncated at 4 sigma. Without unit; 1 for a flat patch, else above 1. Gray values must not be negative.
 #[must_use]
 pub fn mlr(patch: &Patch) -> f64 {
     let blur = &*BLUR;
@@ -51,7 +51,7 @@ fn gradient_magnitude_sums(patch: &[f32; PIXELS]) -> Row {
         let here = padded(&rows[y]);
         let below = padded(&rows[(y + 1).min(PATCH_SIDE - 1)]);
 
-        // Each Sobel operator is a difference along one axis of a 1-2-1 sum along the other.
+        // Each Sobel operator takes a 1-2-1 sum along one axis and a difference along the other.
         let mut smooth = [0.0; PADDED];
         let mut slope = [0.0; PADDED];
         for x in 0..PADDED {
@@ -88,7 +88,7 @@ fn local_ratio_sums(patch: &[f32; PIXELS], blur_rows: &Square, blur_columns: &Sq
     let mut sums = [0.0; PATCH_SIDE];
     for (row, smooth) in image.iter().zip(&blurred) {
         for x in 0..PATCH_SIDE {
-            // The greater of a ratio and its inverse is the greater value over the lesser.
+            // The greater of a ratio and its inverse is the greater value divided by the smaller one.
             sums[x] += (row[x].max(smooth[x]) + 1.0) / (row[x].min(smooth[x]) + 1.0);
         }
     }
@@ -110,8 +110,8 @@ fn product(left: &Square, right: &Square) -> Square {
     out
 }
 
-/// A Gaussian blur as two matrices: `blurred = rows * image * columns`. On a patch hardly wider than the kernel a
-/// product of whole matrices, with the replicated borders folded in, is faster than a convolution.
+/// A Gaussian blur as two matrices: `blurred = rows * image * columns`. The matrices include the replicated borders. On
+/// a patch hardly wider than the kernel, this is faster than a convolution.
 struct Blur {
     rows: Square,
     columns: Square,
@@ -168,7 +168,7 @@ mod tests {
         }
     }
 
-    /// Inside, a slope of `s` a pixel responds with `8 s`; in the two border columns one neighbour is a replica, so
+    /// Inside, a slope of `s` per pixel gives `8 s`. In the two border columns one neighbour is a replica, so they give
     /// half of that.
     #[test]
     fn a_ramp_responds_with_eight_times_its_slope() {
@@ -177,7 +177,7 @@ mod tests {
         assert_close(mgm(&patch(|_, y| 240.0 - 3.0 * y)), expected, 1e-4);
     }
 
-    /// On `3x + 4y` the slopes along the axes respond with 24 and 32 (40 together) inside, and with half where the
+    /// On `3x + 4y` the slopes along the axes give 24 and 32 (40 together) inside, and half of that where the
     /// difference meets a border.
     #[test]
     fn a_slanted_ramp_adds_the_axes_as_a_hypotenuse() {
@@ -189,14 +189,14 @@ mod tests {
         assert_close(mgm(&patch(|x, y| 3.0 * x + 4.0 * y)), expected, 1e-4);
     }
 
-    /// A step of 100 between columns 15 and 16 responds with 4 * 100 in those two columns and nothing elsewhere.
+    /// A step of 100 between columns 15 and 16 gives 4 * 100 in those two columns and 0 elsewhere.
     #[test]
     fn a_step_edge_responds_on_both_of_its_sides() {
         let edge = patch(|x, _| if x < 16.0 { 50.0 } else { 150.0 });
         assert_close(mgm(&edge), 2.0 * 400.0 / 32.0, 1e-5);
     }
 
-    /// A single bright pixel of 80 responds 2, 1 and diagonal sqrt(2) times 80 around it.
+    /// A single bright pixel of 80 gives, around it, 2 * 80 at the four sides and sqrt(2) * 80 at the four corners.
     #[test]
     fn a_point_responds_around_itself() {
         let point = patch(|x, y| if (x, y) == (10.0, 20.0) { 80.0 } else { 0.0 });

@@ -1,4 +1,4 @@
-//! Autofocus: focus metrics and the policies that decide which way to turn the lens. Knows no camera, lens or database.
+//! Autofocus: focus metrics, and the policies that decide where the lens goes. Uses no camera, lens or database.
 
 pub mod belief;
 mod fixed;
@@ -26,37 +26,37 @@ use crate::lens::FocalPower;
 
 /// Step of the paper's policies in focal power.
 pub const STEP: f64 = 0.05;
-/// Errors of focal power below this are in focus, as in the paper.
+/// A focal power error below this counts as in focus, as in the paper.
 pub const IN_FOCUS: f64 = 0.1;
 
-/// Decides, frame by frame, which focal power to ask for next.
+/// Decides, frame by frame, to which focal power the lens should go next.
 pub trait Policy: Send {
-    /// What of a frame this policy uses; constant for an instance. Nothing wider need be shown to it.
+    /// Which part of a frame this policy uses. Constant for an instance; wider patches need not be made for it.
     fn field_of_view(&self) -> FieldOfView;
 
-    /// One step. What comes back is not trusted: the control loop checks it.
+    /// Decides for one frame. The decision is not trusted: the control loop checks it.
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
 
-    /// Tells the policy, before its first step, how fast the optic blurs. Most have no use for that.
+    /// Gives the policy, before its first step, the blur rate of the optics. Most policies ignore it.
     fn learn_of(&mut self, _blur: BlurRate) {}
 }
 
-/// How fast an optic blurs: pixels of blur (standard deviation) in the picture for a change of focal
-/// power by 1. `parfocal scan info` measures it.
+/// Blur rate of the optics: pixels of blur (standard deviation) in the picture per unit of focal power error.
+/// `parfocal scan info` measures it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlurRate(f64);
 
 impl BlurRate {
-    /// Least and most that an optic can have.
+    /// Accepted blur rates, in pixels per unit of focal power.
     pub const RANGE: std::ops::RangeInclusive<f64> = 0.1..=200.0;
 
-    /// `pixels` a unit of focal power; `None` outside [`BlurRate::RANGE`].
+    /// A rate of `pixels` per unit of focal power; `None` outside [`BlurRate::RANGE`].
     #[must_use]
     pub fn new(pixels: f64) -> Option<Self> {
         Self::RANGE.contains(&pixels).then_some(Self(pixels))
     }
 
-    /// Pixels a unit of focal power.
+    /// The rate in pixels per unit of focal power.
     #[must_use]
     pub const fn get(self) -> f64 {
         self.0
@@ -67,7 +67,7 @@ impl std::str::FromStr for BlurRate {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let pixels = text.parse().map_err(|_| format!("'{text}' is no number of pixels"))?;
+        let pixels = text.parse().map_err(|_| format!("'{text}' is not a number of pixels"))?;
         Self::new(pixels).ok_or_else(|| format!("must be from {} to {} pixels", Self::RANGE.start(), Self::RANGE.end()))
     }
 }
@@ -75,28 +75,29 @@ impl std::str::FromStr for BlurRate {
 /// How much of a frame a policy uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FieldOfView {
-    /// The patch alone, as the paper's policies do.
+    /// Only the patch, like the paper's policies.
     Patch,
-    /// The patch and the wider patches around it, which cost the control loop sixteen times the pixels.
+    /// The patch and the wider patches around it. For them the control loop develops sixteen times as many pixels.
     Wide,
 }
 
-/// What a policy sees: one view, and the focal power that it was exposed at.
+/// What a policy sees of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
     /// The patch, and the wider patches if the policy's field of view has them.
     pub view: &'a View,
-    /// Focal power that it was exposed at.
+    /// Focal power at which the frame was exposed.
     pub focal_power: FocalPower,
 }
 
-/// What a policy answers.
+/// What a policy decides for a frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Decision {
-    /// Focal power to go to; checked by the control loop, so a plain number.
+    /// Focal power to go to. A plain number, because the control loop checks it.
     pub target: f64,
     /// The focus metric that the policy computed, if it has one.
     pub metric: Option<f64>,
-    /// Probability of each of equally wide slices of 0..=1 to hold the optimum, if the policy has a belief.
+    /// Probability distribution of the optimum over equally spaced focal powers from 0 to 1, if the policy has a
+    /// belief.
     pub belief: Option<Arc<[f32]>>,
 }

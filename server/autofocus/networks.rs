@@ -7,38 +7,37 @@ use super::registration::CHANGES;
 use super::spectrum::FEATURES;
 use crate::imaging::{PATCH_SIDE, WIDER};
 
-/// Latest frames that the paper's networks see.
+/// Number of latest frames that the paper's networks see.
 pub const HISTORY: usize = 8;
 /// Actions of the paper's networks: a step down, none, a step up.
 pub const ACTIONS: usize = 3;
-/// Logits that the paper's encoder makes of a patch.
+/// Length of the encoding that the paper's encoder makes of a patch.
 pub const ENCODING: usize = 8;
-/// Slices of 0..=1 in the belief tracker's posterior.
+/// Focal powers, equally spaced from 0 to 1, over which the belief tracker's posterior is given.
 pub const BINS: usize = 41;
-/// Units of the belief tracker's memory.
+/// Units of the belief tracker's GRU.
 pub const MEMORY: usize = 192;
-/// What the belief tracker sees of the patch: features, their change, the change over what this frame
-/// and the last have in common; then where the lens stood (softly, one in [`BINS`]), and three
-/// numbers on how it moved.
+/// Inputs from the patch and the lens: features, their change since the last frame, and the change of blur over the
+/// texture that both frames show; then the focal power spread over [`BINS`], and three numbers on how it moved.
 pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
-/// What it sees of a wider patch: features and changes as of the patch, and whether there is one at all.
+/// Inputs from a wider patch: features and changes like those of the patch, and whether the wider patch exists.
 pub const WIDER_INPUT: usize = 2 * FEATURES + CHANGES + 1;
-/// What it sees of a frame: the patch first, then the wider ones.
+/// Inputs from a frame: the patch first, then the wider ones.
 pub const SEEN_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
-/// Inputs of the belief tracker: what it sees, whether it knows how fast the optic blurs, and how fast.
+/// All inputs of the belief tracker: those from the frame, whether the blur rate of the optics is known, and the blur
+/// rate.
 pub const BELIEF_INPUT: usize = SEEN_INPUT + 2;
 
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
 
-/// Keeps libtorch's work for this thread on this thread, including what its matrix libraries would
-/// share out. The setting is each thread's own, and handing on so little work costs more than doing
-/// it.
+/// Makes libtorch and its matrix libraries compute on the calling thread only. The setting is per thread. So little
+/// work costs more to distribute than to do.
 pub fn compute_on_this_thread() {
     tch::set_num_threads(1);
 }
 
-/// Three dense layers, `input` -> 256 -> 256 -> 3, `ReLU` between: the action values.
+/// Computes action values: three dense layers, `input` -> 256 -> 256 -> 3, with `ReLU` between.
 #[derive(Debug)]
 pub struct ValueHead {
     /// The layers, first to last.
@@ -46,7 +45,7 @@ pub struct ValueHead {
 }
 
 impl ValueHead {
-    /// A fresh head whose weights live under `path`.
+    /// A head with random weights under `path`.
     #[must_use]
     pub fn new(path: &nn::Path<'_>, input: usize) -> Self {
         let input = i64::try_from(input).unwrap_or(i64::MAX);
@@ -62,14 +61,14 @@ impl ValueHead {
     }
 }
 
-/// Four convolutions of 8 filters, kernel 3, stride 2, no padding, `ReLU` between: 32x32 -> 8 logits.
+/// Four convolutions of 8 filters, kernel 3, stride 2, no padding, with `ReLU` between: 32x32 -> 8 numbers.
 #[derive(Debug)]
 pub struct Encoder {
     convolutions: [nn::Conv2D; 4],
 }
 
 impl Encoder {
-    /// A fresh encoder whose weights live under `path`.
+    /// An encoder with random weights under `path`.
     #[must_use]
     pub fn new(path: &nn::Path<'_>) -> Self {
         let config = nn::ConvConfig { stride: 2, ..Default::default() };
@@ -77,12 +76,12 @@ impl Encoder {
         Self { convolutions: [layer("0", 1), layer("2", 8), layer("4", 8), layer("6", 8)] }
     }
 
-    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale. Each patch is brought to mean 0 and deviation 1
-    /// first: brightness and contrast tell nothing of focus.
+    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale. Each patch is first standardised to mean 0 and
+    /// about unit deviation, since brightness and contrast say nothing about focus.
     pub fn forward(&self, patches: &Tensor) -> Tensor {
         let patches = patches.view([-1, SIDE * SIDE]);
         let centred = &patches - patches.mean_dim(1, true, Kind::Float);
-        // 2 gray levels: what noise alone would give counts as flat.
+        // Plus 2 gray levels, so that a patch with noise alone counts as flat.
         let spread = centred.square().mean_dim(1, true, Kind::Float).sqrt() + 2.0;
 
         let mut x = (centred / spread).view([-1, 1, SIDE, SIDE]);
@@ -98,7 +97,7 @@ impl Encoder {
     }
 }
 
-/// The belief tracker: a GRU over frames and a head that gives a posterior over the next frame's optimum.
+/// The belief tracker's network: a GRU over frames, and a head that gives a posterior over the next frame's optimum.
 #[derive(Debug)]
 pub struct BeliefNetwork {
     memory: nn::GRU,
@@ -106,7 +105,7 @@ pub struct BeliefNetwork {
 }
 
 impl BeliefNetwork {
-    /// A fresh network of `inputs` numbers a frame whose weights live under `path`.
+    /// A network with `inputs` inputs per frame and random weights under `path`.
     #[must_use]
     pub fn new(path: &nn::Path<'_>, inputs: usize) -> Self {
         let units = MEMORY as i64;
@@ -117,12 +116,13 @@ impl BeliefNetwork {
         }
     }
 
-    /// The memory before anything was seen, for `count` scans: `[1, count, MEMORY]`.
+    /// The initial memory of `count` scans: zeros `[1, count, MEMORY]`.
     pub fn blank(&self, count: usize, device: Device) -> Tensor {
         Tensor::zeros([1, i64::try_from(count).unwrap_or(i64::MAX), MEMORY as i64], (Kind::Float, device))
     }
 
-    /// Logits `[N, T, BINS]` of inputs `[N, T, inputs]` from memory `[1, N, MEMORY]`, and the memory after them.
+    /// Processes `inputs` (`[N, T, inputs]`), beginning with `memory` (`[1, N, MEMORY]`). Returns logits `[N, T, BINS]`
+    /// and the memory after the last frame.
     pub fn forward(&self, inputs: &Tensor, memory: &Tensor) -> (Tensor, Tensor) {
         let (units, state) = self.memory.seq_init(inputs, &nn::GRUState(memory.shallow_clone()));
         let hidden = self.head[0].forward(&units).relu();
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(head.forward(&Tensor::zeros([5, 72], (Kind::Float, Device::Cpu))).size(), [5, 3]);
     }
 
-    /// What `tests/vectors/pytorch.py` wrote under `name`.
+    /// The values that `tests/vectors/pytorch.py` wrote under `name`.
     fn from_pytorch(name: &str) -> Tensor {
         let vectors: serde_json::Value =
             serde_json::from_str(include_str!("../../tests/vectors/pytorch.json")).unwrap();
@@ -159,7 +159,7 @@ mod tests {
         Tensor::from_slice(&values).to_kind(Kind::Float)
     }
 
-    /// The same sines as there.
+    /// The same sines as in `tests/vectors/pytorch.py`.
     fn wave(count: usize, rate: f64, scale: f64, offset: f64) -> Tensor {
         let values: Vec<f64> = (0..count).map(|index| offset + scale * (rate * index as f64).sin()).collect();
         Tensor::from_slice(&values).to_kind(Kind::Float)

@@ -1,8 +1,8 @@
-//! Compares the blur of two patches of one scene: they are laid over each other, and where they show
-//! the same, only the blur differs.
+//! Compares the blur of two patches of one scene. The patches are registered: where they overlap they show the same
+//! texture, and only the blur differs.
 //!
-//! Texture passes under the patch from frame to frame, and its own energy varies more than that of a
-//! slightly blurred one; the ratio of energies over the same texture does not.
+//! The scene moves under the patch from frame to frame. The energy of different textures varies more than a slight blur
+//! changes it. So energies are compared over the same texture only.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -13,26 +13,25 @@ use multiversion::multiversion;
 use super::spectrum::Spectrum;
 use crate::imaging::{PATCH_SIDE, Patch};
 
-/// Values [`changes`] gives: log ratios of energy at [`LAGS`], how well the patches agree, and over how much of them.
+/// Length of the result of [`changes`]: log ratios of energy at [`LAGS`], the correlation, and the overlap.
 pub const CHANGES: usize = LAGS.len() + 2;
 
-/// Distances in pixels of second differences, each of which passes frequencies around 1 / (2 lag).
+/// Lags of the second differences, in pixels. Each passes frequencies around 1 / (2 lag) cycles per pixel.
 const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
-/// Largest displacement considered along each axis, in pixels: beyond it too little is common.
+/// Largest displacement considered along each axis, in pixels. Beyond it the overlap is too small.
 const FARTHEST: isize = 15;
-/// Frequencies used to find the displacement, in cycles a patch: what blur leaves.
+/// Highest frequency used to find the displacement, in cycles per patch. Higher ones do not survive blur.
 const FINEST: usize = 10;
-/// Cross-power below which a frequency's phase is mostly that of noise and rounding.
+/// Cross-power below which the phase of a frequency is mostly due to noise and rounding.
 const FAINT: f32 = 300.0;
-/// Energy a pixel that rounding to whole gray levels gives a second difference: (1 + 4 + 1) / 12; as
-/// much again for noise.
+/// Energy per pixel that rounding to whole gray levels adds to a second difference, (1 + 4 + 1) / 12, plus as much
+/// again for noise.
 const FLOOR: f32 = 1.0;
 
 type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];
 
-/// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive when
-/// sharper; then the patches' correlation where they overlap, and the overlap's share of a patch.
-/// Each is of the order of 1.
+/// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive if sharper now; then the
+/// correlation of the patches in their overlap, and the overlap's share of a patch. Each is of the order of 1.
 #[must_use]
 pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; CHANGES] {
     let (dx, dy) = displacement(before.1, now.1);
@@ -60,9 +59,9 @@ pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; C
     out
 }
 
-/// The displacement `(x, y)` in whole pixels for which `now` at a place shows what `before` shows at
-/// that place plus the displacement: the peak of their phase correlation (Kuglin and Hines 1975).
-/// Blur hardly moves the peak, since it takes from each frequency's strength and not its phase.
+/// The displacement `(x, y)` in whole pixels: `now` at a place shows what `before` shows at that place plus the
+/// displacement. It is the peak of their phase correlation (Kuglin and Hines 1975). Blur hardly moves the peak, since
+/// it reduces the amplitude of each frequency and leaves its phase.
 fn displacement(before: &Spectrum, now: &Spectrum) -> (isize, isize) {
     let map = correlate(before, now, &WAVES);
     let mut best = f32::NEG_INFINITY;
@@ -110,7 +109,7 @@ fn correlate(before: &Spectrum, now: &Spectrum, waves: &Waves) -> Square {
             let re = a * c + b * d;
             let im = b * c - a * d;
             let weight = 1.0 / (re * re + im * im + FAINT * FAINT).sqrt();
-            // Frequencies along a row stand for their negatives too.
+            // Each positive frequency along a row also stands for its negative one.
             let weight = if kx == 0 { weight } else { 2.0 * weight };
             let re = weight * re;
             let im = weight * im;
@@ -133,13 +132,13 @@ fn correlate(before: &Spectrum, now: &Spectrum, waves: &Waves) -> Square {
     map
 }
 
-/// Places along an axis at which a patch and one displaced by `by` both show something.
+/// Range along an axis in which a patch and one displaced by `by` overlap.
 fn overlap(by: isize) -> Range<usize> {
     let side = PATCH_SIDE as isize;
     (-by).max(0) as usize..(side - by.max(0)) as usize
 }
 
-/// `patch` read `(dx, dy)` farther on; what lies outside is 0.
+/// `patch` shifted so that its place `(dx, dy)` becomes the origin; 0 outside.
 fn shifted(patch: &Patch, dx: isize, dy: isize) -> Square {
     let mut out = [[0.0; PATCH_SIDE]; PATCH_SIDE];
     let columns = overlap(dx);
@@ -176,14 +175,14 @@ fn second_differences(square: &Square, rows: Range<usize>, columns: Range<usize>
     out
 }
 
-/// Pearson's correlation of two patches where they overlap; 0 where one is flat.
+/// Pearson's correlation of two patches in their overlap; 0 if one is flat.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn correlation(a: &Square, b: &Square, rows: Range<usize>, columns: Range<usize>) -> f32 {
     let mut sums = [[0.0f32; PATCH_SIDE]; 5];
     let count = (rows.len() * columns.len()).max(1) as f32;
     for y in rows {
         for x in 0..PATCH_SIDE {
-            // About the middle gray, so that squares of what differs are not lost in those of what does not.
+            // Relative to middle gray: with large values, the small variance would be lost to rounding.
             let a = a[y][x] - 128.0;
             let b = b[y][x] - 128.0;
             for (sum, term) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
@@ -208,8 +207,8 @@ mod tests {
 
     const SIDE: usize = 96;
 
-    /// A picture of spots of many sizes: white noise blurred to three widths, each brought to a
-    /// deviation of 20 gray levels.
+    /// A picture of spots of many sizes: white noise blurred to three widths, each scaled to a deviation of 20 gray
+    /// levels.
     fn scene(seed: u32) -> GrayImage {
         let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
         let mut noise = || {
@@ -220,7 +219,7 @@ mod tests {
         let mut sum = vec![128.0f32; SIDE * SIDE];
         for sigma in [0.7, 1.5, 3.0] {
             let white = GrayImage::new(SIDE, SIDE, (0..SIDE * SIDE).map(|_| noise()).collect()).unwrap();
-            // White noise of variance 1/12 under a Gaussian keeps 1 / (4 pi sigma^2) of it.
+            // After a Gaussian blur, white noise of variance 1/12 keeps 1 / (4 pi sigma^2) of it.
             let scale = 20.0 * (12.0 * 2.0 * TAU * sigma * sigma).sqrt() as f32;
             for (total, value) in sum.iter_mut().zip(gaussian_blur(&white, sigma).data) {
                 *total += scale * value;

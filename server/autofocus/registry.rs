@@ -1,4 +1,4 @@
-//! The registry: every policy by its name, the same everywhere.
+//! The registry: all policies by name. Every part of the program uses the same names.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{BlurRate, Policy};
 
-/// A policy's name, as in docs/scripting.md; valid once a [`Registry`] has taken it. Cheap to clone.
+/// A policy's name, as in docs/scripting.md. It need not be known; [`Registry::build`] checks it. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct PolicyName(Arc<str>);
@@ -37,31 +37,31 @@ impl fmt::Display for PolicyName {
 /// One line of the registry.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PolicyEntry {
-    /// Name.
+    /// The policy's name, by which [`Registry::build`] finds it.
     pub name: PolicyName,
     /// What it does, in one sentence.
     pub summary: &'static str,
     /// SHA-256 of its weights, in hexadecimal, if it was learned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
-    /// Whether it can run now; a learned policy cannot without its weights.
+    /// Whether the policy can run now. A learned policy cannot run without its weights.
     pub available: bool,
-    /// Why it cannot run and what to do, if it cannot.
+    /// Why the policy cannot run and what to do; `None` if it is available.
     pub reason: Option<String>,
 }
 
 /// Why a policy could not be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PolicyError {
-    /// No such name.
+    /// The registry has no policy of that name.
     #[error("there is no policy '{name}'; there are: {known}")]
     Unknown {
         /// The name asked for.
         name: PolicyName,
-        /// The names there are, separated by commas.
+        /// All known names, separated by commas.
         known: String,
     },
-    /// The weights are missing or damaged.
+    /// The policy is listed but unavailable: its weights or its file are missing or damaged.
     #[error("policy '{name}' cannot run: {reason}")]
     Unavailable {
         /// The policy.
@@ -71,7 +71,7 @@ pub enum PolicyError {
     },
 }
 
-/// All policies. Clone freely; what their constructors hold (learned weights) is shared.
+/// All policies. Cheap to clone: the clones share the learned weights.
 #[derive(Clone, Default)]
 pub struct Registry {
     policies: Vec<Registered>,
@@ -93,7 +93,7 @@ enum Source {
 }
 
 impl Registry {
-    /// This registry with policy `name` made by `build`, in the place of one of that name or else at the end.
+    /// Adds policy `name`, made by `build`. Replaces a policy of that name, or appends it at the end.
     #[must_use]
     pub fn with(
         self,
@@ -104,7 +104,7 @@ impl Registry {
         self.put(name, summary, Source::Constructor(Arc::new(build)))
     }
 
-    /// This registry with policy `name` listed but unavailable, for `reason`, which says what to do.
+    /// Lists policy `name` as unavailable. `reason` says why and what to do.
     #[must_use]
     pub fn without(self, name: &str, summary: &'static str, reason: &str) -> Self {
         self.put(name, summary, Source::Missing(reason.into()))
@@ -119,7 +119,7 @@ impl Registry {
         self
     }
 
-    /// This registry with `bytes` noted as the weights of policy `name`.
+    /// Records the hash of `bytes` as that of the weights of policy `name`.
     #[must_use]
     pub fn weighing(mut self, name: &str, bytes: &[u8]) -> Self {
         if let Some(policy) = self.policies.iter_mut().find(|policy| policy.name.as_str() == name) {
@@ -128,7 +128,7 @@ impl Registry {
         self
     }
 
-    /// This registry with its policies told how fast the optic blurs, where that is known.
+    /// Gives the blur rate of the optics, if known, to every policy that is built.
     #[must_use]
     pub const fn knowing(mut self, blur: Option<BlurRate>) -> Self {
         self.blur = blur;
@@ -162,10 +162,10 @@ impl Registry {
         self.policies.iter().map(entry).collect()
     }
 
-    /// A fresh instance of policy `name`, with nothing remembered.
+    /// Builds a new instance of policy `name`, with an empty memory.
     ///
     /// # Errors
-    /// When there is no such policy or it cannot run.
+    /// If there is no such policy or it cannot run.
     pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
         let policy = self.policies.iter().find(|policy| policy.name == *name);
 

@@ -1,10 +1,9 @@
-//! Policies from elsewhere, as TorchScript files: `file:PATH` in the place of a policy's name.
+//! Policies of other people, as TorchScript files: `file:PATH` instead of a policy's name.
 //!
-//! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray
-//! patches `[8, 32, 32]` (0..=255) and the focal powers that they were exposed at, `[8]` (0..=1). It
-//! returns the values of the three actions, `[3]`: a step down, none, a step up. Before eight frames
-//! were seen, the first stands for those missing. Each instance has a module of its own, in
-//! evaluation mode.
+//! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray patches `[8, 32, 32]`
+//! (0..=255) and the focal powers at which they were exposed, `[8]` (0..=1). It returns the values of the three
+//! actions, `[3]`: a step down, none, a step up. Before there are eight frames, the first fills the places of those
+//! missing. Each instance has its own module, in evaluation mode.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -18,12 +17,12 @@ use super::networks::{ACTIONS, HISTORY};
 use super::{Decision, FieldOfView, Fixed, Observation, Policy, PolicyName, Registry};
 use crate::imaging::PATCH_SIDE;
 
-/// What a policy's name begins with if it is a file.
+/// Prefix of the name of a policy that is a file.
 pub const PREFIX: &str = "file:";
 const SIDE: i64 = PATCH_SIDE as i64;
 
-/// Adds the policy that `name` stands for to `registry`, if it is a file's; a file that is no such
-/// policy is listed as unavailable, with the reason.
+/// Adds the policy in a file to `registry`, if `name` begins with [`PREFIX`]. A file that cannot be used is listed as
+/// unavailable, with the reason.
 #[must_use]
 pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     const SUMMARY: &str = "action values from a TorchScript file";
@@ -32,7 +31,7 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     match load(Path::new(path)) {
         Ok(bytes) => {
             let source = Arc::clone(&bytes);
-            // It was read a moment ago; should libtorch fail all the same, the lens stays where it is.
+            // The module was loaded a moment ago. If libtorch fails now nevertheless, the lens stays where it is.
             let make = move || {
                 parse(&source).map_or_else(
                     |_| Box::<Fixed>::default() as Box<dyn Policy>,
@@ -46,7 +45,7 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     }
 }
 
-/// Reads the file's bytes, and tries the module on patches that show nothing and on others that do.
+/// Reads the file, and tries the module on flat patches and on textured ones.
 fn load(path: &Path) -> Result<Arc<[u8]>, String> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let module = parse(&bytes).map_err(|reason| format!("{} is not TorchScript: {reason}", path.display()))?;
@@ -66,13 +65,13 @@ fn load(path: &Path) -> Result<Arc<[u8]>, String> {
     Ok(bytes.into())
 }
 
-/// The module in `bytes`, in evaluation mode: without it, layers such as dropout act by chance.
+/// Loads the module in `bytes` in evaluation mode. In training mode, layers such as dropout would act randomly.
 fn parse(bytes: &[u8]) -> Result<CModule, String> {
     let module = CModule::load_data(&mut &*bytes).and_then(|mut module| module.f_set_eval().map(|()| module));
     module.map_err(|error| first_line(&error.to_string()))
 }
 
-/// The three action values; what the module is given is flat, oldest frame first.
+/// The three action values. The inputs are flat lists, oldest frame first.
 fn values(module: &CModule, patches: &[f32], focal_powers: &[f32]) -> Result<[f32; ACTIONS], String> {
     let inputs = [Tensor::from_slice(patches).view([-1, SIDE, SIDE]), Tensor::from_slice(focal_powers)];
     let output = tch::no_grad(|| module.forward_ts(&inputs)).map_err(|error| first_line(&error.to_string()))?;
@@ -86,7 +85,7 @@ fn values(module: &CModule, patches: &[f32], focal_powers: &[f32]) -> Result<[f3
     if values.iter().all(|value| value.is_finite()) { Ok(values) } else { Err("it returned no numbers".to_owned()) }
 }
 
-/// libtorch's messages go on with a stack trace.
+/// The first line of libtorch's message; a stack trace follows it.
 fn first_line(message: &str) -> String {
     message.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("it gave no reason").to_owned()
 }
@@ -129,8 +128,8 @@ impl Policy for Scripted {
                 let target = seen.focal_power.moved(action_step(best_action(&values))).get();
                 Decision { target, metric: None, belief: None }
             }
-            // It worked when it was loaded and fails on what it sees now. The live loop's watchdog
-            // rejects the invalid target and takes over; an evaluation ends.
+            // The module worked when it was loaded, and fails on these frames. The live loop's watchdog rejects the
+            // invalid target and takes over; an evaluation ends.
             Err(_) => Decision { target: f64::NAN, metric: None, belief: None },
         }
     }
@@ -162,7 +161,8 @@ mod tests {
         let mut policy = policy("steepest-frame.pt").unwrap();
         let focal_power = FocalPower::new(0.5).unwrap();
         let mut step = |height| policy.step(&Observation { view: &stripes(height).into(), focal_power }).target;
-        // It goes up where the latest frame is steeper than the one before, and else down; nothing is gained at first.
+        // It steps up if the latest frame is steeper than the one before, and down if it is less steep. At first it
+        // stands still.
         for (height, expected) in [(10.0, 0.5), (20.0, 0.55), (5.0, 0.45), (6.0, 0.55), (6.0, 0.5)] {
             let target = step(height);
             assert!((target - expected).abs() < 1e-9, "{height}: {target}");

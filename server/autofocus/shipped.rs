@@ -1,4 +1,4 @@
-//! The policies that ship with the program, and learned ones that people train themselves.
+//! The policies that ship with the program, and the use of weights that people trained themselves.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use super::learned::{Learned, Sight};
 use super::weights::WeightsError;
 use super::{Fixed, HillClimber, Policy, Registry, mgm, mlr};
 
-/// What a learned policy's weights are for.
+/// The kind of network that a learned policy's weights are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Design {
-    /// The paper's action values.
+    /// The paper's value networks.
     Values(Sight),
     /// The belief tracker.
     Belief,
@@ -69,20 +69,20 @@ impl Registry {
     }
 }
 
-/// The design behind a learned policy's name.
+/// The design of the learned policy `name`; `None` if no learned policy has that name.
 #[must_use]
 pub fn design(name: &str) -> Option<Design> {
     SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| shipped.design)
 }
 
-/// Adds all learned policies to `registry`; one with damaged weights is listed but unavailable.
+/// Adds all learned policies to `registry`. One with damaged weights is listed but unavailable.
 #[must_use]
 pub fn with_shipped(registry: Registry) -> Registry {
     SHIPPED.iter().fold(registry, |registry, shipped| {
         let Shipped { name, summary, design, weights } = shipped;
         match build(*design, weights) {
             Ok(_) => put(registry, name, summary, *design, Arc::from(*weights)),
-            Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
+            Err(error) => registry.without(name, summary, &format!("{error}; replace them with undamaged weights")),
         }
     })
 }
@@ -90,29 +90,29 @@ pub fn with_shipped(registry: Registry) -> Registry {
 /// Why weights in a folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// There are none.
+    /// The folder has no weights of a learned policy.
     #[error("there are no weights in {}: none of {names}", folder.display())]
     Empty {
         /// The folder.
         folder: PathBuf,
-        /// Files that could be there.
+        /// File names that were looked for, separated by commas.
         names: String,
     },
-    /// Some cannot be used.
+    /// A file of weights cannot be used.
     #[error("cannot use the weights {}: {reason}", file.display())]
     Unfit {
-        /// The file.
+        /// The file of the weights.
         file: PathBuf,
-        /// Why.
+        /// What is wrong with it.
         reason: String,
     },
 }
 
-/// Replaces the weights that ship by those that lie in `folder` as `NAME.safetensors`. A policy
-/// without a file there keeps its own.
+/// Replaces the weights that ship by those in `folder`, called `NAME.safetensors`. A policy without a file there keeps
+/// its weights.
 ///
 /// # Errors
-/// When there are none at all, or some are damaged or cannot be read.
+/// If there are no weights at all, or some are damaged or cannot be read.
 pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, FolderError> {
     let file_of = |name: &str| folder.join(format!("{name}.safetensors"));
     let there: Vec<_> = SHIPPED.iter().filter(|shipped| file_of(shipped.name).exists()).collect();
@@ -130,8 +130,8 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
     })
 }
 
-/// Adds a policy whose weights were found sound a moment ago; should libtorch fail all the same,
-/// the lens stays where it is.
+/// Adds a policy whose weights were checked a moment ago. If libtorch fails now nevertheless, the lens stays where it
+/// is.
 fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
     let weights = Arc::clone(&bytes);
     let make = move || build(design, &bytes).unwrap_or_else(|_| Box::<Fixed>::default() as Box<dyn Policy>);
@@ -141,7 +141,7 @@ fn put(registry: Registry, name: &str, summary: &'static str, design: Design, by
 /// A policy of `design` with the weights in `bytes` (safetensors).
 ///
 /// # Errors
-/// When the weights are damaged or another network's.
+/// If the weights are damaged or belong to another network.
 pub fn build(design: Design, bytes: &[u8]) -> Result<Box<dyn Policy>, WeightsError> {
     Ok(match design {
         Design::Values(sight) => Box::new(Learned::new(sight, bytes)?),

@@ -1,8 +1,7 @@
-//! Measures how blurred a patch is: the energy in bands of spatial frequency, as logarithms.
+//! Measures how blurred a patch is, by the logarithm of its energy in bands of spatial frequency.
 //!
-//! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²), so
-//! a change of blur shifts each band's logarithm by an amount that depends on neither contrast nor
-//! texture.
+//! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²). So a change of blur
+//! shifts each band's logarithm by an amount that depends on neither contrast nor texture.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -15,24 +14,25 @@ use crate::imaging::{PATCH_SIDE, Patch};
 
 /// Bands of radial frequency.
 const BANDS: usize = 14;
-/// Values [`features`] gives: the bands, contrast, mean gradient magnitude, mean local ratio, brightness.
+/// Length of the result of [`features`]: the bands, contrast, mean gradient magnitude, mean local ratio, brightness.
 pub const FEATURES: usize = BANDS + 4;
-/// Which of [`features`] is the logarithm of the mean gradient magnitude.
+/// Index in [`features`] of the logarithm of the mean gradient magnitude.
 pub const SHARPNESS: usize = BANDS + 1;
-/// Columns of the transform that a real patch needs: frequencies 0..=16; padded to whole vectors.
+/// Columns of the transform. A real patch needs the 17 of frequencies 0..=16; the rest pads them to whole vectors.
 const COLUMNS: usize = 24;
 const HALF: usize = PATCH_SIDE / 2;
 
-/// Energy far below that of a gray level's noise, so that an empty band has a finite logarithm.
+/// Added to a band's energy so that an empty band has a finite logarithm. Far below the energy of noise of one gray
+/// level.
 const ROUNDING: f32 = 30.0;
-/// How many times as much energy the lower third of the bands must have as the upper third for a
-/// patch to show anything. White noise has more than 2.5 times as much in one patch of a thousand.
+/// Least ratio of the energy in the lower third of the bands to that in the upper third for a patch to show detail.
+/// White noise exceeds 2.5 in one patch of a thousand.
 const LEAST_FALL: f32 = 2.5;
 
 type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
 
-/// The transform of a patch less its mean under a Hann window: rows are frequencies 0..=31 down the patch, the first 17
-/// columns frequencies 0..=16 along it.
+/// The Fourier transform of a patch, less its mean, under a Hann window. Rows are frequencies 0..=31 down the patch;
+/// the first 17 columns are frequencies 0..=16 along it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrum {
     /// Real parts.
@@ -41,21 +41,21 @@ pub struct Spectrum {
     pub imaginary: Matrix,
     /// The patch's mean.
     mean: f32,
-    /// Its variance.
+    /// The patch's variance.
     variance: f32,
     /// Energy in each band.
     energy: [f32; BANDS],
 }
 
-/// Waves for the transform, times the Hann window along their axis.
+/// Sines and cosines for the transform, multiplied by the Hann window along their axis.
 struct Tables {
-    /// cos and sin of 2 pi row column / 32 for the first [`COLUMNS`] frequencies.
+    /// cos and sin of 2 pi row column / 32 for the first [`COLUMNS`] frequencies of the first axis.
     cos: Matrix,
     sin: Matrix,
     /// cos and sin for all 32 frequencies of the second axis.
     full_cos: [[f32; PATCH_SIDE]; PATCH_SIDE],
     full_sin: [[f32; PATCH_SIDE]; PATCH_SIDE],
-    /// Band of each (row frequency, column frequency), `BANDS` for none.
+    /// Band of each pair of frequencies, by row and column; `BANDS` for none.
     band: [[usize; COLUMNS]; PATCH_SIDE],
     /// Frequency pairs in each band.
     count: [f32; BANDS],
@@ -86,8 +86,8 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     }
 });
 
-/// Band of a frequency pair: by radius, finer for low frequencies; none for the mean and its leakage,
-/// and the far corners.
+/// Band of a pair of frequencies, by radius; the bands of low frequencies are narrower. The mean with its leakage and
+/// the far corners belong to no band.
 fn band(ky: usize, kx: usize) -> usize {
     if kx > HALF {
         return BANDS;
@@ -123,8 +123,8 @@ impl Spectrum {
         self.variance.sqrt()
     }
 
-    /// Whether the patch shows more than noise. Tissue has far more energy at low frequencies than
-    /// at high ones however sharp it is; the sensor's noise and rounding have as much at all.
+    /// Whether the patch shows more than noise. Tissue, however sharp, has far more energy at low frequencies than at
+    /// high ones. The sensor's noise and rounding have equal energy at all.
     #[must_use]
     pub fn shows_detail(&self) -> bool {
         let mean = |bands: Range<usize>| {
@@ -134,7 +134,7 @@ impl Spectrum {
     }
 }
 
-/// The transform of a patch.
+/// Computes the transform of a patch.
 #[must_use]
 pub fn spectrum(patch: &Patch) -> Spectrum {
     let mean = column_sums(patch, |value| value).iter().sum::<f32>() / patch.0.len() as f32;
@@ -147,7 +147,7 @@ pub fn spectrum(patch: &Patch) -> Spectrum {
     spectrum
 }
 
-/// Sum of `term` down each column: as many sums side by side as vectors hold.
+/// Sums `term` down each column. The columns' sums fill whole vectors.
 fn column_sums(patch: &Patch, term: impl Fn(f32) -> f32) -> [f32; PATCH_SIDE] {
     let mut sums = [0.0; PATCH_SIDE];
     for line in patch.0.chunks_exact(PATCH_SIDE) {
@@ -192,7 +192,7 @@ fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables)
 }
 
 fn band_energies(spectrum: &Spectrum) -> [f32; BANDS] {
-    // One more than there are bands takes what belongs to none.
+    // The last entry collects the energy that belongs to no band.
     let mut energy = [0.0f32; BANDS + 1];
     for (ky, bands) in TABLES.band.iter().enumerate() {
         let real = &spectrum.real[ky];
@@ -247,9 +247,9 @@ mod tests {
 
     #[test]
     fn the_transform_is_the_textbook_one() {
-        // A wave of amplitude A at frequency (5, 0) under a Hann window (weights 1/4, 1/2, 1/4 on
-        // neighbouring frequencies along each axis) has |X|² = (A/2 · 512² · ...)²: summed over the half
-        // plane, with both signs of the row frequency, (A/2 · 32 · 32)² · (3/8)² by Parseval.
+        // A wave of amplitude A at frequency 5 along the rows. The Hann window spreads it to neighbouring frequencies.
+        // By Parseval, the sum of |X|² over the half plane, with both signs of the row frequency, is
+        // (A/2 · 32 · 32)² · (3/8)²: the mean square of the window is 3/8 along each axis.
         let energy = band_energies(&transform(&wave(5.0).0, 128.0, &TABLES));
         let expected = (25.0f32 * 1024.0 * 0.375).powi(2);
         let found = energy.iter().sum::<f32>();

@@ -1,4 +1,4 @@
-//! Weights of networks as safetensors, read and written without trust: a damaged file is an error, never a crash.
+//! Weights of networks as safetensors. Files are not trusted: a damaged one is an error, never a crash.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -8,10 +8,10 @@ use tch::{Kind, Tensor, nn};
 /// Why weights could not be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WeightsError {
-    /// Not safetensors, or cut short.
+    /// Not safetensors, truncated, or with values that are not finite.
     #[error("the weights are damaged: {0}")]
     Damaged(String),
-    /// A tensor of the network is not there or does not fit.
+    /// A tensor is missing, unknown to the network, or has another shape.
     #[error("the weights belong to another network: {0}")]
     Mismatch(String),
 }
@@ -19,16 +19,16 @@ pub enum WeightsError {
 /// Fills every variable of `store` from safetensors `bytes`.
 ///
 /// # Errors
-/// When the bytes are damaged, or hold a different set of tensors than the network has.
+/// If the bytes are damaged, or hold a different set of tensors than the network has.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
     load_widening(store, bytes, "", &[])
 }
 
-/// Like [`load`], for a network that sees more than it once did: where the matrix `widened` has
-/// one of `widths` columns in the file, they become the first of the network's, and the others become 0.
+/// Like [`load`], for a network that has more inputs now than when its weights were trained. If the matrix `widened`
+/// has one of `widths` columns in the file, they become the network's first columns, and its other columns become 0.
 ///
 /// # Errors
-/// As for [`load`].
+/// If [`load`] would fail, except for such a width.
 pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: &[usize]) -> Result<(), WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
 
@@ -51,7 +51,7 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: 
         let tensor = Tensor::f_from_data_size(view.data(), &shape, Kind::Float)
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;
         if !bool::try_from(tensor.isfinite().all()).unwrap_or(false) {
-            return Err(WeightsError::Damaged(format!("tensor '{name}' holds values that are no numbers")));
+            return Err(WeightsError::Damaged(format!("tensor '{name}' contains values that are not finite")));
         }
 
         tch::no_grad(|| {
@@ -67,12 +67,12 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: 
     Ok(())
 }
 
-/// The variables of `store` as safetensors; one entry of the file's metadata says how they were
-/// `made`. It is a single entry because the order of entries in the file is random, and the same
-/// training must give the same file.
+/// The variables of `store` as safetensors. The file's metadata has one entry, `made`, which says how they were made.
+/// It is a single entry because the order of entries in the file is random, and the same training must give the same
+/// file.
 ///
 /// # Errors
-/// When the tensors cannot be laid out, which does not happen with this program's networks.
+/// If the tensors cannot be laid out, which does not happen with this program's networks.
 pub fn save(store: &nn::VarStore, made: &str) -> Result<Vec<u8>, WeightsError> {
     let data: BTreeMap<String, (Vec<usize>, Vec<u8>)> =
         store.variables().into_iter().map(|(name, tensor)| (name, raw(&tensor))).collect();
@@ -94,7 +94,7 @@ fn raw(tensor: &Tensor) -> (Vec<usize>, Vec<u8>) {
     (shape, floats(tensor).iter().flat_map(|value| value.to_le_bytes()).collect())
 }
 
-/// A float tensor's values, row by row, wherever it lies.
+/// The values of a float tensor on any device, row by row.
 #[must_use]
 pub fn floats(tensor: &Tensor) -> Vec<f32> {
     let mut values = vec![0.0f32; tensor.numel()];
@@ -131,7 +131,7 @@ mod tests {
         let [from, to] = [&narrow, &wide].map(|store| store.variables()["layer.weight"].shallow_clone());
         assert_eq!(to.narrow(1, 0, 3), from);
         assert_eq!(floats(&to.narrow(1, 3, 2)), [0.0; 4]);
-        // Of another width, or of another matrix, they do not fit.
+        // Weights of another width, or of another matrix, do not fit.
         for (name, columns) in [("layer.weight", 4), ("layer.bias", 3)] {
             let refused = load_widening(&store(5), &bytes, name, &[columns]).unwrap_err();
             assert!(matches!(refused, WeightsError::Mismatch(_)), "{refused}");

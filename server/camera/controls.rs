@@ -46,9 +46,9 @@ impl Setting {
 /// A setting's value and the bounds that the camera gives for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Adjustable {
-    /// Which.
+    /// The setting.
     pub setting: Setting,
-    /// As the camera has it.
+    /// Its present value.
     pub value: f64,
     /// Least value.
     pub min: f64,
@@ -56,7 +56,7 @@ pub struct Adjustable {
     pub max: f64,
 }
 
-/// What can be changed, and what became of the last change.
+/// What can be changed, and whether the last change failed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct CameraOffer {
     /// Every setting that the camera offers now.
@@ -106,10 +106,10 @@ impl Controls {
         self.inner().offer.clone()
     }
 
-    /// Asks for `setting` to become `value`; the camera's thread does it before the next frame.
+    /// Asks for `setting` to be set to `value`. The camera's thread does this before the next frame.
     ///
     /// # Errors
-    /// When the camera does not offer the setting, or not that value.
+    /// If the camera does not offer the setting, or `value` is outside its bounds.
     pub fn ask(&self, setting: Setting, value: f64) -> Result<(), ControlError> {
         let mut inner = self.inner();
         let offered = inner.offer.settings.iter().find(|one| one.setting == setting);
@@ -134,7 +134,7 @@ impl Controls {
         self.inner().offer.trouble = Some(format!("{} was not changed: the camera says: {why}", setting.label()));
     }
 
-    /// For the camera: takes the changes asked for.
+    /// For the camera: takes the changes that were asked for, one per setting.
     #[must_use]
     pub fn take(&self) -> Vec<(Setting, f64)> {
         std::mem::take(&mut self.inner().wanted)

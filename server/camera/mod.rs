@@ -1,4 +1,4 @@
-//! Cameras, the sources of frames. This room knows nothing of policies.
+//! Cameras, the sources of frames. This room knows nothing about policies.
 
 pub mod calibration;
 mod controls;
@@ -31,14 +31,15 @@ use crate::lens::FocalPower;
 
 /// A source of frames at its own pace.
 ///
-/// An implementation guarantees that [`Camera::next_frame`] returns within `timeout` plus one frame's
-/// time; that frame numbers rise strictly, gaps being frames lost; and that after an error it keeps
-/// trying to recover by itself, so the caller just asks again.
+/// An implementation guarantees:
+/// * [`Camera::next_frame`] returns within `timeout` plus one frame's time.
+/// * Frame numbers rise strictly. A gap is a lost frame.
+/// * After an error it keeps trying to recover by itself, so the caller just asks again.
 pub trait Camera: Send {
     /// Waits for the next frame.
     ///
     /// # Errors
-    /// When none came within `timeout`, or the device failed.
+    /// If none came within `timeout`, or the device failed.
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError>;
 
     /// The camera's name and state.
@@ -57,7 +58,7 @@ pub trait Camera: Send {
         false
     }
 
-    /// The camera's settings, where an operator can change any.
+    /// The camera's settings; `None` if an operator can change none.
     fn controls(&self) -> Option<Controls> {
         None
     }
@@ -70,16 +71,16 @@ pub struct Frame {
     pub number: u64,
     /// End of the exposure, taken once, here; every later stage passes it on.
     pub exposed_at: Moment,
-    /// Length of the exposure; zero where the camera does not report it.
+    /// Length of the exposure; zero if the camera does not report it.
     pub exposure: Duration,
     /// The picture.
     pub image: FrameImage,
-    /// What only a simulation knows. For reports; no policy sees it.
+    /// What only a simulation knows. It is for reports; no policy sees it.
     pub truth: Option<Truth>,
 }
 
 impl Frame {
-    /// The middle of the exposure: the lens's place at that time is the one that most of the light saw.
+    /// The middle of the exposure. The lens's focal power at that time best stands for the whole exposure.
     #[must_use]
     pub fn middle(&self) -> Moment {
         let half = u64::try_from(self.exposure.as_nanos() / 2).unwrap_or(u64::MAX);
@@ -116,7 +117,7 @@ pub struct CameraHealth {
     pub working: bool,
     /// One sentence: the state and, if it is bad, what to do.
     pub message: Arc<str>,
-    /// Frames a second over the last second, as measured.
+    /// Measured frame rate over the last second, frames per second.
     pub fps: f64,
     /// Frames lost since the start.
     pub lost: u64,

@@ -30,7 +30,7 @@ impl Pace {
     /// Waits for the next frame's time and returns its number.
     ///
     /// # Errors
-    /// When that time is further away than `timeout`; then it has waited for that long.
+    /// If that time is further away than `timeout`. The call has then waited for `timeout`.
     pub fn wait(&mut self, clock: &dyn Clock, timeout: Duration) -> Result<u64, CameraError> {
         let now = clock.now();
         let (number, due) = self.next(now);
@@ -64,7 +64,7 @@ impl Pace {
         }
     }
 
-    /// Frames a second, as measured over the second before `now`.
+    /// Frames per second, as measured over the second before `now`.
     #[must_use]
     pub fn rate(&self, now: Moment) -> f64 {
         let recent = self.delivered.iter().filter(|at| now.since(**at) <= Duration::from_secs(1));

@@ -35,7 +35,7 @@ impl Before {
     }
 }
 
-/// Brightness of the white tile, of full scale.
+/// Brightness of the white tile, as a share of full scale.
 const WHITE: f32 = 0.8;
 /// Place of the camera in the clamp: over the middle of the brain, in focus at the middle of the range.
 const CLAMPED: Pose = Pose { place: [0.0; 2], roll: 0.0, tilt: [0.0; 2], focus: 0.5 };
@@ -56,13 +56,13 @@ pub struct PhantomCamera {
 }
 
 impl PhantomCamera {
-    /// The phantom of the settings' seed, the camera in a hand.
+    /// The phantom of the settings' seed, with the camera in a hand.
     #[must_use]
     pub fn new(settings: CameraSettings) -> Self {
         Self::looking(Before::Hand, settings)
     }
 
-    /// The same with another scene.
+    /// The phantom of the settings' seed, with the scene `before`.
     #[must_use]
     pub fn looking(before: Before, settings: CameraSettings) -> Self {
         let phantom = Phantom::new(settings.seed);

@@ -12,13 +12,13 @@ use crate::lens::FocalPower;
 
 /// Something that can be looked at through a lens.
 pub trait View: Send {
-    /// Why there may be nothing to see.
+    /// Why there may be no picture.
     type Error: Display;
 
     /// The picture `time` after the start at `focal_power`, and the optimal focal power.
     ///
     /// # Errors
-    /// When a picture cannot be read.
+    /// If a picture cannot be read.
     fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), Self::Error>;
 }
 

@@ -1,4 +1,4 @@
-//! Mosaics whose memory is reused once nobody holds them: allocating 4.4 MB a frame costs more than the
+//! Mosaics whose memory is reused once nobody holds them: allocating 4.4 MB per frame costs more than making the
 //! picture.
 
 use std::sync::Arc;
@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::CameraError;
 use crate::imaging::MosaicFrame;
 
-/// Mosaics remembered. The camera fills one, and each of control loop, imaging thread and the threads of the two
-/// larger sizes works on one while its slot holds the next; a recorder that falls behind holds about ten. Beyond
-/// that the camera still gets memory, new from the system.
+/// Most mosaics that are remembered. The camera fills one. The control loop, the imaging thread and the threads of the
+/// two larger sizes each work on one while their slots hold the next. A recorder that falls behind holds about ten. If
+/// more are in use, the camera gets new memory from the system.
 const MOST: usize = 20;
 
-/// Frames of one size, handed out shared and taken back when the last other holder drops them.
+/// Frames of one size, shared with their users. Their memory is reused when the last other holder drops them.
 #[derive(Debug)]
 pub struct MosaicPool {
     width: usize,
@@ -33,10 +33,10 @@ impl MosaicPool {
         freed.map_or_else(|| vec![0; self.width * self.height], MosaicFrame::into_samples)
     }
 
-    /// Samples as a frame to share, remembered for later use.
+    /// Makes `samples` a frame to share, and remembers it to reuse its memory later.
     ///
     /// # Errors
-    /// When the number of samples is not that of a frame.
+    /// If the number of samples is not that of a frame.
     pub fn frame(&mut self, samples: Vec<u16>) -> Result<Arc<MosaicFrame>, CameraError> {
         let frame = MosaicFrame::new(self.width, self.height, samples);
         let frame = Arc::new(frame.map_err(|error| CameraError::Failed(error.to_string()))?);

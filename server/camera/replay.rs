@@ -10,13 +10,13 @@ use crate::clock::{Clock, Moment};
 use crate::lens::FocalPower;
 use crate::recording::{Recording, RecordingError};
 
-/// Pause before the recording begins anew, where it is too short to tell its pace.
+/// Pause before the recording starts again, if it is too short to have a frame rate.
 const PAUSE: Duration = Duration::from_millis(40);
 
 /// Plays the recording in `path` as a camera. It shows what was seen then, however the lens moves now.
 ///
 /// # Errors
-/// When there is no recording, it cannot be read, or it has no frames.
+/// If there is no recording, it cannot be read, or it has no frames.
 pub fn open(path: &Path, settings: CameraSettings) -> Result<impl Camera + use<>, RecordingError> {
     let recording = Recording::open(path)?;
     recording.frame(0)?;
@@ -111,7 +111,7 @@ impl Camera for Replay {
     }
 
     fn health(&self) -> CameraHealth {
-        let message = || Arc::from(format!("plays {} frames over and over", self.recording.rows().len()));
+        let message = || Arc::from(format!("repeats the {} frames of the recording", self.recording.rows().len()));
         CameraHealth {
             name: Arc::clone(&self.name),
             simulated: true,

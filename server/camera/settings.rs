@@ -8,12 +8,12 @@ use crate::lens::Optics;
 /// The settings common to all cameras.
 #[derive(Clone)]
 pub struct CameraSettings {
-    /// Frames a second to aim at.
+    /// The frame rate to aim at, frames per second.
     pub fps: f64,
-    /// Seed of everything that a simulation draws.
+    /// Seed of everything that a simulation draws at random.
     pub seed: u64,
     /// The lens's glass, for cameras that simulate looking through it.
     pub optics: Arc<dyn Optics>,
-    /// The clock.
+    /// The clock that stamps frames.
     pub clock: Arc<dyn Clock>,
 }

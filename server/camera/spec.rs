@@ -11,7 +11,7 @@ use crate::recording::CALIBRATION;
 /// of images, `scan:DIR` with a recorded scan, `recording:DIR` with a hyperspectral recording, or `gige:ID`.
 ///
 /// # Errors
-/// [`CameraError::BadSource`] when the camera is unknown, or its source cannot be used.
+/// [`CameraError::BadSource`] if the camera is unknown, or its source cannot be used.
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     match spec.split_once(':') {
         None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
@@ -47,7 +47,7 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
     }
 }
 
-/// The calibration that belongs to the camera that `spec` names, if it brings one: a recording's own.
+/// The calibration that comes with the camera `spec`: a recording's own. `None` for all other cameras.
 #[must_use]
 pub fn own_calibration(spec: &str) -> Option<PathBuf> {
     spec.strip_prefix("recording:").filter(|path| !path.is_empty()).map(|path| Path::new(path).join(CALIBRATION))

@@ -33,7 +33,7 @@ enum Action {
     Role(ChangeRole),
     /// Replace a passphrase, and end all sign-ins of the account. Asks for it, or reads it from standard input.
     Passphrase(Named),
-    /// Let a person sign in no more, and end all sign-ins of the account.
+    /// Stop a person from signing in, and end all sign-ins of the account.
     Disable(Named),
     /// Let a person sign in again.
     Enable(Named),
@@ -48,7 +48,7 @@ struct Add {
     /// What the person may do.
     #[arg(long, value_name = "ROLE", value_parser = role)]
     role: AccountRole,
-    /// The person's name, as signatures have it; the account's name by default.
+    /// The person's name as it appears in signatures; the account's name by default.
     #[arg(long, value_name = "TEXT")]
     display: Option<String>,
 }
@@ -101,7 +101,7 @@ fn role(text: &str) -> Result<AccountRole, String> {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When there is no database, the passphrase is too short, or the rules refuse.
+/// If there is no database, the passphrase is too short, or the account rules refuse the change.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     wait_for(async {
         match &arguments.action {
@@ -183,12 +183,12 @@ async fn finish(accounts: &Accounts, done: &str) -> Result<(), Failure> {
     print(&format!("{done}\nchain {head}\n"))
 }
 
-/// The passphrase: asked for twice on a terminal, else the first line of standard input.
+/// Reads the passphrase: twice from a terminal, otherwise the first line of standard input.
 fn ask() -> Result<Passphrase, Failure> {
     let first = line("passphrase (10 characters or more; 15 are recommended): ")?;
     let passphrase = Passphrase::new(&first)?;
-    if std::io::stdin().is_terminal() && line("the same again: ")? != first {
-        return Err("the two differ; nothing was changed; try again".into());
+    if std::io::stdin().is_terminal() && line("repeat the passphrase: ")? != first {
+        return Err("the two passphrases differ; nothing was changed; try again".into());
     }
     Ok(passphrase)
 }
@@ -198,7 +198,7 @@ fn line(prompt: &str) -> Result<String, Failure> {
     let stdin = std::io::stdin();
     let mut line = String::new();
     if stdin.is_terminal() {
-        // Hidden before it is asked for: whoever types ahead is not shown either.
+        // Hide the input before prompting, so that text typed ahead is not shown either.
         let hidden = Hidden::begin()?;
         tell(format_args!("{prompt}"));
         let read = stdin.lock().read_line(&mut line);
@@ -211,7 +211,7 @@ fn line(prompt: &str) -> Result<String, Failure> {
     Ok(line.trim_end_matches(['\r', '\n']).to_owned())
 }
 
-/// While this lives the terminal does not show what is typed.
+/// Hides what is typed on the terminal, until it is dropped.
 struct Hidden {
     before: Termios,
 }

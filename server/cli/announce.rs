@@ -1,5 +1,5 @@
-//! The announcement that `serve` prints when it is ready: where each role finds its page, a code for
-//! the tablet to scan, and, loudly, what is simulated.
+//! The announcement that `serve` prints when it is ready: each role's link, a QR code for the tablet, and a loud
+//! warning about simulated devices.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use crate::http::keys::{Keys, ROLES};
 use crate::imaging::Calibration;
 use crate::trial::role::Role;
 
-/// The announcement for people of a server that others `reach`. On a `terminal` the code has colours.
+/// The announcement of a server that is reachable at `reach`. On a `terminal` the QR code has colours.
 pub fn announcement(
     reach: &Reach,
     keys: &Keys,
@@ -44,14 +44,14 @@ pub fn announcement(
     }
 
     text.push_str(
-        "A page opens only by its link, and whoever has the link has the role: give each link only to its person.\n",
+        "Each page opens only with its link. Anyone with a link has its role, so give each link only to its person.\n",
     );
 
     let _ = writeln!(text, "{}\nCtrl-C stops the server.", advice(reach));
     text
 }
 
-/// What to know of the connection to the server.
+/// Advice about the connection to the server.
 fn advice(reach: &Reach) -> String {
     let mut advice = Vec::new();
     if reach.loopback_only() {
@@ -67,7 +67,7 @@ fn advice(reach: &Reach) -> String {
     advice.join("\n")
 }
 
-/// The code, black on white whatever the terminal's own colours are.
+/// The QR code, black on white whatever colours the terminal uses.
 fn drawn(code: &QrCode, terminal: bool) -> String {
     let picture = code.render::<Dense1x2>().build();
     if !terminal {

@@ -13,7 +13,7 @@ use crate::store::backup;
 /// Arguments of `parfocal backup`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// File to write: a new one.
+    /// File to write; it must not exist yet.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Folder of the server's database.
@@ -27,7 +27,7 @@ pub struct Arguments {
 /// Writes the backup.
 ///
 /// # Errors
-/// When the file exists or cannot be written, there is no database, or the copy does not verify.
+/// If the file exists or cannot be written, there is no database, or the copy does not verify.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let made = wait_for(backup::backup(&arguments.data_dir, &arguments.out, Arc::new(SystemClock)))??;
     if arguments.json {

@@ -11,7 +11,7 @@ use crate::clock::{Clock, SystemClock};
 use crate::imaging::{Average, Calibration, Reference};
 use crate::lens::{Lens, SimulatedLens};
 
-/// Frames let pass before the first that counts: settings take effect, automatics settle.
+/// Frames skipped before the first that counts, so that settings take effect and automatic controls settle.
 const WARM_UP: u32 = 10;
 /// Longest wait for a frame.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -80,7 +80,7 @@ struct Destination {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When the camera fails, a reference cannot be used, or a file cannot be read or written.
+/// If the camera fails, a reference cannot be used, or a file cannot be read or written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.action {
         Action::Dark(capture) => dark(capture),
@@ -95,7 +95,7 @@ fn dark(capture: &Capture) -> Result<(), Failure> {
 
     let size = (dark.width(), dark.height());
     if calibration.size().is_some_and(|before| before != size) {
-        // The white reference of another size is of no use any more.
+        // A white reference of another size cannot be used per pixel any more; keep its band means.
         calibration.white = Reference::PerBand(calibration.white.band_means());
     }
     calibration.dark = Reference::PerPixel(dark);
@@ -121,7 +121,7 @@ fn refused(which: &str, error: &dyn std::fmt::Display) -> Failure {
     format!("this is not a {which} reference, and nothing was saved: {error}").into()
 }
 
-/// Adds up frames of the camera.
+/// Averages frames of the camera, after the warm-up.
 fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure> {
     calibration::check_scale(calibration)?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
@@ -173,7 +173,7 @@ fn import(arguments: &Import) -> Result<(), Failure> {
 }
 
 impl Destination {
-    /// Keeps `calibration` as the next version, of today.
+    /// Saves `calibration` as the next version, dated today.
     fn save(&self, mut calibration: Calibration, changed: &[&str]) -> Result<(), Failure> {
         let before = calibration.version.parse::<u32>().unwrap_or(0);
         calibration.version = (before + 1).to_string();

@@ -21,10 +21,10 @@ pub struct Arguments {
     /// Folder of the server's database and keys.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
-    /// Ask this lens too, which no server may be using: optotune:auto or optotune:DEVICE.
+    /// Also check this lens: optotune:auto or optotune:DEVICE. No server may be using it.
     #[arg(long, value_name = "SPEC")]
     lens: Option<String>,
-    /// Look at this calibration too: a TOML file, or a folder of `parfocal calibrate`.
+    /// Also check this calibration: a TOML file, or a folder of `parfocal calibrate`.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
     /// Print JSON.
@@ -35,7 +35,7 @@ pub struct Arguments {
 /// Prints every finding on standard output.
 ///
 /// # Errors
-/// When something must be put right before a trial, or standard output cannot be written.
+/// If something must be fixed before a trial, or standard output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let data = &arguments.data_dir;
     let mut findings = machine(data, &SystemClock);
@@ -55,12 +55,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let wrong = findings.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
     match wrong {
         0 => Ok(()),
-        1 => Err("put one thing right before a trial".into()),
-        _ => Err(format!("put {wrong} things right before a trial").into()),
+        1 => Err("fix one thing before a trial".into()),
+        _ => Err(format!("fix {wrong} things before a trial").into()),
     }
 }
 
-/// The calibration at `path`, for a camera of the size of its references.
+/// Checks the calibration at `path` for a camera whose size is that of its references.
 fn calibration_in(path: &Path) -> Finding {
     let today = SystemClock.wall().to_zoned(TimeZone::system()).date();
     match read(path) {
@@ -69,7 +69,7 @@ fn calibration_in(path: &Path) -> Finding {
     }
 }
 
-/// A line a finding, and below it what to do.
+/// One line per finding, with the advice below it.
 fn written(findings: &[Finding]) -> String {
     let width = findings.iter().map(|finding| finding.subject.len()).max().unwrap_or(0);
     let mut text = String::new();

@@ -17,13 +17,13 @@ pub struct Encryption {
     /// data folder at the first start; docs/operations.md says how devices trust it.
     #[arg(long)]
     tls: bool,
-    /// The server's certificate in PEM form, followed by those between it and its authority.
+    /// The server's certificate in PEM form, followed by any intermediate certificates.
     #[arg(long, value_name = "FILE", requires = "tls", requires = "tls_key")]
     tls_certificate: Option<PathBuf>,
     /// The private key of --tls-certificate in PEM form.
     #[arg(long, value_name = "FILE", requires = "tls", requires = "tls_certificate")]
     tls_key: Option<PathBuf>,
-    /// Let other machines connect without encryption: whoever is on the network can read along.
+    /// Let other machines connect without encryption: anyone on the network can read along.
     #[arg(long, conflicts_with = "tls")]
     insecure: bool,
 }
@@ -38,7 +38,8 @@ impl Encryption {
         Err(format!("{problem}; add --tls, or --insecure on a network that you trust").into())
     }
 
-    /// The certificates of a server that listens on `listening`, kept current from now on; none without TLS.
+    /// The certificates of a server that listens on `listening`, or `None` without TLS. Starts the task that keeps them
+    /// current.
     pub fn start(
         &self,
         data_dir: &Path,

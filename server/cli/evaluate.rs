@@ -1,4 +1,4 @@
-//! `parfocal evaluate`: all policies on the same focal-time scans, and the paper's table with ours beside it.
+//! `parfocal evaluate`: runs policies on the same focal-time scans, and shows the paper's table beside ours.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -85,13 +85,13 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Most scans over the phantom at once: each takes 25 MB, and half a minute to make.
+/// Limit on scans over the phantom: each takes 25 MB, and half a minute to make.
 const MOST_PHANTOM: usize = 100;
 
 /// Runs the command.
 ///
 /// # Errors
-/// When scans, footage, policies or shards cannot be used, or results cannot be written.
+/// If scans, footage, policies or shards cannot be used, or results cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.out {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let (report, outcomes) = merge(shards)?;
 
-    // Both in any case: what one cannot take, the other has.
+    // Do both even if one fails, so that the other still has the results.
     let written = arguments
         .out
         .as_ref()
@@ -126,12 +126,12 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> String {
     format!("cannot write the results to {}: {error}", folder.display())
 }
 
-/// What the policies are told of how fast the optic blurs.
+/// The blur rate that the policies are given.
 #[derive(Debug, Clone, Copy)]
 enum Blur {
-    /// This rate.
+    /// The same rate for all scans.
     Rate(BlurRate),
-    /// The rate that is measured on each focal stack.
+    /// The rate measured on each focal stack.
     Measured,
 }
 
@@ -143,7 +143,7 @@ impl FromStr for Blur {
     }
 }
 
-/// The policies asked for, each of which can run, and the registry that builds them.
+/// The requested policies, each of which can run, and the registry that builds them.
 fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
     compute_on_this_thread();
     let mut registry = Registry::standard();
@@ -156,8 +156,8 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
         Some(Blur::Rate(rate)) => registry = registry.knowing(Some(rate)),
         Some(Blur::Measured) if arguments.stacks.is_empty() => {
             return Err(
-                "--blur measured works with --stacks; for other scans give the pixels, which `parfocal scan info` \
-                        tells of a recorded scan"
+                "--blur measured works only with --stacks; for other scans give the pixels; `parfocal scan info` \
+                        shows them for a recorded scan"
                     .into(),
             );
         }
@@ -172,7 +172,7 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     Ok((registry, policies))
 }
 
-/// Runs the policies on the scans asked for, or on the shard of them.
+/// Runs the policies on the requested scans, or on the requested shard of them.
 fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
 
@@ -186,7 +186,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     match warning(blank, set.count()) {
         Ok(None) => {}
         Ok(Some(warning)) => tell(format_args!("note: {warning}")),
-        // The other shards may show something.
+        // The other shards may have detail.
         Err(error) if part == Part::WHOLE => return Err(error.into()),
         Err(error) => tell(format_args!("note: shard {part}: {error}")),
     }
@@ -213,7 +213,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     Ok(Shard::new(part, subject, blank, outcomes?))
 }
 
-/// Writes and prints a shard for `--merge`.
+/// Writes and prints a shard, for `--merge`.
 fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
     let text = serde_json::to_string(shard)? + "\n";
     let mut told = String::new();
@@ -272,7 +272,7 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })
 }
 
-/// The policies asked for, each once.
+/// The requested policies, each once.
 fn policies(asked: &[String], registry: &Registry) -> Vec<PolicyName> {
     let mut policies: Vec<PolicyName> = Vec::new();
     for name in asked.iter().flat_map(|argument| names(argument)) {
@@ -283,7 +283,7 @@ fn policies(asked: &[String], registry: &Registry) -> Vec<PolicyName> {
     policies
 }
 
-/// The names in one argument; a file's path goes on to the argument's end, commas included.
+/// The names in one argument. A file's path extends to the end of the argument, commas included.
 fn names(argument: &str) -> Vec<&str> {
     let argument = argument.trim_start();
     match argument.split_once(',') {

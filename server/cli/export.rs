@@ -40,8 +40,7 @@ pub struct Arguments {
 /// Writes the export.
 ///
 /// # Errors
-/// When there is no such session, it has not been unblinded though the policies are asked for, or the
-/// folder cannot be written.
+/// If there is no such session, the policies are requested before unblinding, or the folder cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     wait_for(write(arguments))?
 }
@@ -68,7 +67,7 @@ async fn write_session(recorder: &Recorder, session: SessionId, arguments: &Argu
     print(&format!("{} files ({kind}{practice}) in {folder}\nchain {}\n", summary.files.len(), summary.head))
 }
 
-/// Exports all of `study`, and tells how far it has come.
+/// Exports all of `study`, and shows the progress.
 async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) -> Result<(), Failure> {
     let steps = Arc::new(Steps::new());
     let told = {
@@ -84,7 +83,7 @@ async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) ->
     tell(&exported?, arguments.json)
 }
 
-/// Writes the package of `sources`, and tells how far it has come and what it holds.
+/// Writes the package of `sources`, shows the progress, and prints what the package holds.
 pub fn join(sources: &[Source], left_out: &[LeftOut], out: &Path, json: bool) -> Result<(), Failure> {
     let steps = Steps::new();
     let joined = package::write(sources, Sessions::Copied, left_out, out, &mut |done, all| {
@@ -94,7 +93,7 @@ pub fn join(sources: &[Source], left_out: &[LeftOut], out: &Path, json: bool) ->
     tell(&joined?, json)
 }
 
-/// Tells what a package holds.
+/// Prints what a package holds.
 fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
     if json {
         return print(&(serde_json::to_string(summary)? + "\n"));

@@ -1,5 +1,5 @@
-//! Signals that end a command. Ctrl-C for those that save what they have: the first asks them to stop, the second ends
-//! the process at once. Whatever ends it, every lens is let go first.
+//! Signals that end a command. For commands that save their work, the first Ctrl-C asks them to stop, and the second
+//! ends the process at once. Every lens is released before the process ends.
 
 use std::io;
 use std::sync::Arc;
@@ -11,26 +11,26 @@ use tokio::signal::unix::{SignalKind, signal};
 use crate::lens;
 use crate::notices::tell;
 
-/// Ends the process as `signal` does where nobody listens, once every lens is let go. (An exit would take libtorch down
-/// while another thread computes with it.)
+/// Releases every lens, then ends the process as `signal` does by default. (A normal exit would destroy libtorch while
+/// another thread computes with it.)
 fn end_by(signal: i32) {
     lens::let_go_of_all();
     let _ = signal_hook::low_level::emulate_default_handler(signal);
 }
 
-/// From now on lenses are let go before Ctrl-C, an order to end, or the end of the terminal ends the process. For
-/// commands that need not be asked to stop.
+/// Makes SIGINT (Ctrl-C), SIGTERM, SIGHUP (the terminal closes) and SIGQUIT release all lenses before they end the
+/// process. For commands that have nothing to save.
 ///
 /// # Errors
-/// When the system has no thread or signal handler left.
+/// If the system cannot provide a thread or a signal handler.
 pub fn let_lenses_go_first() -> io::Result<()> {
     listen(&[SIGINT, SIGTERM, SIGHUP, SIGQUIT])
 }
 
-/// The same for commands whose Ctrl-C an [`Interrupt`] listens to.
+/// The same without SIGINT, for commands that handle Ctrl-C with an [`Interrupt`].
 ///
 /// # Errors
-/// When the system has no thread or signal handler left.
+/// If the system cannot provide a thread or a signal handler.
 pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
     listen(&[SIGTERM, SIGHUP, SIGQUIT])
 }
@@ -53,7 +53,7 @@ fn listen(ending: &[i32]) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether Ctrl-C was pressed, and whether anything is left to save then.
+/// Whether Ctrl-C was pressed, and whether everything is saved.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
@@ -61,10 +61,10 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Begins to listen. The first Ctrl-C says `notice`.
+    /// Starts to listen. The first Ctrl-C prints `notice`.
     ///
     /// # Errors
-    /// When the system has no thread or signal handler left.
+    /// If the system cannot provide a thread or a signal handler.
     pub fn listen(notice: String) -> io::Result<Self> {
         let interrupt = Self::default();
         let heard = interrupt.clone();
@@ -84,13 +84,13 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Whether to stop.
+    /// Whether Ctrl-C was pressed, so that the command should stop.
     #[must_use]
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// From now on Ctrl-C ends the process at once: all there is to save is saved.
+    /// From now on Ctrl-C ends the process at once, because everything is saved.
     pub fn all_is_saved(&self) {
         self.saved.store(true, Ordering::Relaxed);
     }

@@ -6,7 +6,7 @@ use super::output::Failure;
 use crate::autofocus::Registry;
 use crate::conductor::Library;
 
-/// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
+/// The shipped protocols and those of `folder`; without `folder`, those of `trial-protocols` if it exists.
 pub fn protocols(folder: Option<&Path>, registry: &Registry) -> Result<Library, Failure> {
     let beside = Path::new("trial-protocols");
 

@@ -1,4 +1,4 @@
-//! The command line: one file a command; wires the rooms together.
+//! The command line: one file per command; wires the rooms together.
 
 mod account;
 mod announce;
@@ -47,7 +47,7 @@ enum Command {
     Backup(backup::Arguments),
     /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
     Calibrate(calibrate::Arguments),
-    /// Look whether this machine is ready for a trial, and say what to do where it is not.
+    /// Check whether this machine is ready for a trial, and say what to do if it is not.
     Doctor(doctor::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
@@ -59,7 +59,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
-    /// Put a backup in the place of the database, and keep what was there.
+    /// Replace the database by a backup, and keep the old one.
     Restore(restore::Arguments),
     /// Record hyperspectral video, and get cubes, video and pictures out of it.
     Recording(recording::Arguments),
@@ -81,7 +81,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = run(arguments.command);
-    // A thread that hangs may still hold one.
+    // A thread that hangs may still hold a lens.
     crate::lens::let_go_of_all();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

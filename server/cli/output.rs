@@ -10,7 +10,7 @@ use crate::notices;
 /// A command's failure: one clear sentence that says what to do.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Writes what a command was asked for on standard output.
+/// Writes a command's result to standard output.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout();
     out.write_all(text.as_bytes())
@@ -18,30 +18,30 @@ pub fn print(text: &str) -> Result<(), Failure> {
         .map_err(|error| format!("cannot write to standard output: {error}").into())
 }
 
-/// A bar over `total` poses, `done` of which are done.
+/// A progress bar over `total` poses that starts at `done`.
 pub fn bar(total: usize, done: usize) -> ProgressBar {
     let bar = steps(total, "poses").with_position(done as u64);
     bar.reset_eta();
     bar
 }
 
-/// A bar over `total` of what `name` calls them.
+/// A progress bar over `total` items; `name` says what they are, in the plural.
 pub fn steps(total: usize, name: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     let style = ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {name}, {{eta}} left {{msg}}"));
     style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
 }
 
-/// How far work of several parts has come, on standard error: a bar on a terminal, elsewhere a line for each tenth of
-/// a part. May be told from several threads.
+/// Progress of work that has several parts, on standard error: a bar on a terminal, otherwise one line per tenth of a
+/// part. May be called from several threads.
 pub struct Steps {
     bar: Option<ProgressBar>,
-    /// The part told last, and how many tenths of it.
+    /// The part reported last, and how many tenths of it are done.
     last: Mutex<(&'static str, usize)>,
 }
 
 impl Steps {
-    /// Nothing told yet.
+    /// Nothing reported yet.
     pub fn new() -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(0);
@@ -51,7 +51,7 @@ impl Steps {
         Self { bar, last: Mutex::new(("", 0)) }
     }
 
-    /// Tells that `done` of `all` are done, of what `part` calls them.
+    /// Reports that `done` of `all` items are done; `part` says what the items are.
     pub fn tell(&self, part: &'static str, done: usize, all: usize) {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let tenths = done * 10 / all.max(1);
@@ -70,7 +70,7 @@ impl Steps {
         *last = (part, tenths);
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn end(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -78,7 +78,7 @@ impl Steps {
     }
 }
 
-/// `count` poses, in words.
+/// `count` poses in words.
 pub fn poses(count: usize) -> String {
     format!("{count} {}", if count == 1 { "pose" } else { "poses" })
 }

@@ -14,7 +14,7 @@ pub struct Arguments {
 /// Prints every policy on standard output.
 ///
 /// # Errors
-/// When standard output cannot be written.
+/// If standard output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let entries = Registry::standard().entries();
     let text = if arguments.json { serde_json::to_string_pretty(&entries)? + "\n" } else { table(&entries) };

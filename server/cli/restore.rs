@@ -1,4 +1,4 @@
-//! `parfocal restore`: puts a backup in the place of the database, and keeps what was there.
+//! `parfocal restore`: replaces the database by a backup, and keeps the old one.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub struct Arguments {
 /// Restores the backup.
 ///
 /// # Errors
-/// When a server runs on the folder, or the backup does not verify; then nothing was changed.
+/// If a server runs on the folder, or the backup does not verify; nothing is changed then.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let restored = wait_for(backup::restore(&arguments.data_dir, &arguments.file, Arc::new(SystemClock)))??;
     if arguments.json {
@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let file = arguments.file.display();
     let kept = restored.kept.as_ref();
-    let kept = kept.map_or_else(String::new, |kept| format!("what was there is kept as {}\n", kept.display()));
+    let kept = kept.map_or_else(String::new, |kept| format!("the old database is kept as {}\n", kept.display()));
     let relation = in_words(&restored);
     print(&format!("restored {file}, verified\nchain {}\n{kept}{relation}", restored.backup))
 }
@@ -44,13 +44,13 @@ fn in_words(restored: &Restored) -> String {
     let replaced = restored.replaced.as_deref().unwrap_or("unknown");
     match restored.relation {
         Relation::Nothing => String::new(),
-        Relation::Same => "the backup has all that was there\n".to_owned(),
-        Relation::Later => format!("the backup goes on where what was there ended ({replaced})\n"),
+        Relation::Same => "the backup contains everything that the old database had\n".to_owned(),
+        Relation::Later => format!("the backup continues where the old database ended ({replaced})\n"),
         Relation::Earlier { rows } => {
-            format!("WARNING: what was there ({replaced}) went on for {rows} rows that the backup does not have\n")
+            format!("WARNING: the old database ({replaced}) had {rows} more rows, which the backup does not have\n")
         }
         Relation::Apart { row } => format!(
-            "WARNING: the backup is not of the same history as what was there ({replaced}): they part at row {row}\n"
+            "WARNING: the backup and the old database ({replaced}) have different histories from row {row} on\n"
         ),
     }
 }

@@ -1,4 +1,4 @@
-//! `parfocal serve`: wires camera, lens, loop, trial and pages together and serves them.
+//! `parfocal serve`: wires camera, lens, control loop, trial and pages together and serves the pages.
 
 use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
@@ -85,10 +85,10 @@ pub struct Arguments {
     lens_dynamics: Option<PathBuf>,
 }
 
-/// Telemetry that may wait for the disk: a quarter of a minute at 50 frames a second.
+/// Telemetry records that may wait for the disk: 15 s at 50 frames per second.
 const TELEMETRY_CAPACITY: usize = 750;
 
-/// What `--help` says at its end.
+/// The text at the end of `--help`.
 pub const REAL_TIME: &str = "\
 Real-time priority:
   Where the system allows it, the threads from camera to lens run before all other programs and their memory is locked,
@@ -99,22 +99,22 @@ Real-time priority:
   A systemd service needs LimitRTPRIO=40 and LimitMEMLOCK=infinity, a container the capabilities SYS_NICE and
   IPC_LOCK.";
 
-/// Open connections get this long to end by themselves, and then the disk as long to take what is left.
+/// Time for open connections to end by themselves. The disk then gets as long again to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
 
-/// The disk gets this long to take the rest of a recording.
+/// Time for the disk to take the rest of a recording.
 const RECORDING: Duration = Duration::from_secs(3);
 
-/// Lens and camera get this long to be put to rest.
+/// Time for lens and camera to stop.
 const DEVICES: Duration = Duration::from_secs(5);
 
-/// Serves until Ctrl-C, SIGTERM or the end of its terminal.
+/// Serves until Ctrl-C, SIGTERM or the end of the terminal.
 ///
 /// # Errors
-/// When the address is taken, or a folder, camera or lens cannot be used.
+/// If the address is taken, or a folder, camera or lens cannot be used.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    // Through a queue: a held terminal, or a pipe that nobody reads, must not hold the control loop when it
-    // logs a line. What does not fit is left out.
+    // Log through a queue: a paused terminal, or a pipe that nobody reads, must not block the control loop when it logs
+    // a line. Lines that do not fit are dropped.
     let (writer, flush) = tracing_appender::non_blocking(std::io::stderr());
     tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| "info,sqlx=warn".into()))
@@ -122,7 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .with_writer(writer)
         .init();
 
-    // Whatever the server makes holds trial data: nobody else's to read.
+    // Everything that the server writes is trial data, so only this user may read it.
     rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     control::keep_policies_quiet();
 
@@ -144,7 +144,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     arguments.encryption.check(arguments.bind)?;
 
-    // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
+    // Bind first: if that fails, the rest need not be set up. Early visitors wait in the listener's queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
 
@@ -164,7 +164,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut rig = rig(arguments, &clock, developer.reconstructor().clone(), registry.clone(), seeded.random())?;
     let mosaics = rig.camera.mosaic_size();
     calibration::check_camera(&calibration, mosaics)?;
-    // Before the loop has the lens: it is not asked again.
+    // Ask before the control loop takes the lens; nobody asks it again.
     let lens_info = described(rig.lens.as_mut());
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
@@ -175,7 +175,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     tokio::spawn(device_log::record(store.clone(), Arc::clone(&clock), control.status.clone()));
 
-    // A colour picture has one size.
+    // A colour picture has only one size.
     let largest = if mosaics.is_some() { Size::Full } else { Size::Cell };
     let (live, imaging) = live::start(control.clone(), &developer, largest, &clock)?;
 
@@ -241,13 +241,13 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let announcement =
         announcement(&reach, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
 
-    // The server serves whether or not anyone reads this.
+    // The server serves whether or not anyone reads the announcement.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
 
     signals.any().await;
     tracing::info!("ending");
 
-    // At once, for viewers may take their time to leave.
+    // Hold the lens at once, because viewers may take their time to leave.
     control.send(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     let _ = end.send(true);
     let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
@@ -261,12 +261,12 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What `lens` says of itself, if it does.
+/// The lens's description of itself, if it gives one.
 fn described(lens: &mut dyn Lens) -> Option<LensInfo> {
     lens.info().inspect_err(|error| tracing::warn!(%error, "the lens did not describe itself")).ok()
 }
 
-/// Ends what is recorded, and then puts camera and lens to rest.
+/// Ends the recording, then stops camera and lens.
 async fn end_recording_and_devices(
     recordings: &Recordings,
     control_loop: ControlLoop,
@@ -282,7 +282,7 @@ async fn end_recording_and_devices(
     }
 }
 
-/// Waits until the disk has what is still to be written, and closes the database.
+/// Waits until the disk has everything that remains to be written, and closes the database.
 async fn store_the_rest(store: &Store, conductor: &Conductor, telemetry: JoinHandle<()>) {
     let _ = tokio::join!(telemetry, conductor.record_the_rest());
     if let Ok(head) = store.reader().head().await {
@@ -291,7 +291,7 @@ async fn store_the_rest(store: &Store, conductor: &Conductor, telemetry: JoinHan
     store.close().await;
 }
 
-/// Keeps a thread at real-time priority that never pauses from freezing the machine.
+/// Prevents a thread at real-time priority that never pauses from freezing the machine.
 fn bound_real_time() -> std::io::Result<()> {
     let mut overrun = signal(SignalKind::from_raw(priority::OVERRUN))?;
     priority::bound_runs();
@@ -305,13 +305,13 @@ fn bound_real_time() -> std::io::Result<()> {
     Ok(())
 }
 
-/// The calibration asked for, else the camera's own, else that of a typical unit.
+/// The calibration given on the command line, else the camera's own, else that of a typical unit.
 fn calibration_of(arguments: &Arguments) -> Result<Calibration, Failure> {
     let own = camera::own_calibration(&arguments.camera);
     Ok(calibration::read_or_default(arguments.calibration.as_deref().or(own.as_deref()))?)
 }
 
-/// The policies that ship and those from files, each tried once.
+/// The policies that ship and those from files. Each policy from a file is built once, to check it.
 fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
     let mut registry = Registry::standard().knowing(arguments.blur);
     if let Some(folder) = &arguments.weights {
@@ -345,7 +345,7 @@ async fn open_store(
     Ok(Store::open(&arguments.data_dir, &run).await?)
 }
 
-/// A random source that may be predictable: nothing of a real session is drawn from it.
+/// A random source that may be predictable; real sessions draw nothing from it.
 fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
     Ok(match arguments.seed {
         Some(seed) => ChaCha12Rng::seed_from_u64(seed),
@@ -369,7 +369,7 @@ fn rig(
     Ok(Rig { camera, lens, reconstructor, registry, clock })
 }
 
-/// The dynamics in the file `path`, which must have been measured on this very lens.
+/// Reads lens dynamics from the file `path`; they must have been measured on this lens.
 fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
     let named = |problem: String| format!("lens dynamics {}: {problem}", path.display());
     let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
@@ -395,8 +395,8 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     }
 }
 
-/// The signals that end the server: Ctrl-C or Ctrl-\, a service manager's stop, the end of the terminal. Made before
-/// anything is announced, so that no signal is missed.
+/// The signals that end the server: Ctrl-C, Ctrl-\, a service manager's stop, and the end of the terminal. Registered
+/// before anything is announced, so that no signal is missed.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,

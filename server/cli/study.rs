@@ -1,5 +1,5 @@
-//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, analyses
-//! it, and joins what its sites exported.
+//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows its state, analyses it, and
+//! joins the exports of its sites.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -32,15 +32,15 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Plan a study by a definition; docs/study.md explains its keys.
+    /// Plan a study from a definition; docs/study.md explains its keys.
     New(New),
-    /// Let sessions be made. The first time, draw the orders and print the commitment to them.
+    /// Allow new sessions. The first time, draw the orders and print the commitment to them.
     Open(Move),
-    /// Let no more sessions be made.
+    /// Allow no more new sessions.
     Close(Move),
-    /// Lock a closed study: nothing of it can be changed any more.
+    /// Lock a closed study, so that it cannot be changed any more.
     Lock(Lock),
-    /// Print where a study stands, also while a server runs; without a name, all studies.
+    /// Print the state of a study, also while a server runs; without a name, of all studies.
     Show(Show),
     /// Join the exports of several sites into one package, after verifying each.
     Merge(Merge),
@@ -74,7 +74,7 @@ struct Move {
 struct Lock {
     /// Name of the study.
     study: String,
-    /// Lock it though a surgeon's device may still hold something, which would then not count.
+    /// Lock it even if a surgeon's device may still hold unsent data, which would then not count.
     #[arg(long)]
     despite_outstanding: bool,
     #[command(flatten)]
@@ -83,10 +83,10 @@ struct Lock {
 
 #[derive(Debug, Args)]
 struct Signed {
-    /// Who does it: kept with the change.
+    /// Person who makes the change; recorded with it.
     #[arg(long, value_name = "PERSON")]
     by: String,
-    /// Why: kept with the change.
+    /// Reason for the change; recorded with it.
     #[arg(long, value_name = "TEXT")]
     reason: String,
     /// Folder of the server's database. No server may run on it.
@@ -108,7 +108,7 @@ struct Show {
 
 #[derive(Debug, Args)]
 struct Merge {
-    /// What each site exported: folders written by `parfocal export --study`, or exports of single sessions.
+    /// The sites' exports: folders written by `parfocal export --study`, or exports of single sessions.
     #[arg(required = true, value_name = "DIR")]
     sites: Vec<PathBuf>,
     /// Folder to write: new or empty.
@@ -122,7 +122,7 @@ struct Merge {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When there is no database, a server has it open, or the study's rules refuse.
+/// If there is no database, a server has it open, or the study's rules refuse the change.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     wait_for(async {
         match &arguments.action {
@@ -176,7 +176,7 @@ impl Signed {
     }
 }
 
-/// Prints where `study` stands after a change, with the chain's head.
+/// Prints the state of `study` after a change, and the chain's head.
 async fn tell(studies: &Studies, study: &str) -> Result<(), Failure> {
     let detail = studies.detail(study).await?;
     let head = studies.reader().head().await?;
@@ -212,7 +212,7 @@ async fn show(show: &Show) -> Result<(), Failure> {
     }
 }
 
-/// Joins what the sites exported.
+/// Joins the sites' exports.
 fn merge(merge: &Merge) -> Result<(), Failure> {
     let mut sources = Vec::new();
     let mut left_out = Vec::new();
@@ -226,7 +226,7 @@ fn merge(merge: &Merge) -> Result<(), Failure> {
     join(&sources, &left_out, &merge.out, merge.json)
 }
 
-/// A few lines on a study.
+/// A study in a few lines.
 fn in_short(detail: &StudyDetail) -> String {
     let line = &detail.line;
     let mut text = format!(
@@ -243,7 +243,7 @@ fn in_short(detail: &StudyDetail) -> String {
     text
 }
 
-/// All of a study but its orders.
+/// Everything about a study except its orders.
 fn whole(detail: &StudyDetail) -> String {
     let mut text = in_short(detail);
     let _ = writeln!(text, "definition {}", detail.definition_sha256);

@@ -28,7 +28,7 @@ pub struct Arguments {
 /// Analyses the study.
 ///
 /// # Errors
-/// When there is no such study, it is not unblinded, or the folder cannot be written.
+/// If there is no such study, it is not unblinded, or the folder cannot be written.
 pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
     let reader = Reader::open(&arguments.data_dir).await?;
     let analysis = analyse(&reader, &arguments.study).await?;
@@ -89,7 +89,7 @@ fn write_outcome(text: &mut String, compared: &Comparison) {
     }
 
     if compared.left_out > 0 {
-        let _ = writeln!(text, "  surgeons left out of the tests, a value missing: {}", compared.left_out);
+        let _ = writeln!(text, "  surgeons left out of the tests because a value is missing: {}", compared.left_out);
     }
     let pairs = compared.pairs.iter().map(|pair| &pair.said);
     let said = std::iter::once(&compared.difference.said).chain(pairs);

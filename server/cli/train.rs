@@ -1,4 +1,4 @@
-//! `parfocal train`: makes a learned policy from nothing, on this machine.
+//! `parfocal train`: trains a learned policy on this machine, or compares trainings.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ enum Compute {
     Cuda,
 }
 
-/// What to train, and where to.
+/// What to train, and where to write it.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -42,10 +42,10 @@ pub struct Arguments {
 #[derive(Debug, clap::Args)]
 #[group(id = "Training")]
 struct Training {
-    /// Recipe: `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`. The first three have one
-    /// by the paper, too, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined`,
-    /// `parfocal-relief` and `parfocal-adapted` (to a bench, with `--scans`) are later stages: give
-    /// them the weights of the stage before by `--from`.
+    /// Recipe: `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`. Each of the first three also has a recipe
+    /// that follows the paper, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined`, `parfocal-relief`
+    /// and `parfocal-adapted` (to a bench, with `--scans`) are later stages: give them the weights of the stage before
+    /// with `--from`.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
@@ -83,7 +83,7 @@ struct Training {
 /// Runs the command.
 ///
 /// # Errors
-/// When recipe, footage, folder or checkpoint are unusable.
+/// If the recipe, footage, folder or checkpoint is unusable.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.training {
         Some(training) => train(training),
@@ -122,8 +122,8 @@ fn train(arguments: &Training) -> Result<(), Failure> {
         bar.set_message(message);
     };
 
-    // On one of the threads that share the work: it need not wait for another to wake up whenever there is
-    // some to share.
+    // Run on one of the threads that share the work, so that it need not wait for another to wake up whenever there is
+    // work to share.
     let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| compute_on_this_thread()).build()?;
     let whole = threads.install(|| run.go(&SystemClock, &|| interrupt.asked(), &mut tell_progress))?;
 

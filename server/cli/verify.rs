@@ -1,4 +1,4 @@
-//! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged and true to its
+//! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged, and matches its
 //! commitments.
 
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ pub struct Arguments {
 /// Prints a verdict for each check.
 ///
 /// # Errors
-/// When one failed.
+/// If a check failed.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.path;
     if !path.exists() {

@@ -1,11 +1,11 @@
-//! How a command waits for what takes its time, such as a database.
+//! Waits for a command's asynchronous work, such as a database query.
 
 use std::io;
 
-/// Runs `work` to its end, on this thread.
+/// Runs `work` to its end on this thread.
 ///
 /// # Errors
-/// When the system refuses what waiting needs, such as one more open file.
+/// If the system refuses a resource that waiting needs, such as one more open file.
 pub fn wait_for<T>(work: impl Future<Output = T>) -> io::Result<T> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     Ok(runtime.block_on(work))

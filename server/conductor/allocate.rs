@@ -1,4 +1,4 @@
-//! Making a session: who, by which protocol, and the order drawn for it.
+//! Makes a session: checks the participant, finds the protocol, and draws the session's order.
 
 use rand::Rng;
 use rand_chacha::ChaCha12Rng;
@@ -19,14 +19,14 @@ use crate::trial::study::lists::List;
 use crate::trial::study::places::next_place;
 use crate::trial::study::refusal::StudyRefusal;
 
-/// What a new session gets.
+/// The protocol and the place in an order that a new session gets.
 struct Drawn {
     protocol: Protocol,
-    /// The seed of its set.
+    /// The seed of the session's set.
     seed: Seed,
-    /// Its index in the set.
+    /// The session's index in the set.
     index: usize,
-    /// Its place in a study, if it is made in one.
+    /// The session's place in a study; `None` outside studies.
     enrolment: Option<Enrolment>,
 }
 
@@ -67,7 +67,7 @@ impl Shared {
         Ok(session)
     }
 
-    /// An order for a session outside any study, by the protocol that is installed.
+    /// An order for a session outside any study, by the installed protocol.
     async fn draw_outside(&self, protocol: &str, pen: &mut Pen) -> Result<Drawn, ConductError> {
         let protocol = self.library.get(protocol).cloned().ok_or_else(|| {
             let name: String = protocol.chars().take(40).collect();
@@ -134,8 +134,8 @@ impl Shared {
         Ok(())
     }
 
-    /// The seed, and the place in the set that shares it: the first free place of a set that is
-    /// still open, or a fresh seed.
+    /// A seed, and a place in the set of sessions that share it: the first free place of the latest set if that is
+    /// still open, otherwise place 0 of a new seed.
     async fn draw_place(&self, protocol: &Protocol, random: &mut ChaCha12Rng) -> Result<(Seed, usize), ConductError> {
         let algorithm = protocol.order.algorithm();
         let size = algorithm.set_size(protocol.policies.len());

@@ -1,4 +1,4 @@
-//! What stands beside a session, as researchers read it: consents, corrections, erasures, a withdrawal.
+//! Records kept beside a session, as researchers read them: consents, corrections, erasures, a withdrawal.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -17,32 +17,32 @@ use crate::trial::question::Question;
 use crate::trial::role::Role;
 use crate::trial::view::LogLine;
 
-/// A correction for reading.
+/// A correction, as it is shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct CorrectionLine {
     /// Order of the record in the database.
     pub number: i64,
-    /// When, by the server's wall clock.
+    /// When it was recorded, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Who.
+    /// Who recorded it.
     pub by: Role,
-    /// What was corrected, in words.
+    /// The corrected record, in words.
     pub about: String,
-    /// What of it.
+    /// The corrected part of the record.
     pub field: Field,
-    /// What stood there so far, in words.
+    /// The value before the correction, in words.
     pub old: String,
-    /// What is right, in words.
+    /// The corrected value, in words.
     pub new: String,
-    /// Why.
+    /// Reason for the correction.
     pub reason: String,
-    /// When its words were erased, by the server's wall clock.
+    /// When its words were erased, by the server's wall clock; none if they were not.
     #[schema(value_type = Option<String>)]
     pub erased: Option<Timestamp>,
 }
 
-/// A consent for reading.
+/// A consent, as it is shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct ConsentLine {
     /// When it was recorded, by the server's wall clock.
@@ -53,25 +53,25 @@ pub struct ConsentLine {
     pub consent: Consent,
 }
 
-/// A withdrawal for reading.
+/// A withdrawal, as it is shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct WithdrawalLine {
-    /// When, by the server's wall clock.
+    /// When it was recorded, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
     /// Who recorded it.
     pub by: Role,
-    /// The personal account of whoever recorded it, where somebody was signed in.
+    /// The personal account of the person who recorded it, if signed in.
     pub account: Option<String>,
-    /// Why.
+    /// Reason for the withdrawal.
     pub reason: String,
-    /// Comments, answers in words and notes that still stand in the database: nobody has erased them.
+    /// Number of comments, answers in words and notes that nobody has erased from the database yet.
     pub words_left: usize,
 }
 
 impl Conductor {
-    /// What was recorded beside the session: consents, corrections, erasures. Each with its time by the server's clocks
-    /// over its restarts.
+    /// The log lines of consents, corrections and erasures. Each comes with its time by the server's clocks over its
+    /// restarts.
     pub(super) async fn beside(&self, session: SessionId) -> Result<Vec<(Timestamp, LogLine)>, ConductError> {
         let reader = self.shared.store.reader();
         let clocks = &self.shared.run_clock.clocks;
@@ -165,7 +165,7 @@ impl Conductor {
         Ok(corrections.into_iter().map(line).collect())
     }
 
-    /// That the participant withdrew, if so.
+    /// The participant's withdrawal, if there is one.
     pub(super) async fn withdrawal(&self, course: &Course) -> Result<Option<WithdrawalLine>, ConductError> {
         let of_withdrawal = |event: &Event| match &event.kind {
             EventKind::Withdrawn { reason } => Some((event.clone(), reason.clone())),
@@ -187,7 +187,7 @@ fn question_of<'a>(course: &'a Course, answer: &Answer) -> Option<&'a Question> 
     course.protocol.question(&answer.question, answer.segment.is_some())
 }
 
-/// What a correction is about, in words.
+/// The corrected record, in words.
 fn about(subject: Subject, setting: Option<usize>, question: Option<&Question>) -> String {
     let on = setting.map_or_else(String::new, |setting| format!(" on setting {setting}"));
     match (subject, question) {

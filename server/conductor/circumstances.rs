@@ -1,4 +1,4 @@
-//! What the rule of unblinding asks for, gathered from the database.
+//! Gathers from the database what the rules of unblinding need to know.
 
 use super::course::Course;
 use super::{ConductError, Pen, Shared};
@@ -10,7 +10,7 @@ use crate::trial::study::signature::Signature;
 use crate::trial::study::stage::Stage;
 use crate::trial::unblinding::{BlindedStudy, Circumstances};
 
-/// What of a session is needed to look up the circumstances of an action on it.
+/// The parts of a session that are needed to look up the circumstances of an action on it.
 #[derive(Clone, Copy)]
 pub(super) struct Subject {
     session: SessionId,
@@ -25,8 +25,8 @@ impl Subject {
 }
 
 impl Shared {
-    /// The circumstances that bear on `action`. Only unblinding asks for any. `signature`: of whoever does it, where
-    /// they signed for an emergency.
+    /// The circumstances that the rules need for `action`; only unblinding needs any. `signature` is given for an
+    /// emergency unblinding.
     pub(super) async fn circumstances(
         &self,
         pen: &mut Pen,
@@ -38,8 +38,7 @@ impl Shared {
             return Ok(Circumstances::default());
         }
 
-        // The database has to know whether the session in memory has ended: it may be of the same
-        // set.
+        // The database must know whether the session in memory has ended, because it may belong to the same set.
         self.record_stops(pen).await?;
         let set = self.store.reader().balanced_set(subject.seed).await?;
         let outstanding = self.outstanding(subject.session, subject.grace).await?;
@@ -47,7 +46,7 @@ impl Shared {
         Ok(Circumstances { set: Some(set), outstanding, study })
     }
 
-    /// The study of `session`, if it belongs to one that is not unblinded.
+    /// The study of `session`, if it belongs to one that is still blinded.
     async fn blinded_study(&self, session: SessionId, signed: bool) -> Result<Option<BlindedStudy>, ConductError> {
         let reader = self.store.reader();
         let Some(enrolment) = reader.enrolment(session).await? else { return Ok(None) };
@@ -60,8 +59,7 @@ impl Shared {
         Ok(Some(BlindedStudy { name: study.definition.name, policies, signed }))
     }
 
-    /// What may still come in for `session`, whose grace is `grace`, and would not count after
-    /// unblinding.
+    /// What may still arrive for `session`, which has the grace period `grace`, and would not count after unblinding.
     pub(super) async fn outstanding(
         &self,
         session: SessionId,

@@ -7,10 +7,11 @@ use crate::trial::account::Actor;
 use crate::trial::consent::{self, NewConsent};
 
 impl Conductor {
-    /// Records a participant's consent. When this returns, it is on disk. The same consent again changes nothing.
+    /// Records a participant's consent. It is on disk when this returns. Recording the same consent again changes
+    /// nothing.
     ///
     /// # Errors
-    /// When `by` is not the operator, there is no such session, the consent makes no sense, or the disk failed.
+    /// If `by` is not the operator, there is no such session, the consent is invalid, or the disk failed.
     pub async fn record_consent(&self, by: impl Into<Actor>, new: NewConsent) -> Result<(), ConductError> {
         let by = by.into();
         self.to_the_end(move |shared| async move { shared.record_consent(by, new).await }).await

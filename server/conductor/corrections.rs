@@ -1,4 +1,4 @@
-//! Corrections: decided by the trial's rules against what stands on the disk, and recorded beside it.
+//! Corrections: the trial's rules decide on them against what is on disk, and they are recorded beside the original.
 
 use super::course::Course;
 use super::{ConductError, Conductor, Shared};
@@ -10,7 +10,7 @@ use crate::trial::permission;
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
 
-/// What is corrected, and how, as it is kept.
+/// A correction that was decided on, as it is stored.
 struct Decided {
     subject: Subject,
     record: String,
@@ -20,11 +20,11 @@ struct Decided {
 }
 
 impl Conductor {
-    /// Corrects something of session `session`. When this returns, the correction is on disk; the original stays.
+    /// Corrects a record of session `session`. The correction is on disk when this returns; the original stays.
     ///
     /// # Errors
-    /// When `by` is not the researcher, the session is under way or withdrawn, the correction makes no sense or was
-    /// made meanwhile, or the disk failed.
+    /// If `by` is not the researcher, the session is under way or withdrawn, the correction is invalid or was made in
+    /// the meantime, or the disk failed.
     pub async fn correct(
         &self,
         by: impl Into<Actor>,
@@ -41,7 +41,7 @@ impl Shared {
         let _pen = self.pen.lock().await;
         let course = self.load(session).await?;
         let reason = correction::check(by.role, course.state.ended(), &new.reason)?;
-        // Whose session it was is put right all the same: it says who has withdrawn.
+        // The participant can be corrected even after a withdrawal, because it says who has withdrawn.
         if !matches!(new.change, FieldChange::Participant { .. }) {
             permission::check_reading(course.state.withdrawn())?;
         }

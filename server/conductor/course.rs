@@ -1,5 +1,5 @@
-//! A session in memory: how it was made, where it stands, what was said, what of it is not on disk
-//! yet, and what it asks of the control loop.
+//! A session in memory: how it was made, its state, the comments on it, which events are not on disk yet, and what it
+//! requires of the control loop.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,47 +26,47 @@ use crate::trial::session::{Plan, SessionState, decide, decide_time};
 use crate::trial::unblinding::Circumstances;
 use crate::trial::view::CommentLine;
 
-/// Comments and log lines that the operator sees.
+/// Number of comments and log lines that the operator sees.
 pub(super) const LATEST: usize = 30;
 
 /// A session in memory.
 pub(super) struct Course {
     pub made: NewSession,
     pub protocol: Protocol,
-    /// Where it stands, with what stopped it since the disk last took something.
+    /// The session's state, including the stops that are not on disk yet.
     pub state: SessionState,
-    /// Whether what is said still counts.
+    /// Whether comments and answers that arrive still count.
     pub grace: Grace,
-    /// The study that it belongs to; none outside any study.
+    /// The session's study; `None` outside studies.
     pub study: Option<String>,
-    /// When its study was locked, if it belongs to one that was.
+    /// When its study was locked; `None` if it was not, or outside studies.
     study_locked: Option<Timestamp>,
-    /// All its events, those that are not on the disk yet last.
+    /// All its events. Those that are not on disk yet come last.
     pub events: Vec<Event>,
-    /// When each of them happened, by the server's clocks over its restarts.
+    /// When each event happened, by the server's clocks over its restarts.
     times: Vec<Timestamp>,
     clock: RunClock,
-    /// What the participant consented to, if that is recorded.
+    /// The participant's consent, if recorded.
     pub consent: Option<Consent>,
-    /// Comments in all.
+    /// Number of all comments.
     pub comments: usize,
     /// The latest comments, newest last.
     pub latest_comments: Vec<CommentLine>,
     /// Whether the operator has closed it.
     pub dismissed: bool,
-    /// How many events are on the disk.
+    /// Number of events that are on disk.
     recorded: usize,
-    /// What led to the events that are not, oldest first.
+    /// The stops that led to the events that are not on disk yet, oldest first.
     stops: Vec<Stop>,
-    /// Whether further events are being written. They change the state once they are on disk.
+    /// Whether further events are being written. They change the state only when they are on disk.
     writing: bool,
-    /// Where the policy begins when it is next put in charge; none: where the lens is.
+    /// Focal power at which the policy starts when it next drives; `None` starts it where the lens is.
     begin_at: Option<FocalPower>,
-    /// Where the lens was when the server ended in this session.
+    /// Focal power of the lens when the server ended during this session.
     interrupted_at: Option<FocalPower>,
 }
 
-/// This run of the server and its clock, with those of the runs before.
+/// The number of this run of the server, and the clocks of all runs up to it.
 #[derive(Debug, Clone)]
 pub(super) struct RunClock {
     pub clocks: Arc<RunClocks>,
@@ -74,25 +74,25 @@ pub(super) struct RunClock {
 }
 
 impl RunClock {
-    /// `at`, a moment of this run, on the time that goes on over the server's restarts.
+    /// Converts `at`, a moment of this run, to the time that continues over the server's restarts.
     pub fn time(&self, at: Moment) -> Timestamp {
         self.clocks.wall(self.run, at)
     }
 }
 
-/// What stops the lens: somebody's action, or the time limit. It takes effect at once, and is
-/// recorded as soon as the disk takes it.
+/// Something that stops the lens: a person's action, or the time limit. It takes effect at once, and is recorded as
+/// soon as the disk takes it.
 #[derive(Debug, Clone)]
 struct Stop {
     by: Actor,
-    /// None: the time limit.
+    /// `None` means the time limit.
     action: Option<Action>,
     at: Moment,
     wall: Timestamp,
 }
 
 impl Course {
-    /// A session just made in `study`, or outside any; `clock` is this run's.
+    /// A session just made in `study`, or outside studies; `clock` is this run's.
     pub fn new(made: NewSession, protocol: Protocol, created: Event, study: Option<String>, clock: RunClock) -> Self {
         let mut course = Self::without_events(made, protocol, clock);
         course.study = study;
@@ -127,8 +127,7 @@ impl Course {
         }
     }
 
-    /// Session `session` as the database has it, or `None`; `clock` is this run's, and knows those
-    /// before.
+    /// Loads session `session` from the database, or `None`; `clock` is this run's, and knows the earlier runs.
     pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Option<Self>, ConductError> {
         let Some(stored) = reader.session(session).await? else { return Ok(None) };
         let protocol =
@@ -149,33 +148,32 @@ impl Course {
         Ok(Some(course))
     }
 
-    /// Its id.
+    /// The session's identifier.
     pub const fn session(&self) -> SessionId {
         self.made.session
     }
 
-    /// Number of `segment` as surgeons read it, from 1; 0 where it is none of this session's.
+    /// Number of `segment` as surgeons read it, from 1; 0 if the segment is not of this session.
     pub fn setting(&self, segment: SegmentId) -> usize {
         self.state.plan().position(segment).map_or(0, |position| position + 1)
     }
 
-    /// The next events, numbered and stamped.
+    /// Makes the next events: numbers and stamps `kinds`.
     pub fn number(&self, by: &Actor, kinds: Vec<EventKind>, at: Moment, wall: Timestamp) -> Vec<Event> {
         let next = self.events.last().map_or(1, |event| event.number + 1);
         let event = |(kind, number)| Event { number, by: by.role, account: by.account.clone(), at, wall, kind };
         kinds.into_iter().zip(next..).map(event).collect()
     }
 
-    /// Tells where the lens was when the server ended: the session goes on from there.
+    /// Notes where the lens was when the server ended; the session continues from there.
     pub const fn was_interrupted_at(&mut self, focal_power: FocalPower) {
         self.interrupted_at = Some(focal_power);
     }
 
-    /// The events that `action` brings about, to be written to the disk; [`Course::written`] says
-    /// what became of them.
+    /// The events that `action` causes, to be written to disk. Call [`Course::written`] with the result of writing.
     ///
     /// # Errors
-    /// When `by` may not, or the action does not fit where the session stands or the circumstances.
+    /// If `by` may not do this, or the action does not fit the session's state or the circumstances.
     pub fn begin_writing(
         &mut self,
         by: &Actor,
@@ -189,9 +187,8 @@ impl Course {
         Ok(self.number(by, kinds, at, wall))
     }
 
-    /// Takes in `events`, which are now on disk; none where writing failed. What stopped the
-    /// session in the meantime comes after them and is decided anew: a pause while the session was
-    /// being resumed pauses it again.
+    /// Applies `events`, which are now on disk; pass none if writing failed. Stops that happened in the meantime come
+    /// after them and are decided again: a pause during a resumption pauses the session again.
     pub fn written(&mut self, events: Vec<Event>) {
         self.writing = false;
         let mut recorded: Vec<(Timestamp, Event)> =
@@ -201,20 +198,20 @@ impl Course {
         self.replay(recorded);
 
         for stop in std::mem::take(&mut self.stops) {
-            // It is refused where the session or setting that it was to stop has ended.
+            // This is refused if the session or setting that it was to stop has ended.
             let _ = self.take(stop);
         }
     }
 
-    /// Stops the session or its setting at once, as `action` asks; its events wait for the disk.
+    /// Stops the session or its setting at once, as `action` says; its events wait for the disk.
     ///
     /// # Errors
-    /// When `by` may not, or the action does not fit where the session stands.
+    /// If `by` may not do this, or the action does not fit the session's state.
     pub fn stop(&mut self, by: Actor, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
         self.take(Stop { by, action: Some(action), at, wall })
     }
 
-    /// Ends the setting if its time is up; its events wait for the disk. Whether it did.
+    /// Ends the setting if its time is up; its events wait for the disk. Returns whether it ended.
     pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
         let before = self.events.len();
         // The time limit is never refused.
@@ -228,8 +225,7 @@ impl Course {
             None => decide_time(&self.state, stop.at),
         };
 
-        // An action that changes nothing now may change something once the events being written are
-        // there.
+        // An action that changes nothing now may change something after the events that are being written.
         if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
             return Ok(());
         }
@@ -240,35 +236,34 @@ impl Course {
         Ok(())
     }
 
-    /// The events that are not on the disk yet, and how many stops led to them.
+    /// The events that are not on disk yet, and the number of stops that led to them.
     pub fn unrecorded(&self) -> (&[Event], usize) {
         (&self.events[self.recorded..], self.stops.len())
     }
 
-    /// Notes that the first `events` of those events are on the disk, and with them the first
-    /// `stops` stops.
+    /// Notes that the first `events` of the unrecorded events, and the first `stops` stops, are on disk.
     pub fn recorded(&mut self, events: usize, stops: usize) {
         self.recorded += events;
         self.stops.drain(..stops);
     }
 
-    /// Whether something that happened is not on the disk yet.
+    /// Whether an event is not on disk yet.
     pub const fn is_unrecorded(&self) -> bool {
         self.recorded < self.events.len()
     }
 
-    /// Whether event number `number` is on the disk.
+    /// Whether event number `number` is on disk.
     pub fn is_recorded(&self, number: u32) -> bool {
         self.events[..self.recorded].last().is_some_and(|last| number <= last.number)
     }
 
-    /// Whether it is closed and leaves nothing to do.
+    /// Whether the session is closed and nothing remains to be written.
     pub const fn is_done_with(&self) -> bool {
         self.dismissed && !self.writing && !self.is_unrecorded()
     }
 
-    /// Starts over with `events`, which are on disk, each with its time by the server's clocks over
-    /// its restarts.
+    /// Rebuilds the state from `events`, which are on disk, each with its time by the server's clocks over its
+    /// restarts.
     fn replay(&mut self, events: Vec<(Timestamp, Event)>) {
         self.recorded = events.len();
         self.state = self.state.replayed(&[]);
@@ -296,20 +291,20 @@ impl Course {
         self.events.push(event);
     }
 
-    /// Takes in a consent that was recorded.
+    /// Notes a recorded consent.
     pub fn keep_consent(&mut self, consent: Consent) {
         self.state.keep_consent(&consent.text_version);
         self.consent = Some(consent);
     }
 
-    /// Forgets the comments, of which some were erased, and takes in `comments`, which are all there are.
+    /// Replaces all comments by `comments`, after some were erased.
     pub fn hear_again(&mut self, comments: impl IntoIterator<Item = Comment>) {
         self.comments = 0;
         self.latest_comments.clear();
         comments.into_iter().for_each(|comment| self.heard(comment));
     }
 
-    /// Takes in its `events` as the disk has them, where a reason was erased.
+    /// Replaces events by `events` as read from the database, after a reason was erased.
     pub fn read_again(&mut self, events: impl IntoIterator<Item = Event>) {
         for event in events {
             let kept = self.events.iter_mut().find(|kept| kept.number == event.number);
@@ -319,7 +314,7 @@ impl Course {
         }
     }
 
-    /// Takes in a comment that was kept.
+    /// Adds a comment that was stored.
     pub fn heard(&mut self, comment: Comment) {
         self.comments += 1;
         if self.latest_comments.len() == LATEST {
@@ -329,8 +324,8 @@ impl Course {
         self.latest_comments.push(CommentLine { at: comment.stamp.wall, setting, said: comment.said });
     }
 
-    /// Who is to drive the lens now, as a command to the control loop. None before the session's
-    /// start and after its end.
+    /// The command to the control loop that says what drives the lens now. `None` before the session's start and after
+    /// its end.
     pub fn lens_command(&self) -> Option<Command> {
         let segment = self.state.segment();
         let running = self.state.running();
@@ -355,7 +350,7 @@ impl Course {
         Some(policy.clone())
     }
 
-    /// Time of inspection until what is shown changes, `inspected` having passed in the segment.
+    /// Time of inspection until what is shown changes, after `inspected` of it has passed in the segment.
     pub fn until_next_change(&self, inspected: Duration) -> Duration {
         let limit = self.state.plan().limit;
         let next = self.protocol.next_prompt_change(inspected).map_or(limit, |change| change.min(limit));

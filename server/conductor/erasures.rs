@@ -1,4 +1,4 @@
-//! Erasure of words, with everything that the database has about them.
+//! Erases words, together with everything that the database has about them.
 
 use std::collections::BTreeSet;
 
@@ -16,21 +16,21 @@ use crate::trial::remark::Said;
 use crate::trial::study::event::StudyEventKind;
 
 impl Conductor {
-    /// Erases words that were said in session `session` with the notes on them, or the reason of one of its events. When
-    /// this returns, they are nowhere in the database's files.
+    /// Erases words of session `session` with the notes on them, or the reason of one of its events. When this returns,
+    /// no file of the database contains them.
     ///
     /// # Errors
-    /// When `by` is not the researcher, a session is under way, the record has no words, or the disk failed.
+    /// If `by` is not the researcher, a session is under way, the record has no words, or the disk failed.
     pub async fn erase(&self, by: impl Into<Actor>, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
         let by = by.into();
         self.to_the_end(move |shared| async move { shared.erase(by, session, new).await }).await
     }
 
     /// Erases all words of session `session`, whose participant withdrew: comments with their sound, answers in words,
-    /// and notes. When this returns, they are nowhere in the database's files.
+    /// and notes. When this returns, no file of the database contains them.
     ///
     /// # Errors
-    /// When `by` is not the researcher, the participant has not withdrawn, a session is under way, nothing is left to
+    /// If `by` is not the researcher, the participant has not withdrawn, a session is under way, nothing is left to
     /// erase, or the disk failed.
     pub async fn erase_all_words(
         &self,
@@ -48,7 +48,7 @@ impl Shared {
         let mut pen = self.pen.lock().await;
         let reason = self.check_erasing(&mut pen, &by, session, reason).await?;
         if !self.store.reader().is_withdrawn(session).await? {
-            let refusal = "only of a withdrawn session all words are erased at once; erase others one by one";
+            let refusal = "all words can be erased at once only for a withdrawn session; erase them one by one";
             return Err(Refusal::conflict(refusal).into());
         }
 
@@ -59,7 +59,7 @@ impl Shared {
         self.erase_records(by, session, records, &reason).await
     }
 
-    /// The records of `session` with words that nobody has erased: comments, answers in words, notes.
+    /// The records of `session` whose words nobody has erased: comments, answers in words, notes.
     pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let comments = reader.comments(session).await?.into_iter();
@@ -79,7 +79,7 @@ impl Shared {
         Ok(left.collect())
     }
 
-    /// Whether words of `session` may be erased now; the reason comes back without blanks around it.
+    /// Checks that words of `session` may be erased now. Returns the reason without surrounding white space.
     async fn check_erasing(
         &self,
         pen: &mut Pen,
@@ -103,7 +103,7 @@ impl Shared {
         let records = match new.subject {
             Erasable::Event => self.with_its_copy(session, &new.record).await?,
             Erasable::StudyEvent => {
-                let advice = "erase the reason of the session's event: that of the study's event goes with it";
+                let advice = "erase the reason of the session's event instead; the study's event is erased with it";
                 return Err(Refusal::Invalid(advice.to_owned()).into());
             }
             Erasable::Comment | Erasable::Answer | Erasable::Correction => {
@@ -138,7 +138,7 @@ impl Shared {
         Ok(())
     }
 
-    /// The record of something said, and the notes on it: a note may repeat the words.
+    /// The record itself and the notes on it, because a note may repeat the words.
     async fn with_its_notes(
         &self,
         session: SessionId,
@@ -180,7 +180,7 @@ impl Shared {
     }
 }
 
-/// Whether the event of a study tells what the event `of_session` of session `session` does.
+/// Whether the study's event `of_study` repeats the event `of_session` of session `session`.
 fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind) -> bool {
     match of_study {
         StudyEventKind::SessionWithdrawn { session: about } => {

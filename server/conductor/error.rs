@@ -1,37 +1,37 @@
-//! Why the conductor did not do something.
+//! Errors of the conductor.
 
 use crate::ids::SessionId;
 use crate::store::StoreError;
 use crate::trial::refusal::Refusal;
 use crate::trial::study::refusal::StudyRefusal;
 
-/// Why the conductor did not do something.
+/// The reason why the conductor did not do something.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConductError {
     /// There is no such session, segment or question, or it is not the one under way.
     #[error("{0}")]
     NotFound(String),
-    /// Another role does this.
+    /// Only another role may do this.
     #[error("{0}")]
     Forbidden(String),
-    /// It cannot be done in the session's present state; nothing was changed.
+    /// The session's state does not allow it; nothing was changed.
     #[error("{0}")]
     Conflict(String),
-    /// What was sent makes no sense; says which part.
+    /// The request is invalid; the text says which part.
     #[error("{0}")]
     Invalid(String),
     /// The disk or database failed; nothing was acknowledged.
     #[error("could not be saved: {0}")]
     Storage(String),
-    /// The session's protocol is of another version, or damaged.
+    /// The session's protocol is of another version or is damaged.
     #[error(
         "session {session} was made with a protocol that this version cannot read ({reason}); \
-         go on with the version that made it, or with another folder by --data-dir"
+         use the version that made it, or another folder with --data-dir"
     )]
     Unreadable {
         /// The session.
         session: SessionId,
-        /// Why.
+        /// Why it cannot be read.
         reason: String,
     },
 }

@@ -1,6 +1,6 @@
-//! The order in which things happen. An action that moves a session on: decide, write to disk,
-//! change the state, show it, tell the control loop. An action that stops it: decide, change the
-//! state, tell the control loop, and then write to disk and show it.
+//! The order of the steps. An action that moves a session on: decide, write to disk, change the state, show it, command
+//! the control loop. An action that stops the session: decide, change the state, command the control loop, and then
+//! write to disk and show it.
 
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -21,15 +21,14 @@ use crate::trial::role::Role;
 use crate::trial::session::decide_restart;
 use crate::trial::study::signature::Signature;
 
-/// How long the screens wait for the disk to take what stopped a session before they show it as not
-/// recorded yet.
+/// How long the screens wait until a stop is on disk. After that they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
 
-/// The lens stays where it is, and no session's setting is under way.
+/// The lens stays where it is, outside any setting.
 const HOLD: Command = Command::Drive { drive: Drive::Hold { at: None }, segment: None };
 
 impl Shared {
-    /// What is in memory. Never held while waiting for anything.
+    /// The state in memory. Never hold this lock while waiting for something.
     pub(super) fn live(&self) -> MutexGuard<'_, Live> {
         self.live.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -49,8 +48,8 @@ impl Shared {
         }
     }
 
-    /// Does what waits for no disk: the lens is held when this returns, whatever becomes of the
-    /// record.
+    /// Carries out an action that does not wait for the disk. The lens is held when this returns, even if recording
+    /// fails.
     async fn stop(self: &Arc<Self>, by: &Actor, session: SessionId, action: &Action) -> Result<(), ConductError> {
         let stopped = {
             let mut live = self.live();
@@ -63,14 +62,14 @@ impl Shared {
             stopped
         };
 
-        // Also when the action was refused: the time limit may have stopped something.
+        // Record even if the action was refused: the time limit may have stopped something.
         self.record_promptly().await;
         self.show_and_drive();
         self.wake();
         Ok(stopped?)
     }
 
-    /// Does what takes effect only once it is on disk.
+    /// Carries out an action that takes effect only when it is on disk.
     async fn move_on(
         &self,
         by: &Actor,
@@ -89,7 +88,7 @@ impl Shared {
 
             let mut live = self.live();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            // The session was stopped in the meantime, and that goes to the disk first.
+            // The session was stopped in the meantime; the stop must be on disk first.
             if course.is_unrecorded() {
                 continue;
             }
@@ -128,7 +127,7 @@ impl Shared {
         self.append(session, &events, signature).await
     }
 
-    /// Writes `events` of `session`. An emergency unblinding is recorded with its study, too.
+    /// Writes `events` of `session`. An emergency unblinding is also recorded in its study.
     async fn append(
         &self,
         session: SessionId,
@@ -157,7 +156,7 @@ impl Shared {
         course.ok_or_else(ConductError::no_session)
     }
 
-    /// Takes up the session that was under way when the server ended, held where it was.
+    /// Resumes the session that was under way when the server ended; the lens is held where it was.
     pub(super) async fn take_up(&self, mut course: Course) -> Result<(), ConductError> {
         let reader = self.store.reader();
         let mut inspected = Duration::ZERO;
@@ -177,7 +176,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Ends the setting under way if its time is up. Whether it did.
+    /// Ends the current setting if its time is up. Returns whether it ended.
     pub(super) fn keep_time(&self) -> bool {
         let mut live = self.live();
         let at = self.clock.now();
@@ -189,24 +188,23 @@ impl Shared {
         ended
     }
 
-    /// Records what stopped the session. Waits for the disk only as long as the screens can wait.
+    /// Records the stops. Waits for the disk only as long as the screens can wait.
     pub(super) async fn record_promptly(self: &Arc<Self>) {
         let shared = Arc::clone(self);
-        // A task of its own, so that it goes on when this no longer waits.
+        // A separate task continues after this function stops waiting.
         let recording = tokio::spawn(async move {
             let mut pen = shared.pen.lock().await;
-            // A failure is shown on the screens, and recording is tried again.
+            // The screens show a failure, and recording is tried again.
             let _ = shared.record_stops(&mut pen).await;
         });
 
         let _ = timeout(PROMPTLY, recording).await;
     }
 
-    /// Records what stopped the session, in order. What the disk does not take is kept for the next
-    /// attempt.
+    /// Records the stops in order. If the disk refuses some, they are kept for the next attempt.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database failed.
     pub(super) async fn record_stops(&self, _pen: &mut Pen) -> Result<(), ConductError> {
         loop {
             let (session, events, stops) = {
@@ -248,20 +246,19 @@ impl Shared {
         let shown = live.shown();
         let because = live.unrecorded_because.as_deref();
         let (surgeon, operator) = shown.map(|course| views::both(course, because, now)).unzip();
-        // First to the operator: from that view it is known which tablets may see the surgeon's.
+        // The operator first: that view tells which tablets may see the surgeon's.
         replace_if_changed(&self.operator, operator);
         replace_if_changed(&self.surgeon, surgeon);
     }
 
-    /// Shows where the session stands, and only then moves the lens: a notice that covers the view
-    /// has to be there first.
+    /// Shows the session's state, and only then moves the lens: a notice that covers the view must be shown first.
     pub(super) fn show_and_drive(&self) {
         let mut live = self.live();
         self.publish(&live);
         self.drive(&mut live);
     }
 
-    /// Takes the lens from a policy that the session no longer asks for.
+    /// Holds the lens if a policy drives it that the session no longer wants.
     fn hold(&self, live: &mut Live) {
         let wanted = live.course.as_ref().and_then(Course::lens_command);
         let policy_drives = matches!(live.commanded, Some(Command::Drive { drive: Drive::Policy { .. }, .. }));
@@ -277,7 +274,7 @@ impl Shared {
         live.commanded = Some(hold);
     }
 
-    /// Tells the control loop what the session now asks of it, if that changed.
+    /// Sends the control loop the session's present command, if it changed.
     fn drive(&self, live: &mut Live) {
         let wanted = live.course.as_ref().and_then(Course::lens_command);
         if wanted == live.commanded {
@@ -288,8 +285,8 @@ impl Shared {
         if let Some(command) = wanted.clone() {
             self.control.send(command);
         } else if !is_ready {
-            // The session has ended: its last command no longer holds, and nobody has said who
-            // focuses next.
+            // The session has ended. Its last command is no longer valid, and nobody has chosen what drives the lens
+            // next.
             self.control.send(HOLD);
         }
         live.commanded = wanted;

@@ -1,5 +1,5 @@
-//! What goes on by itself while the server runs: the time is kept, what waits for the disk is recorded, and voice is
-//! erased when its time is over.
+//! Background work while the server runs: keeps the time, records what waits for the disk, and erases voice when its
+//! retention period is over.
 
 use std::time::Duration;
 
@@ -8,12 +8,12 @@ use tokio::time::sleep;
 use super::Conductor;
 use super::course::Course;
 
-/// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
+/// Interval between two updates of the remaining time. A killed server loses at most this much of a segment's clock.
 const BEAT: Duration = Duration::from_secs(1);
 
 impl Conductor {
-    /// Keeps time limits, prompts and the time left, records what waits for the disk, and erases voice when its time is
-    /// over. Never ends; drop it to stop.
+    /// Keeps time limits, prompts and the remaining time, records what waits for the disk, and erases voice when its
+    /// retention period is over. Never returns; drop it to stop.
     pub async fn run(self) {
         let keeping_time = async {
             loop {
@@ -25,7 +25,7 @@ impl Conductor {
             }
         };
 
-        // Apart, because it waits for the disk, and the time does not.
+        // A separate loop, because recording waits for the disk and the time does not.
         let recording = async {
             loop {
                 if self.record().await {
@@ -39,13 +39,13 @@ impl Conductor {
         tokio::join!(keeping_time, recording, self.clone().keep_voice_no_longer());
     }
 
-    /// Does what the time now asks for, and records what there is to record.
+    /// Does what is due now, and records what waits for the disk.
     pub async fn tick(&self) {
         self.keep_time().await;
         self.record().await;
     }
 
-    /// Records what the disk has not taken yet: the last chance before the server ends.
+    /// Records what is not on disk yet; the last chance before the server ends.
     pub async fn record_the_rest(&self) {
         let mut pen = self.shared.pen.lock().await;
         if let Err(error) = self.shared.record_stops(&mut pen).await {
@@ -53,7 +53,7 @@ impl Conductor {
         }
     }
 
-    /// Ends the setting under way at its limit and shows what the time changes; says how long until it changes more.
+    /// Ends the current setting at its limit and shows what the time changes. Returns the time until the next change.
     async fn keep_time(&self) -> Duration {
         if self.shared.keep_time() {
             self.shared.record_promptly().await;
@@ -69,11 +69,11 @@ impl Conductor {
         course.until_next_change(inspected).min(BEAT)
     }
 
-    /// Records what stopped the session, and how far its clock has come. Whether there will be more to record soon.
+    /// Records the stops, and how far the segment's clock is. Returns whether there will be more to record soon.
     async fn record(&self) -> bool {
         {
             let mut pen = self.shared.pen.lock().await;
-            // A failure is shown on the screens, and recording is tried again.
+            // The screens show a failure, and recording is tried again.
             let _ = self.shared.record_stops(&mut pen).await;
         }
 

@@ -1,4 +1,4 @@
-//! Who focuses outside sessions. This is the only way from people to the lens.
+//! What drives the lens outside sessions. This is the only way from people to the lens.
 
 use super::{ConductError, Conductor, Shared};
 use crate::autofocus::{PolicyError, PolicyName};
@@ -9,18 +9,18 @@ use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::role::Role;
 
 impl Conductor {
-    /// Lets a policy focus, or puts the lens at a focal power, as `focus` says.
+    /// Makes a policy drive the lens, or moves the lens to a focal power, as `focus` says.
     ///
     /// # Errors
-    /// When `by` may not, a session is not closed yet, the focal power is invalid, or the policy is
-    /// unknown or cannot run.
+    /// If `by` may not do this, a session is not closed yet, the focal power is invalid, or the policy is unknown or
+    /// cannot run.
     pub fn focus(&self, by: Role, focus: &Focus) -> Result<(), ConductError> {
-        // A policy may have to load, so this comes before the lock, which must be there for whoever
-        // stops the lens.
+        // Loading a policy may take time, so do it before taking the lock, which must be free for anyone who stops the
+        // lens.
         let drive = self.shared.drive_for(focus);
 
-        // Held until the loop is told: a session that is made in the meantime tells the loop after
-        // this.
+        // Hold the lock until the command is sent. A session that is made in the meantime then sends its command after
+        // this one.
         let live = self.shared.live();
         permission::check(by, Request::MoveLens, CurrentSession::of(live.shown_phase()))?;
         self.shared.control.send(Command::Drive { drive: drive?, segment: None });
@@ -29,7 +29,7 @@ impl Conductor {
 }
 
 impl Shared {
-    /// Refuses here what the loop could only refuse without an answer.
+    /// Rejects here what the control loop could only reject without an answer.
     fn drive_for(&self, focus: &Focus) -> Result<Drive, ConductError> {
         match focus {
             Focus::FocalPower(value) => {

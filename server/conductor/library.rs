@@ -1,4 +1,4 @@
-//! The protocols there are: those that ship, and those of a folder, which come before them.
+//! The available protocols: those that ship, and those of a folder, which take precedence.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,22 +15,22 @@ const SHIPPED: [(&str, &str); 2] = [
     ("practice.toml", include_str!("../../trial-protocols/practice.toml")),
 ];
 
-/// The protocols there are, by name.
+/// The available protocols, by name.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
     protocols: BTreeMap<String, Protocol>,
 }
 
-/// A protocol for the operator to choose. Says nothing of its policies, for the operator stands beside the surgeon.
+/// A protocol for the operator to choose. Says nothing of its policies, because the operator stands beside the surgeon.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct ProtocolSummary {
-    /// Name.
+    /// Name of the protocol.
     pub name: String,
     /// Title for surgeons.
     pub title: String,
     /// Title for operators and researchers.
     pub researcher_title: String,
-    /// Whether it is practice.
+    /// Whether its sessions are practice.
     pub practice: bool,
     /// Settings in a session.
     pub settings: usize,
@@ -41,7 +41,7 @@ pub struct ProtocolSummary {
 /// Why the protocols could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
-    /// One is malformed.
+    /// A protocol is malformed.
     #[error("{0}")]
     Malformed(#[from] ProtocolError),
     /// The folder or a file could not be read.
@@ -49,10 +49,10 @@ pub enum LibraryError {
     Unreadable {
         /// Folder or file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// Two files have protocols of one name.
+    /// Two files define protocols with the same name.
     #[error("{} and another file of its folder both hold a protocol called '{name}'; rename one", .path.display())]
     Twice {
         /// The second file.
@@ -63,10 +63,10 @@ pub enum LibraryError {
 }
 
 impl Library {
-    /// The protocols that ship and the `.toml` files of `folder`, if one is given; `known` are the policies there are.
+    /// Loads the protocols that ship and the `.toml` files of `folder`, if given; `known` are the available policies.
     ///
     /// # Errors
-    /// When the folder cannot be read or one protocol in it is malformed: names file, line and key.
+    /// If the folder cannot be read, or a protocol in it is malformed. The error names file, line and key.
     pub fn load(folder: Option<&Path>, known: &[PolicyName]) -> Result<Self, LibraryError> {
         let mut protocols = BTreeMap::new();
         for (file, source) in SHIPPED {
@@ -80,7 +80,7 @@ impl Library {
         Ok(Self { protocols })
     }
 
-    /// Protocol `name`.
+    /// The protocol called `name`.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Protocol> {
         self.protocols.get(name)
@@ -97,7 +97,7 @@ impl Library {
         self.protocols.keys().map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 
-    /// All of them, by name.
+    /// Summaries of all protocols, ordered by name.
     #[must_use]
     pub fn summaries(&self) -> Vec<ProtocolSummary> {
         self.protocols.values().map(ProtocolSummary::of).collect()

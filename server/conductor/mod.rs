@@ -1,6 +1,5 @@
-//! The conductor carries a session's events in this order: the trial's rules decide, the disk takes
-//! the events, and then the control loop and the screens hear of them. So what anyone has seen is
-//! on disk.
+//! The conductor handles a session's events in this order: the trial's rules decide, the disk takes the events, and
+//! then the control loop and the screens hear of them. So everything that anyone has seen is on disk.
 //!
 //! Only stopping the lens does not wait for the disk. A pause, an end and a time limit hold the
 //! lens first. They are recorded as soon as the disk takes them, and until then the screens show
@@ -56,24 +55,23 @@ use crate::trial::study::signature::Signature;
 use crate::trial::view::{OperatorView, SurgeonView};
 use course::{Course, RunClock};
 
-/// What a conductor works with.
+/// The parts that a conductor is made of.
 pub struct Parts {
-    /// Where everything is kept.
+    /// The database.
     pub store: Store,
     /// The control loop.
     pub control: ControlHandle,
-    /// The protocols there are.
+    /// The available protocols.
     pub library: Library,
-    /// The policies there are.
+    /// The available policies.
     pub registry: Registry,
-    /// Both clocks.
+    /// Both clocks, monotonic and wall.
     pub clock: Arc<dyn Clock>,
-    /// Where the orders and ids of real sessions come from. Nobody may foresee it: the server seeds
-    /// it from the system's random source.
+    /// Random source for the orders and ids of real sessions. It must be unpredictable: the server seeds it from the
+    /// system's random source.
     pub random: ChaCha12Rng,
-    /// Where those of practice sessions come from, which may be foreseen. Each start of the server
-    /// gets a stream of its own, so that a fixed seed does not make the same ids twice in one
-    /// database.
+    /// Random source for those of practice sessions, which may be predictable. Each start of the server gets a stream
+    /// of its own, so that a fixed seed does not make the same ids twice in one database.
     pub practice_random: ChaCha12Rng,
 }
 
@@ -90,23 +88,22 @@ struct Shared {
     studies: Studies,
     registry: Registry,
     clock: Arc<dyn Clock>,
-    /// The clocks of this start of the server and of those before.
+    /// The clocks of this start of the server and of the earlier ones.
     run_clock: RunClock,
-    /// The session in memory. Stopping the lens needs this lock, so nobody holds it while waiting
-    /// for the disk.
+    /// The session in memory. Stopping the lens needs this lock, so never hold it while waiting for the disk.
     live: std::sync::Mutex<Live>,
-    /// Held from a decision until it is on disk, so that the next decision is based on what is on
-    /// disk, and is written after it.
+    /// Held from a decision until it is on disk. So the next decision is based on what is on disk, and is written after
+    /// it.
     pen: Mutex<Pen>,
     surgeon: watch::Sender<Option<Arc<SurgeonView>>>,
     operator: watch::Sender<Option<Arc<OperatorView>>>,
-    /// Wakes the task that keeps time: the next change may be due at another time now.
+    /// Wakes the task that keeps time, because the next change may be due at another time now.
     changed: Notify,
-    /// Wakes the task that records: there may be something to record.
+    /// Wakes the task that records, because there may be something to record.
     to_record: Notify,
 }
 
-/// Where in a study a session is to be made.
+/// The site of a study in which a session is to be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StudySite {
     /// The study's name.
@@ -117,9 +114,9 @@ pub struct StudySite {
 
 struct Live {
     course: Option<Course>,
-    /// What the session last told the control loop.
+    /// The session's last command to the control loop.
     commanded: Option<Command>,
-    /// Why the disk did not take what stopped the session, at the last attempt.
+    /// Why the last attempt to record a stop failed; `None` if it did not.
     unrecorded_because: Option<String>,
 }
 
@@ -134,7 +131,7 @@ impl Live {
         self.course.as_ref().filter(|course| !course.dismissed)
     }
 
-    /// Where that session stands.
+    /// The phase of the session on the screens.
     fn shown_phase(&self) -> Option<Phase> {
         self.shown().map(|course| course.state.phase())
     }
@@ -145,7 +142,7 @@ impl Live {
     }
 }
 
-/// The right to write a session's data, with the random sources that making a session needs.
+/// The right to write a session's data, with the random sources for making a session.
 struct Pen {
     /// For real sessions.
     random: ChaCha12Rng,
@@ -154,11 +151,11 @@ struct Pen {
 }
 
 impl Conductor {
-    /// Takes up the session that was under way when the server last ended, paused where it was.
-    /// Something has to await [`Conductor::run`] for time limits and prompts to be kept.
+    /// Resumes the session that was under way when the server last ended, paused where it was. Time limits and prompts
+    /// work only while [`Conductor::run`] is awaited.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database failed.
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
         let Parts { store, control, library, registry, clock, random, mut practice_random } = parts;
         practice_random.set_stream(u64::try_from(store.run()).unwrap_or_default());
@@ -192,8 +189,8 @@ impl Conductor {
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// The session under way (or just ended, until dismissed) as the surgeon may see it; changes as
-    /// it changes.
+    /// The session under way, or one that has just ended until it is dismissed, as the surgeon may see it. The receiver
+    /// gets every change.
     #[must_use]
     pub fn surgeon_view(&self) -> watch::Receiver<Option<Arc<SurgeonView>>> {
         self.shared.surgeon.subscribe()
@@ -212,7 +209,7 @@ impl Conductor {
         live.shown().filter(|course| !course.state.phase().has_ended()).map(Course::session)
     }
 
-    /// What the session under way is to have recorded, from its start to its end.
+    /// The session under way, and what is to be recorded of it, from its start to its end.
     #[must_use]
     pub fn to_record(&self) -> Option<(SessionId, Record)> {
         let live = self.shared.live();
@@ -222,11 +219,11 @@ impl Conductor {
         (runs && course.protocol.record != Record::None).then(|| (course.session(), course.protocol.record))
     }
 
-    /// Makes a session for `participant` by `protocol` and draws its allocation; it waits for
+    /// Makes a session for `participant` by `protocol` and draws its allocation. The session waits for
     /// [`Action::Start`].
     ///
     /// # Errors
-    /// When one is under way already, or participant or protocol is unknown.
+    /// If a session is under way already, or participant or protocol is unknown.
     pub async fn create(
         &self,
         by: impl Into<Actor>,
@@ -240,7 +237,7 @@ impl Conductor {
     /// of `place.site`.
     ///
     /// # Errors
-    /// When one is under way already, the participant is unknown, or the study allows no such session.
+    /// If a session is under way already, the participant is unknown, or the study allows no such session.
     pub async fn create_in_study(
         &self,
         by: impl Into<Actor>,
@@ -263,10 +260,10 @@ impl Conductor {
         self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol, place).await }).await
     }
 
-    /// Moves session `session` on.
+    /// Carries out `action` on session `session`.
     ///
     /// # Errors
-    /// When `by` may not, or the session is not where the action fits.
+    /// If `by` may not do this, or the action does not fit the session's state.
     pub async fn act(&self, by: impl Into<Actor>, session: SessionId, action: Action) -> Result<(), ConductError> {
         let by = by.into();
         self.to_the_end(move |shared| async move { shared.act(&by, session, &action, None).await }).await
@@ -275,7 +272,7 @@ impl Conductor {
     /// Unblinds one session of a study that is still blinded, signed by a person.
     ///
     /// # Errors
-    /// When `by` is not the researcher, the reason names a policy, or the session's order would tell another's.
+    /// If `by` is not the researcher, the reason names a policy, or the session's order would reveal another's.
     pub async fn unblind_in_emergency(
         &self,
         by: impl Into<Actor>,
@@ -288,10 +285,10 @@ impl Conductor {
         self.to_the_end(move |shared| async move { shared.act(&by, session, &action, Some(&signature)).await }).await
     }
 
-    /// Takes an ended session off the screens.
+    /// Removes an ended session from the screens.
     ///
     /// # Errors
-    /// When it has not ended, or `by` is not the operator.
+    /// If it has not ended, or `by` is not the operator.
     pub fn dismiss(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
         let mut live = self.shared.live();
         let phase = live.course_of(session).map(|course| course.state.phase());
@@ -305,33 +302,33 @@ impl Conductor {
         Ok(())
     }
 
-    /// Keeps a comment. When this returns, it is on disk. A comment on a segment that has just
-    /// ended stays with that segment.
+    /// Stores a comment. It is on disk when this returns. A comment on a segment that has just ended stays with that
+    /// segment.
     ///
     /// # Errors
-    /// When the session does not exist, the text is empty or too long, or the disk failed.
+    /// If the session does not exist, the text is empty or too long, or the disk failed.
     pub async fn comment(&self, comment: NewComment) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.comment(comment).await }).await
     }
 
-    /// Keeps an answer. When this returns, it is on disk.
+    /// Stores an answer. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the question has not been asked yet, the value does not fit it, or the disk failed.
+    /// If the question has not been asked yet, the value does not fit it, or the disk failed.
     pub async fn answer(&self, answer: NewAnswer) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.answer(answer).await }).await
     }
 
-    /// Notes how much of a session a surgeon's device still holds.
+    /// Records how much of a session a surgeon's device still holds unsent.
     ///
     /// # Errors
-    /// When there is no such session, or the disk failed.
+    /// If there is no such session, or the disk failed.
     pub async fn holding(&self, holding: Holding) -> Result<(), ConductError> {
         self.to_the_end(move |shared| async move { shared.holding(holding).await }).await
     }
 
-    /// Runs `work` to its end even if the caller is dropped, as a handler is when its browser goes
-    /// away. Otherwise memory could fall behind the disk.
+    /// Runs `work` to its end even if the caller is dropped, as a handler is when its browser disconnects. Otherwise
+    /// memory could fall behind the disk.
     async fn to_the_end<T, F>(&self, work: impl FnOnce(Arc<Shared>) -> F) -> Result<T, ConductError>
     where
         T: Send + 'static,

@@ -1,4 +1,4 @@
-//! What the surgeon says: comments and answers, kept whatever state the session is in.
+//! The surgeon's comments and answers, stored whatever the session's state.
 
 use super::course::Course;
 use super::{ConductError, Shared};
@@ -27,8 +27,7 @@ impl Shared {
 
         acceptance::check_spoken(&new.said, voice)?;
         let stamp = self.stamp();
-        // A segment that is not this session's can only come from a broken page: what was said is
-        // kept all the same.
+        // Only a faulty page can send a segment of another session. Keep the comment anyway.
         let segment = new.segment.filter(|segment| segments.contains(segment));
         let comment = Comment {
             key: new.key,
@@ -55,14 +54,14 @@ impl Shared {
 
     pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
-        // What led to the question comes before its answer.
+        // Events that led to the question are written before its answer.
         self.record_stops(&mut pen).await?;
 
         let checked = self.live().course_of(new.session).map(|course| check(course, &new).map(|()| course.grace));
         let grace = match checked {
             Some(checked) => checked?,
             None => match self.load(new.session).await {
-                // What was asked cannot be known any more; what was answered is kept all the same.
+                // The questions can no longer be read; keep the answer anyway.
                 Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
                 earlier => {
                     let earlier = earlier?;
@@ -86,7 +85,7 @@ impl Shared {
         unless_taken(kept)
     }
 
-    /// Keeps an answer to a session whose questions are not known.
+    /// Stores an answer to a session whose questions cannot be read.
     async fn keep_unasked(&self, new: NewAnswer) -> Result<(), ConductError> {
         let Known { segments, grace, .. } = self.of_earlier(new.session).await?;
         acceptance::check_unasked(&new, &segments)?;
@@ -109,12 +108,12 @@ impl Shared {
         Answer { key, session, segment, question, value, origin: origin.plausible(), late, stamp }
     }
 
-    /// What is known of an earlier session whether or not its protocol can still be read, so that a late comment on it
-    /// is kept.
+    /// What is known of an earlier session, even if its protocol can no longer be read, so that a late comment on it is
+    /// stored.
     async fn of_earlier(&self, session: SessionId) -> Result<Known, ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.run_clock.clocks);
-        // Where the protocol cannot be read, nothing that was said may be lost.
+        // If the protocol cannot be read, accept voice, so that nothing that was said is lost.
         let voice = stored.protocol().map_or(true, |protocol| protocol.voice);
         let segments = stored.made.segments.into_iter().map(|(segment, _)| segment).collect();
         Ok(Known { segments, grace, voice })
@@ -125,11 +124,11 @@ impl Shared {
     }
 }
 
-/// What deciding about a comment needs to know of its session.
+/// What a decision about a comment needs to know of its session.
 struct Known {
     segments: Vec<SegmentId>,
     grace: Grace,
-    /// Whether the session asks for comments aloud.
+    /// Whether the session accepts spoken comments.
     voice: bool,
 }
 
@@ -145,5 +144,5 @@ fn unless_taken(kept: Kept) -> Result<(), ConductError> {
 }
 
 pub(super) fn taken() -> ConductError {
-    ConductError::Conflict("its key already stands for something else; send it with a new key".to_owned())
+    ConductError::Conflict("its key is already used for something else; send it with a new key".to_owned())
 }

@@ -1,4 +1,4 @@
-//! What the operator's and researcher's pages read: participants, protocols, sessions, one session in detail.
+//! Reports for the operator's and researcher's pages: participants, protocols, sessions, one session in detail.
 
 use std::sync::Arc;
 
@@ -25,99 +25,99 @@ use crate::trial::question::{AnswerValue, QuestionKind};
 use crate::trial::role::Role;
 use crate::trial::view::LogLine;
 
-/// A session in detail, for the researcher. Policies are in it once it was unblinded, and not before.
+/// A session in detail, for the researcher. Contains the policies only after it was unblinded.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SessionDetail {
-    /// Its line in the list.
+    /// The session's line in the list.
     #[serde(flatten)]
     pub line: SessionLine,
-    /// Protocol's title for researchers.
+    /// The protocol's title for researchers.
     pub researcher_title: String,
     /// Algorithm that drew the order.
     pub algorithm: &'static str,
-    /// SHA-256 that commits to the order since the session was made.
+    /// SHA-256 with which the order was committed to when the session was made.
     pub commitment: String,
-    /// Its settings, in order.
+    /// The session's settings, in order.
     pub settings_detail: Vec<SettingDetail>,
     /// Answers that count, in the order they were given; none once the participant has withdrawn.
     pub answers: Vec<AnswerLine>,
-    /// What was put right, oldest first; once the participant has withdrawn, only whose session it was.
+    /// Corrections, oldest first. Once the participant has withdrawn, only those of the participant.
     pub corrections: Vec<CorrectionLine>,
-    /// What the participant consented to, oldest first; the latest counts.
+    /// The participant's consents, oldest first; the latest counts.
     pub consents: Vec<ConsentLine>,
-    /// That the participant withdrew, if so.
+    /// The participant's withdrawal, if there is one.
     pub withdrawal: Option<WithdrawalLine>,
-    /// Until when, by the server's clock, what arrives counts; none while the session is under way.
+    /// Time, by the server's clock, until which what arrives counts; none while the session is under way.
     #[schema(value_type = Option<String>)]
     pub counts_until: Option<Timestamp>,
-    /// What may still come in, and would not count after unblinding.
+    /// What may still arrive and would not count after unblinding.
     pub outstanding: Option<Outstanding>,
     /// Everything that happened, oldest first.
     pub log: Vec<LogLine>,
-    /// What unblinding told, if it happened.
+    /// What unblinding revealed; none before.
     pub unblinding: Option<Unblinding>,
 }
 
 /// A setting of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SettingDetail {
-    /// Number, from 1.
+    /// Number of the setting, from 1.
     pub setting: usize,
-    /// Segment.
+    /// Identifier of the segment.
     pub segment: SegmentId,
     /// When inspection began, by the server's wall clock.
     #[schema(value_type = Option<String>)]
     pub started: Option<Timestamp>,
-    /// Time inspected without pauses, seconds, once it is over.
+    /// Time inspected without pauses, in seconds; none until the inspection is over.
     pub inspected_seconds: Option<f64>,
 }
 
-/// An answer for reading.
+/// An answer, as it is shown.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AnswerLine {
-    /// When, by the server's wall clock.
+    /// When it was recorded, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
     /// Setting, from 1; none for a closing question.
     pub setting: Option<usize>,
-    /// Question's id.
+    /// The question's identifier.
     pub question: String,
-    /// The question.
+    /// The question's text.
     pub text: String,
-    /// The question's kind, where it is known.
+    /// The question's kind; none if it is not known.
     pub kind: Option<&'static str>,
     /// The answer's key.
     pub key: IdempotencyKey,
-    /// The answer.
+    /// The answer as it was given.
     pub value: AnswerValue,
-    /// The same in words.
+    /// The answer in words.
     pub words: String,
-    /// The right answer, where it was corrected.
+    /// The corrected answer; none if it was not corrected.
     pub corrected: Option<AnswerValue>,
-    /// The same in words.
+    /// The corrected answer in words.
     pub corrected_words: Option<String>,
-    /// A researcher's note on it.
+    /// A researcher's note on the answer.
     pub note: Option<String>,
-    /// When its words were erased, by the server's wall clock.
+    /// When its words were erased, by the server's wall clock; none if they were not.
     #[schema(value_type = Option<String>)]
     pub erased: Option<Timestamp>,
-    /// What it scores, corrected where it was; none where it has no score or lacks an item.
+    /// Its scores, from the corrected answer if there is one; none if it has no score or an item is missing.
     pub scores: Vec<Measure>,
-    /// The System Usability Scale's score, 0..=100, for its ten items.
+    /// The score of the System Usability Scale, 0 to 100, for its ten items.
     pub sus_score: Option<f64>,
     /// Whether it replaced an earlier answer.
     pub changed: bool,
-    /// Whether another of the surgeon's devices said something else; the timeline tells what.
+    /// Whether another of the surgeon's devices gave a different answer; the timeline shows it.
     pub devices_disagree: bool,
 }
 
-/// What unblinding told.
+/// What unblinding revealed.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Unblinding {
     /// When, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Why.
+    /// Reason for the unblinding.
     pub reason: String,
     /// Whether the session was still under way.
     pub emergency: bool,
@@ -127,22 +127,22 @@ pub struct Unblinding {
 }
 
 impl Conductor {
-    /// For reading what is kept.
+    /// Reads the database.
     #[must_use]
     pub fn reader(&self) -> &Reader {
         self.shared.store.reader()
     }
 
-    /// For recording what `by` looks at.
+    /// Records what `by` looks at.
     #[must_use]
     pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
         Recorder::of_server(&self.shared.store, by.into(), Arc::clone(&self.shared.clock))
     }
 
-    /// Whether what was said, answered and recorded in `session` may be read.
+    /// Checks that the comments, answers and recordings of `session` may be read.
     ///
     /// # Errors
-    /// When its participant withdrew, or the database failed.
+    /// If its participant withdrew, or the database failed.
     pub async fn check_reading(&self, session: SessionId) -> Result<(), ConductError> {
         let withdrawn = self.shared.store.reader().is_withdrawn(session).await?;
         Ok(permission::check_reading(withdrawn)?)
@@ -151,15 +151,15 @@ impl Conductor {
     /// The participants, by code.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn participants(&self) -> Result<Vec<Participant>, ConductError> {
         Ok(self.shared.store.reader().participants().await?)
     }
 
-    /// Adds a participant; one that is there already stays.
+    /// Adds a participant; an existing one stays.
     ///
     /// # Errors
-    /// When `code` is no code, or the disk failed.
+    /// If `code` is not a valid code, `by` may not add participants, or the disk failed.
     pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
         permission::check(by, Request::AddParticipant, CurrentSession::None)?;
         let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
@@ -172,10 +172,10 @@ impl Conductor {
         self.shared.library.summaries()
     }
 
-    /// The sessions, newest first; practice only where `practice` is set.
+    /// The sessions, newest first; practice sessions only if `practice` is set.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, ConductError> {
         Ok(self.shared.store.reader().sessions(practice).await?)
     }
@@ -183,7 +183,7 @@ impl Conductor {
     /// Session `session` in detail.
     ///
     /// # Errors
-    /// When there is none, or the database failed.
+    /// If there is no such session, or the database failed.
     pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
         let course = self.shared.load(session).await?;
         let withdrawal = self.withdrawal(&course).await?;
@@ -191,7 +191,7 @@ impl Conductor {
         let mut corrections = self.correction_lines(&course).await?;
         if withdrawal.is_some() {
             answers.clear();
-            // Whose session it was stays right: the withdrawal is that participant's.
+            // Corrections of the participant stay: they say who has withdrawn.
             corrections.retain(|correction| correction.field == Field::Participant);
         }
 
@@ -215,14 +215,14 @@ impl Conductor {
         })
     }
 
-    /// What happened in the session, and to camera and lens since it was made.
+    /// The events of the session, and those of camera and lens since the session was made.
     async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
         let reader = self.shared.store.reader();
         let clocks = &self.shared.run_clock.clocks;
         let events = reader.events(course.session()).await?;
         let devices = reader.device_events(course.session()).await?;
 
-        // In the order in which it happened, whatever was done to the wall clock meanwhile.
+        // In the order in which things happened, even if the wall clock was changed in between.
         let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
         for (run, event) in events {
             let text = event.kind.in_words(|segment| course.setting(segment));
@@ -290,7 +290,7 @@ impl Conductor {
     }
 }
 
-/// The scores of an answer that lacks no item of theirs, the weights of a workload index left aside.
+/// The scores of an answer without missing items. The weights of a workload index are left out.
 fn scores(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
     let told = |measure: &Measure| measure.score && measure.value.is_some() && !measure.name.starts_with("weight-of-");
     measures(kind, value).into_iter().filter(told).collect()

@@ -1,5 +1,5 @@
-//! What is done to studies: the rules decide, the disk takes it. The server does it beside its sessions; a command does
-//! it while no server runs.
+//! Changes to studies: the rules decide, then the disk stores them. The server makes changes beside its sessions; a
+//! command makes them while no server runs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,8 +22,8 @@ use crate::trial::study::signature::{Signature, Way};
 use crate::trial::study::stage::Stage;
 use crate::trial::study::state::{Change, StudyCircumstances, check_way};
 
-/// Studies, and what is done to them. Nobody else may do anything to a study meanwhile: the server calls it with the
-/// right to write in hand, and a command keeps servers out.
+/// Reads and changes studies. Nothing else may change a study at the same time: the server holds the right to write,
+/// and a command keeps servers out.
 #[derive(Clone)]
 pub struct Studies {
     book: StudyBook,
@@ -36,31 +36,31 @@ impl Studies {
         Self { book: StudyBook::of_server(store), protocols: library.protocols(), clock }
     }
 
-    /// Those of data folder `folder`, for a command. Keeps servers out until it is closed.
+    /// The studies in data folder `folder`, for a command. Keeps servers out until it is closed.
     ///
     /// # Errors
-    /// When there is no database, a server has it open, or it is not of this version.
+    /// If there is no database, a server has it open, or it is not of this version.
     pub async fn open(folder: &Path, library: &Library, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
         let book = StudyBook::open(folder).await?;
         Ok(Self { book, protocols: library.protocols(), clock })
     }
 
-    /// For reading.
+    /// Reads the database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {
         self.book.reader()
     }
 
-    /// Ends its connections where it has its own.
+    /// Closes the connections, if it has its own.
     pub async fn close(&self) {
         self.book.close().await;
     }
 
-    /// Plans the study that `definition`, the text of `file`, describes; this database runs `sites` of it, or all of
-    /// them where none are named.
+    /// Plans the study that `definition`, the text of `file`, describes. This database runs its sites `sites`, or all
+    /// sites if none are named.
     ///
     /// # Errors
-    /// When the definition is malformed, there is a study of its name, or it has no such site.
+    /// If the definition is malformed, a study of that name exists, or it has no such site.
     pub async fn plan(
         &self,
         way: Way,
@@ -77,7 +77,7 @@ impl Studies {
         let name = definition.name.clone();
         if self.reader().study_names().await?.iter().any(|known| known == name.as_str()) {
             return Err(ConductError::Conflict(format!(
-                "there is a study '{name}' already; a changed plan is another study: give it another name"
+                "there is already a study '{name}'; a changed plan is a new study and needs a new name"
             )));
         }
 
@@ -88,11 +88,11 @@ impl Studies {
         Ok(name)
     }
 
-    /// Changes study `name`. `random` is what its orders are drawn from; `on_screens` is the session that the
-    /// operator's page shows.
+    /// Changes study `name`. Its orders are drawn from `random`; `on_screens` is the session that the operator's page
+    /// shows.
     ///
     /// # Errors
-    /// When there is no such study, the rules refuse, or the disk failed.
+    /// If there is no such study, the rules refuse the change, or the disk failed.
     pub async fn change(
         &self,
         way: Way,
@@ -148,7 +148,7 @@ impl Studies {
         Ok(self.book.change(&study.definition.name, &change).await?)
     }
 
-    /// Records an emergency unblinding with its study: `events`, of which `unblinding` is one, go with it.
+    /// Records an emergency unblinding in its study, together with `events`, which include `unblinding`.
     pub(super) async fn session_unblinded(
         &self,
         enrolment: &Enrolment,
@@ -171,7 +171,7 @@ impl Studies {
         Ok(self.book.change(&study.definition.name, &change).await?)
     }
 
-    /// Study `name`.
+    /// The study called `name`.
     pub(super) async fn stored(&self, name: &str) -> Result<StoredStudy, ConductError> {
         if let Some(study) = self.reader().study(name).await? {
             return Ok(study);
@@ -182,7 +182,7 @@ impl Studies {
         Err(ConductError::NotFound(format!("there is no study '{name}'; there are: {known}")))
     }
 
-    /// The studies that take sessions now.
+    /// The studies that accept new sessions now.
     pub(super) async fn taking_sessions(&self) -> Result<Vec<StoredStudy>, ConductError> {
         let mut open = Vec::new();
         for name in self.reader().study_names().await? {
@@ -194,12 +194,12 @@ impl Studies {
         Ok(open)
     }
 
-    /// Now, by the monotonic clock that sessions go by; only a server has it.
+    /// The present moment on the monotonic clock of the sessions; `None` in a command, which has none.
     fn at(&self) -> Option<Moment> {
         self.book.run().map(|_| self.clock.now())
     }
 
-    /// Sessions of `study` for which a surgeon's device may still hold something that counts.
+    /// Number of sessions of `study` for which a surgeon's device may still hold something that counts.
     pub(super) async fn outstanding(&self, study: &StoredStudy) -> Result<usize, ConductError> {
         let reader = self.reader();
         let clocks = reader.run_clocks().await?;
@@ -215,7 +215,7 @@ impl Studies {
         Ok(outstanding)
     }
 
-    /// Now, on the time that goes on over the server's restarts.
+    /// The present time, on the clock that continues over the server's restarts.
     fn now(&self, clocks: &RunClocks) -> Timestamp {
         match self.book.run() {
             Some(run) => clocks.wall(run, self.clock.now()),
@@ -237,7 +237,7 @@ impl Studies {
         Ok(unblindings)
     }
 
-    /// The next event of a session that nobody is at, by whoever signed.
+    /// The next event of a session that is not under way, by the person who signed.
     async fn next_event(
         &self,
         session: SessionId,
@@ -251,7 +251,7 @@ impl Studies {
     }
 }
 
-/// The sites that a database runs: those of `wanted`, or all.
+/// The sites that a database runs: those in `wanted`, or all if it is empty.
 fn sites_here(definition: &Definition, wanted: &[String]) -> Result<Vec<String>, ConductError> {
     let known: Vec<String> = definition.sites.iter().map(|site| site.name.clone()).collect();
     if let Some(unknown) = wanted.iter().find(|site| !known.contains(site)) {

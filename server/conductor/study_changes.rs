@@ -1,4 +1,4 @@
-//! Studies as the server changes them: with the right to write in hand, beside its sessions.
+//! Changes to studies made by the server, which holds the right to write, beside its sessions.
 
 use super::course::Course;
 use super::studies::Studies;
@@ -10,17 +10,17 @@ use crate::trial::study::signature::{Signature, Way};
 use crate::trial::study::state::Change;
 
 impl Conductor {
-    /// The studies.
+    /// Reads and changes studies.
     #[must_use]
     pub fn studies(&self) -> &Studies {
         &self.shared.studies
     }
 
-    /// The study that `session` belongs to; none outside any study. Does not wait for the disk for the session under
-    /// way, whose lens somebody may want to stop.
+    /// The study that `session` belongs to; `None` outside studies. For the session under way it does not wait for the
+    /// disk, because somebody may want to stop the lens.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn study_of(&self, session: SessionId) -> Result<Option<String>, ConductError> {
         let under_way = self.shared.live().course_of(session).map(|course| course.study.clone());
         if let Some(study) = under_way {
@@ -32,7 +32,7 @@ impl Conductor {
     /// Plans a study; see [`Studies::plan`].
     ///
     /// # Errors
-    /// When the definition is malformed, there is a study of its name, or it has no such site.
+    /// If the definition is malformed, a study of that name exists, or it has no such site.
     pub async fn plan_study(
         &self,
         by: Role,
@@ -50,7 +50,7 @@ impl Conductor {
     /// Changes study `name`; see [`Studies::change`].
     ///
     /// # Errors
-    /// When there is no such study, the rules refuse, or the disk failed.
+    /// If there is no such study, the rules refuse the change, or the disk failed.
     pub async fn change_study(
         &self,
         by: Role,
@@ -60,7 +60,7 @@ impl Conductor {
     ) -> Result<(), ConductError> {
         self.to_the_end(move |shared| async move {
             let mut pen = shared.pen.lock().await;
-            // The database has to know whether the session in memory has ended.
+            // The database must know whether the session in memory has ended.
             shared.record_stops(&mut pen).await?;
             let on_screens = shared.live().course.as_ref().map(Course::session);
             let random = &mut pen.random;

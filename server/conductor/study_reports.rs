@@ -1,4 +1,4 @@
-//! What the pages and the command line read of studies. No order is in it.
+//! Reports on studies for the pages and the command line. They contain no order.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -20,71 +20,71 @@ use crate::trial::study::stage::Stage;
 /// A study in a list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct StudyLine {
-    /// Its name.
+    /// Name of the study.
     pub study: String,
-    /// Its title.
+    /// Title of the study.
     pub title: String,
-    /// How far it has come.
+    /// Stage of the study, from planned to unblinded.
     pub stage: Stage,
-    /// Sessions that were made in it.
+    /// Number of sessions made in it.
     pub sessions: usize,
-    /// Surgeons planned at the sites that this database runs.
+    /// Number of surgeons planned at the sites that this database runs.
     pub surgeons: usize,
 }
 
 /// A study in detail.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct StudyDetail {
-    /// Its line in the list.
+    /// The study's line in the list.
     #[serde(flatten)]
     pub line: StudyLine,
-    /// SHA-256 of its definition: the same at every site.
+    /// SHA-256 of the definition: the same at every site.
     pub definition_sha256: String,
-    /// Its definition, byte for byte.
+    /// The definition, byte for byte.
     pub definition: String,
-    /// How its sessions are ordered.
+    /// How sessions are ordered, the same as in each protocol.
     pub order: Order,
-    /// Its protocols.
+    /// The study's protocols.
     pub protocols: Vec<StudyProtocol>,
-    /// Its sites.
+    /// The study's sites.
     pub sites: Vec<SiteDetail>,
-    /// What becomes of places whose session does not stand.
+    /// Rules for the place of an aborted or withdrawn session.
     pub rules: PlaceRules,
     /// What to do when a list is used up.
     pub when_used_up: String,
-    /// Who may unblind all of it.
+    /// Names of the people who may unblind the whole study.
     pub may_unblind: Vec<String>,
-    /// How it will be analysed.
+    /// The planned analysis.
     pub analysis: String,
-    /// The line to print, publish or mail before the first session; none before the orders were drawn.
+    /// The line to print, publish or mail before the first session; none until the orders are drawn.
     pub commitment_line: Option<String>,
-    /// While it is closed: sessions for which a surgeon's device may still hold something that locking would keep from
-    /// counting.
+    /// Number of sessions for which a surgeon's device may still hold something that would not count after locking. 0
+    /// unless the study is closed.
     pub outstanding: usize,
-    /// Its sessions, in the order in which they were made.
+    /// The study's sessions, in the order in which they were made.
     pub study_sessions: Vec<StudySession>,
-    /// What happened to it, oldest first.
+    /// The study's events, oldest first.
     pub log: Vec<StudyLogLine>,
 }
 
 /// A protocol of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct StudyProtocol {
-    /// Its name.
+    /// Name of the protocol.
     pub name: String,
-    /// SHA-256 of its text.
+    /// SHA-256 of the protocol's text.
     pub sha256: String,
 }
 
 /// A site of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct SiteDetail {
-    /// As it is planned.
+    /// The site as planned.
     #[serde(flatten)]
     pub site: Site,
-    /// Whether this database runs it.
+    /// Whether this database runs the site.
     pub here: bool,
-    /// Sessions that were made there.
+    /// Number of sessions made at the site.
     pub sessions: usize,
 }
 
@@ -93,50 +93,50 @@ pub struct SiteDetail {
 pub struct StudySession {
     /// The session.
     pub session: SessionId,
-    /// Participant's code.
+    /// The participant's code.
     pub participant: String,
-    /// The right code, where it was corrected.
+    /// The corrected code; none if it was not corrected.
     pub corrected_participant: Option<String>,
-    /// Its site.
+    /// Name of the site.
     pub site: String,
-    /// Its protocol.
+    /// Name of the protocol.
     pub protocol: String,
-    /// Its place in the list of both, from 1.
+    /// Place in the list of this site and protocol, from 1.
     pub place: usize,
-    /// How far it came.
+    /// State of the session.
     pub status: SessionStatus,
-    /// Whether it was told which policies ran.
+    /// Whether the session's policies were revealed.
     pub unblinded: bool,
-    /// Whether its surgeon withdrew.
+    /// Whether the surgeon withdrew.
     pub withdrawn: bool,
 }
 
 /// An event of a study in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct StudyLogLine {
-    /// When, by the wall clock.
+    /// When it happened, by the wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// By which way: a role, or the command line.
+    /// Where it came from: a role, or the command line.
     pub by: &'static str,
-    /// Who, as the person said.
+    /// The person who did it, as given in the signature.
     pub person: String,
     /// What happened.
     pub text: String,
-    /// Why.
+    /// Reason for the change.
     pub reason: String,
 }
 
-/// A study that takes sessions now, for the operator to choose. Says nothing of its policies.
+/// A study that accepts new sessions now, for the operator to choose. Says nothing of its policies.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct OpenStudy {
-    /// Its name.
+    /// Name of the study.
     pub study: String,
-    /// Its title.
+    /// Title of the study.
     pub title: String,
-    /// The names of its sites that this database runs.
+    /// Names of the sites that this database runs.
     pub sites: Vec<String>,
-    /// Its protocols, as they were when it was planned.
+    /// The study's protocols, as they were when it was planned.
     pub protocols: Vec<ProtocolSummary>,
 }
 
@@ -144,7 +144,7 @@ impl Studies {
     /// All studies, in the order in which they were planned.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn lines(&self) -> Result<Vec<StudyLine>, ConductError> {
         let mut lines = Vec::new();
         for name in self.reader().study_names().await? {
@@ -156,7 +156,7 @@ impl Studies {
     /// Study `name` in detail.
     ///
     /// # Errors
-    /// When there is none, or the database failed.
+    /// If there is no such study, or the database failed.
     pub async fn detail(&self, name: &str) -> Result<StudyDetail, ConductError> {
         let study = self.stored(name).await?;
         let mut detail = StudyDetail::of(&study);
@@ -168,10 +168,10 @@ impl Studies {
 }
 
 impl Conductor {
-    /// The studies that take sessions now.
+    /// The studies that accept new sessions now.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn open_studies(&self) -> Result<Vec<OpenStudy>, ConductError> {
         let open = self.shared.studies.taking_sessions().await?;
         let summary = |study: StoredStudy| OpenStudy {
@@ -196,7 +196,7 @@ fn line(study: &StoredStudy) -> StudyLine {
 }
 
 impl StudyDetail {
-    /// That of `study`, without what may be outstanding.
+    /// The details of `study`; `outstanding` is 0.
     #[must_use]
     pub fn of(study: &StoredStudy) -> Self {
         let definition = &study.definition;

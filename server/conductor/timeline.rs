@@ -1,4 +1,4 @@
-//! A session over time: when each setting was inspected, the focal path, and what was said.
+//! A session over time: when each setting was inspected, the focal path, and the comments and answers.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -28,13 +28,13 @@ use crate::trial::voice::Ending;
 pub struct Timeline {
     /// When each setting was inspected.
     pub settings: Vec<SettingSpan>,
-    /// When the session was held, with the lens where it stood.
+    /// When the session was paused and the lens held where it was.
     pub pauses: Vec<PauseSpan>,
     /// The focal path.
     pub points: Vec<TimelinePoint>,
-    /// What was said.
+    /// The comments.
     pub comments: Vec<TimelineComment>,
-    /// Answers that do not count though they are their device's last word.
+    /// Answers that do not count, although they are their device's latest.
     pub set_aside: Vec<SetAside>,
 }
 
@@ -43,20 +43,20 @@ pub struct Timeline {
 pub struct SettingSpan {
     /// Setting, from 1.
     pub setting: usize,
-    /// From, seconds.
+    /// Start, in seconds.
     pub from: f64,
-    /// To, seconds; none while it lasts.
+    /// End, in seconds; none while it lasts.
     pub to: Option<f64>,
 }
 
-/// When the session was held, by someone or by a restart of the server.
+/// When the session was paused, by a person or by a restart of the server.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PauseSpan {
-    /// From, seconds. For a restart: when the server ended, as far as is known.
+    /// Start, in seconds. For a restart: when the server ended, as far as is known.
     pub from: f64,
-    /// To, seconds; none while it lasts.
+    /// End, in seconds; none while it lasts.
     pub to: Option<f64>,
-    /// Why, in words.
+    /// Reason in words.
     pub reason: String,
 }
 
@@ -65,17 +65,17 @@ pub struct PauseSpan {
 pub struct TimelinePoint {
     /// Setting, from 1.
     pub setting: i64,
-    /// Seconds.
+    /// When the frame was exposed, in seconds.
     pub seconds: f64,
-    /// Frame's number.
+    /// Number of the frame.
     pub frame: i64,
-    /// Focal power asked for, 0..=1.
+    /// Requested focal power, 0 to 1.
     pub asked: f64,
-    /// Focal power that the frame was exposed at, 0..=1.
+    /// Focal power at which the frame was exposed, 0 to 1.
     pub measured: Option<f64>,
-    /// The optimum, 0..=1, where a simulation knows it.
+    /// The optimum, 0 to 1, if a simulation knows it.
     pub optimal: Option<f64>,
-    /// The policy's focus metric, by a scale of its own; only once the session was unblinded.
+    /// The policy's focus metric, on a scale of its own; only after the session was unblinded.
     pub metric: Option<f64>,
 }
 
@@ -84,25 +84,25 @@ pub struct TimelinePoint {
 pub struct TimelineComment {
     /// The comment's key.
     pub key: IdempotencyKey,
-    /// When it was kept, by the server's wall clock.
+    /// When it was stored, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// When it was said, seconds: what it waited on the surgeon's device is taken off.
+    /// When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.
     pub seconds: f64,
-    /// Setting, from 1.
+    /// Setting, from 1; none outside settings.
     pub setting: Option<usize>,
     /// Number of the frame that was on screen.
     pub frame: Option<u64>,
-    /// Whether it arrived after the time in which what a surgeon's device held counted.
+    /// Whether it arrived after the time in which what a surgeon's device held still counted.
     pub late: bool,
-    /// What was said; nothing where it was erased.
+    /// The content of the comment; empty if it was erased.
     #[serde(flatten)]
     pub said: Said,
-    /// A researcher's note on it; of a voice comment what was said, typed out.
+    /// A researcher's note on the comment; for a voice comment, its transcript.
     pub note: Option<String>,
-    /// The recording of a voice comment.
+    /// The recording of a voice comment; none for other comments.
     pub voice: Option<TimelineVoice>,
-    /// When its words were erased, by the server's wall clock.
+    /// When its words were erased, by the server's wall clock; none if they were not.
     #[schema(value_type = Option<String>)]
     pub erased: Option<Timestamp>,
 }
@@ -110,43 +110,43 @@ pub struct TimelineComment {
 /// The recording of a voice comment.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TimelineVoice {
-    /// What it is; none while nothing of it has arrived.
+    /// Media type; none until a part of the recording has arrived.
     pub media_type: Option<String>,
-    /// How long it is, seconds.
+    /// Length in seconds.
     pub seconds: f64,
-    /// Why it ended; none where it was cut off, or goes on.
+    /// Why the recording ended; none if it was cut off or still continues.
     pub ended: Option<Ending>,
-    /// Pieces of about a second that have not arrived, though later ones have.
+    /// Number of pieces, of about a second each, that have not arrived although later ones have.
     pub missing: usize,
 }
 
-/// An answer that does not count: a later one from another device says something else, or it arrived too late.
+/// An answer that does not count: a later one from another device differs, or it arrived too late.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SetAside {
-    /// When it was kept, by the server's wall clock.
+    /// When it was stored, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// When it was given, seconds: what it waited on the surgeon's device is taken off.
+    /// When it was given, in seconds: the time that it waited on the surgeon's device is subtracted.
     pub seconds: f64,
     /// Setting, from 1; none for a closing question.
     pub setting: Option<usize>,
-    /// The question's id.
+    /// The question's identifier.
     pub question: String,
-    /// The question.
+    /// The question's text.
     pub text: String,
     /// The answer.
     pub value: AnswerValue,
-    /// The answer that counts instead, if any does.
+    /// The answer that counts instead; none if there is none.
     pub counted: Option<AnswerValue>,
     /// Whether it arrived too late.
     pub late: bool,
 }
 
 impl Conductor {
-    /// Session `session` over time as `by` may see it, its focal path thinned to about `points` a setting.
+    /// Session `session` over time, as `by` may see it. The focal path is thinned to about `points` points per setting.
     ///
     /// # Errors
-    /// When there is none, its participant withdrew, or the database failed.
+    /// If there is no such session, its participant withdrew, or the database failed.
     pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.shared.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
@@ -198,20 +198,20 @@ impl Conductor {
     }
 }
 
-/// When the session's seconds begin: at its start, or when it was made if it has not started.
+/// The zero of the session's seconds: its start, or the time when it was made if it has not started.
 fn start(course: &Course, events: &[(Timestamp, Event)]) -> Timestamp {
     let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
     started.map_or(course.made.stamp.wall, |(at, _)| *at)
 }
 
-/// What playing the recordings of a session needs to know of it.
+/// The facts about a session that are needed to play its recordings.
 #[derive(Debug, Clone)]
 pub struct Played {
     start: Timestamp,
     clocks: Arc<RunClocks>,
-    /// What its protocol has recorded.
+    /// What the protocol asks to record.
     pub asked: Record,
-    /// Whether it has ended.
+    /// Whether the session has ended.
     pub ended: bool,
 }
 
@@ -231,10 +231,10 @@ impl Played {
 }
 
 impl Conductor {
-    /// What playing the recordings of `session` needs to know of it.
+    /// The facts about `session` that are needed to play its recordings.
     ///
     /// # Errors
-    /// When `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
+    /// If `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
     pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
         let course = self.shared.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
@@ -261,7 +261,7 @@ fn told_of(recorded: &Recorded) -> TimelineVoice {
     }
 }
 
-/// When the words of the record with this key were erased.
+/// When the words of the record with this key were erased; `None` if they were not.
 pub(super) fn erased(erasures: &[StoredErasure], subject: Erasable, key: &IdempotencyKey) -> Option<Timestamp> {
     let key = key.to_string();
     let its_own = |stored: &&StoredErasure| stored.erasure.subject == subject && stored.erasure.record == key;
@@ -308,13 +308,12 @@ fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
     spans
 }
 
-/// A restart is recorded when the server is back. The server ended when the setting's clock stopped
-/// or the last frame before was exposed, whichever is later.
+/// When the session was paused. A restart is recorded only when the server is back, but the pause starts when the
+/// server ended: when the setting's clock stopped, or when the last frame before was exposed, whichever is later.
 fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
     let mut spans: Vec<PauseSpan> = Vec::new();
     let mut inspecting = false;
-    // When the inspection last began or resumed, and how much of the setting, in milliseconds, had
-    // been inspected by then.
+    // When the inspection last began or resumed, and how many milliseconds of the setting had been inspected by then.
     let mut since = 0.0;
     let mut before = 0;
     for &(at, kind) in events {
@@ -350,7 +349,7 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     spans
 }
 
-/// That many milliseconds in seconds.
+/// Converts milliseconds to seconds.
 fn milliseconds(count: u64) -> f64 {
     Duration::from_millis(count).as_secs_f64()
 }
@@ -373,12 +372,12 @@ mod tests {
             (5.0, EventKind::SegmentStarted { segment }),
             (15.0, paused(10_000)),
             (20.0, EventKind::Resumed),
-            // Inspected for 4 s more, so until 24 s; back after 16 s; again before anyone went on.
+            // Inspected for 4 s more, so until 24 s. Back after 16 s. Restarted again before anyone resumed.
             (40.0, restarted(14_000)),
             (50.0, restarted(14_000)),
             (60.0, EventKind::Resumed),
             (66.0, EventKind::SegmentFinished { segment, inspected_ms: 20_000 }),
-            // During the questions no clock runs.
+            // No clock runs during the questions.
             (80.0, restarted(20_000)),
         ];
 
@@ -396,7 +395,7 @@ mod tests {
             pauses(&events, points).iter().map(|span| (span.from, span.to)).collect()
         };
         assert_eq!(spans(&[]), [(15.0, Some(20.0)), (24.0, Some(60.0)), (80.0, None)]);
-        // The clock is kept once a second; a frame shown after that tells more.
+        // The clock is stored once a second; a frame after that gives a later time.
         assert_eq!(spans(&[at(5.0), at(24.7), at(40.1)])[1], (24.7, Some(60.0)));
         assert_eq!(pauses(&events, &[])[0].reason, "Paused: phone");
     }

@@ -1,4 +1,4 @@
-//! From a session to what each role sees of it. Policies stay behind here.
+//! Makes each role's view of a session. The views contain no policies.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use crate::trial::question::AnswerValue;
 use crate::trial::session::PauseCause;
 use crate::trial::view::{LogLine, OperatorView, SurgeonView};
 
-/// The surgeon's and the operator's view of `course` at `now`; `because`: why the disk did not take
-/// what stopped it.
+/// The surgeon's and the operator's view of `course` at `now`. `because` says why the last attempt to record a stop
+/// failed.
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
     let withdrawn = course.state.withdrawn();
@@ -57,7 +57,7 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
     }
 }
 
-/// The setting in progress; at the end, the last one.
+/// Number of the current setting, from 1; at the end, of the last one. 0 before the start.
 fn setting(course: &Course) -> usize {
     let state = &course.state;
     match state.phase() {
@@ -73,8 +73,7 @@ fn answers(course: &Course) -> BTreeMap<String, AnswerValue> {
     state.questions().iter().filter_map(|question| Some((question.id.clone(), kept(&question.id)?))).collect()
 }
 
-/// The latest events in words. A reason for unblinding may name a policy, so it is the researcher's
-/// alone.
+/// The latest events in words. The reason for an unblinding may name a policy, so only the researcher sees it.
 fn log(course: &Course) -> Vec<LogLine> {
     let line = |event: &Event| {
         let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));

@@ -1,4 +1,5 @@
-//! Voice: pieces of recordings as they arrive, and their erasure when the protocol's time is over.
+//! Voice: stores pieces of recordings as they arrive, and erases recordings when the protocol's retention period is
+//! over.
 
 use std::time::Duration;
 
@@ -14,26 +15,26 @@ use crate::trial::protocol::Protocol;
 use crate::trial::role::Role;
 use crate::trial::voice::{self, MediaType, NewPiece};
 
-/// Time between two looks for recordings whose time is over.
+/// Interval between two searches for recordings whose retention period is over.
 const DAILY: Duration = Duration::from_hours(24);
 
-/// Time until the next look where this one could not be finished, as while a session is under way.
+/// Time until the next attempt if this one could not finish, for example because a session is under way.
 const SOON: Duration = Duration::from_hours(1);
 
 impl Conductor {
-    /// Keeps a piece of a recording. When this returns, it is on disk. Pieces may come late, and in any order.
+    /// Stores a piece of a recording. It is on disk when this returns. Pieces may come late, and in any order.
     ///
     /// # Errors
-    /// When the session has no such voice comment, the piece is no sound or too large, something else stands in its
-    /// place, or the disk failed.
+    /// If the session has no such voice comment, the piece is not sound or too large, its place is taken by something
+    /// else, or the disk failed.
     pub async fn voice_piece(&self, piece: NewPiece) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.voice_piece(piece).await }).await
     }
 
-    /// The sound of a voice comment of `session`, with what it is.
+    /// The sound of a voice comment of `session`, and its media type.
     ///
     /// # Errors
-    /// When there is none, it was erased, the participant withdrew, or the database failed.
+    /// If there is none, it was erased, the participant withdrew, or the database failed.
     pub async fn voice_audio(
         &self,
         session: SessionId,
@@ -45,21 +46,23 @@ impl Conductor {
         found.ok_or_else(none)
     }
 
-    /// Erases what was said aloud once it has been kept as long as its protocol says: how many recordings.
+    /// Erases recordings whose retention period by their protocol is over. Returns how many.
     ///
     /// # Errors
-    /// When a session is under way, or the disk failed.
+    /// If a session is under way, or the disk failed.
     pub async fn erase_expired_voice(&self) -> Result<usize, ConductError> {
         self.to_the_end(|shared| async move { shared.erase_expired_voice().await }).await
     }
 
-    /// Erases at once, and then daily, what was said aloud and has been kept long enough. Never ends; drop it to stop.
+    /// Erases expired recordings now and then daily. Never returns; drop it to stop.
     pub async fn keep_voice_no_longer(self) {
         loop {
             let wait = match self.erase_expired_voice().await {
                 Ok(0) => DAILY,
                 Ok(erased) => {
-                    tracing::info!("{erased} voice comments were erased: their protocols keep them no longer");
+                    tracing::info!(
+                        "{erased} voice comments were erased, because the time that their protocols keep them is over"
+                    );
                     DAILY
                 }
                 Err(ConductError::Conflict(_)) => SOON,
@@ -78,7 +81,7 @@ impl Shared {
         let media_type = voice::check_piece(&new)?;
         let NewPiece { comment, session, piece, media_type: _, through_ms, ended, audio } = new;
 
-        // No pen: a piece changes nothing that anybody decides, and must not wait for those who do.
+        // Does not take the pen: a piece affects no decision, and must not wait for those that are being made.
         let stamp = self.stamp();
         let piece = VoicePiece { comment, session, piece, media_type, through_ms, ended, audio, stamp };
         match self.store.keep_voice(&piece).await? {
@@ -113,7 +116,7 @@ impl Shared {
             return Ok(0);
         }
 
-        // Erasing writes the whole database anew, for which what a surgeon says would have to wait.
+        // Erasing rewrites the whole database, and a surgeon's comments would have to wait for it.
         let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
         if under_way {
             return Err(ConductError::Conflict("a session is under way; voice is erased once it has ended".to_owned()));
@@ -123,8 +126,8 @@ impl Shared {
     }
 }
 
-/// For how many days the protocol keeps this recording, if that time is over at `now`. A protocol that cannot be read
-/// erases nothing.
+/// The protocol's retention period for this recording in days, if it is over at `now`. If the protocol cannot be read,
+/// nothing is erased.
 fn days_over(kept: &KeptVoice, now: Timestamp) -> Option<u32> {
     let protocol = Protocol::parse_kept(&kept.protocol_toml, "the protocol kept with the session").ok()?;
     let days = protocol.voice_days?;

@@ -1,4 +1,4 @@
-//! From what a policy decides to advice that the loop can follow.
+//! Checks a policy's decision, so that the loop can follow it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -6,44 +6,43 @@ use std::time::Duration;
 use crate::autofocus::{Decision, PolicyError};
 use crate::lens::FocalPower;
 
-/// A belief longer than this is not shown.
+/// Largest number of values of a belief that is shown.
 const LONGEST_BELIEF: usize = 4096;
 
-/// A policy's decision, checked: it can be followed.
+/// A policy's decision after the check: it can be followed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Advice {
-    /// Where to go.
+    /// Focal power to go to.
     pub target: FocalPower,
     /// The policy's focus metric, if it has one and it is finite.
     pub metric: Option<f64>,
     /// The policy's belief, if it has one.
     pub belief: Option<Arc<[f32]>>,
-    /// Time the policy's step took.
+    /// Duration of the policy's step.
     pub took: Duration,
 }
 
 /// Why a policy gave no advice.
 #[derive(Debug)]
 pub enum Failure {
-    /// It panicked, with this message; its thread has ended.
+    /// It panicked with this message. Its thread has ended.
     Panicked(String),
-    /// It could not be made; its thread has ended.
+    /// It could not be built. Its thread has ended.
     Unavailable(PolicyError),
-    /// It asked for this, which is not a focal power.
+    /// It asked for this number, which is not a focal power.
     InvalidTarget(f64),
 }
 
 impl Advice {
-    /// Checks `decision`, which took the policy `took`. This is the one place where a policy's
-    /// decision becomes something to act on.
+    /// Checks `decision`; the policy's step took `took`. Every decision of a policy passes this check before the loop
+    /// acts on it.
     ///
     /// # Errors
-    /// When its target is not a focal power.
+    /// If its target is not a focal power.
     pub fn new(decision: Decision, took: Duration) -> Result<Self, Failure> {
         let target = FocalPower::new(decision.target).map_err(|_| Failure::InvalidTarget(decision.target))?;
 
-        // Metric and belief are only shown. A bad one is left out, and the target is still
-        // followed.
+        // Metric and belief are only shown. An invalid one is left out, and the target is still followed.
         let metric = decision.metric.filter(|metric| metric.is_finite());
         let belief = decision.belief.filter(|belief| can_be_shown(belief));
 

@@ -1,20 +1,20 @@
-//! Estimates which focal power a frame was exposed at, for a lens that cannot be read.
+//! Estimates the focal power at which a frame was exposed, for a lens that cannot be read.
 
 use crate::autofocus::STEP;
 use crate::clock::Moment;
 use crate::lens::{FocalPower, LensDynamics, Optics, Response};
 
-/// This close to its destination a lens counts as there. An eighth of a policy's step blurs nothing that can be seen,
-/// and policies stay on the grid of the steps that they asked for.
+/// A lens this close to its destination counts as arrived. An eighth of a policy's step causes no visible blur. So
+/// policies stay on the grid of their own steps.
 const THERE: f64 = STEP / 8.0;
 
-/// Follows the commands that a lens took, and tells where its glass was at a moment: the middle of an exposure.
+/// Follows the commands that a lens accepted, and computes its focal power at a moment, such as the middle of an
+/// exposure.
 ///
-/// With 15 ms of settling, frames at 50 a second and exposures of up to 10 ms, the lens has always
-/// arrived when the next frame is exposed, so that policies see exactly the focal power they asked for,
-/// as in the paper's simulation. A slower lens, a faster camera or a longer exposure shows them frames
-/// from the way there; those are attributed to the point on the way that the lens's dynamics give,
-/// never to the destination.
+/// With 15 ms of settling, 50 frames per second and exposures of up to 10 ms, the lens has always arrived when the next
+/// frame is exposed. So policies see exactly the focal power they asked for, as in the paper's simulation. With a
+/// slower lens, a faster camera or a longer exposure, some frames are exposed while the lens still moves. They are
+/// attributed to the focal power that the lens's dynamics predict, never to the destination.
 #[derive(Debug)]
 pub struct Attribution {
     way: Response,
@@ -22,12 +22,12 @@ pub struct Attribution {
 }
 
 impl Attribution {
-    /// A lens at rest at `start`.
+    /// Begins with the lens at rest at `start`.
     pub fn new(dynamics: LensDynamics, start: FocalPower) -> Self {
         Self { way: Response::new(dynamics, 0.0, start), destination: start }
     }
 
-    /// The lens took the command to go to `target` at `now`.
+    /// Records that the lens accepted the command to go to `target` at `now`.
     pub fn commanded(&mut self, now: Moment, target: FocalPower) {
         if target != self.destination {
             self.way.command(now, target);
@@ -35,13 +35,13 @@ impl Attribution {
         }
     }
 
-    /// Where the lens was at `moment`.
+    /// The lens's focal power at `moment`.
     pub fn focal_power(&self, moment: Moment) -> FocalPower {
         let on_the_way = self.way.focal_power_at(moment);
         if on_the_way.distance(self.destination) < THERE { self.destination } else { on_the_way }
     }
 
-    /// Whether the lens had arrived at its latest destination by then.
+    /// Whether the lens had arrived at its latest destination by `moment`.
     pub fn settled(&self, moment: Moment) -> bool {
         self.focal_power(moment) == self.destination
     }

@@ -1,4 +1,4 @@
-//! The eye: what policies see of a frame, whatever kind of picture it carries.
+//! The eye: makes what policies see of a frame, from a mosaic or a colour picture.
 
 use super::Hold;
 use super::pilot::HoldReason;
@@ -6,33 +6,34 @@ use crate::autofocus::FieldOfView;
 use crate::camera::FrameImage;
 use crate::imaging::{ContentArea, Patch, PatchArea, Reconstructor, View, rgb_patch, rgb_view};
 
-/// Finds the patch and reconstructs what a policy uses of the picture, and nothing else.
+/// Finds the patch, and reconstructs only the part of the picture that a policy uses.
 pub struct Eye {
     reconstructor: Reconstructor,
 }
 
 impl Eye {
-    /// An eye for mosaics that `reconstructor` is calibrated for, and for colour pictures.
+    /// An eye for colour pictures, and for mosaics of the camera for which `reconstructor` is calibrated.
     #[must_use]
     pub const fn new(reconstructor: Reconstructor) -> Self {
         Self { reconstructor }
     }
 
-    /// Where the patch of `image` is: at the centre of `content`, or of the picture without one.
+    /// Place of the patch in `image`: at the centre of `content`, or of the picture if there is no content area.
     ///
     /// # Errors
-    /// When the picture is smaller than a patch.
+    /// If the picture is smaller than a patch.
     pub fn find(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<PatchArea, HoldReason> {
         let (width, height) = match image {
             FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
             FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
         };
 
-        PatchArea::central(width, height, content)
-            .map_err(|error| HoldReason::new(Hold::CameraFailed, &format!("the camera's picture is no use: {error}")))
+        PatchArea::central(width, height, content).map_err(|error| {
+            HoldReason::new(Hold::CameraFailed, &format!("the camera's picture cannot be used: {error}"))
+        })
     }
 
-    /// The patch of `image` at `area`.
+    /// Reconstructs the patch of `image` at `area`.
     #[must_use]
     pub fn patch(&self, image: &FrameImage, area: PatchArea) -> Patch {
         match image {
@@ -41,7 +42,7 @@ impl Eye {
         }
     }
 
-    /// What a policy with this `field` of view sees of `image`, whose patch is at `area`.
+    /// Reconstructs what a policy with the field of view `field` sees of `image`, whose patch is at `area`.
     #[must_use]
     pub fn look(&self, image: &FrameImage, area: PatchArea, field: FieldOfView) -> View {
         match (field, image) {

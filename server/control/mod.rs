@@ -1,5 +1,5 @@
-//! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for
-//! no viewer, disk or database.
+//! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. It never waits for a viewer,
+//! disk or database.
 
 mod advice;
 mod attribution;
@@ -36,21 +36,21 @@ use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::{FocalPower, LensHealth};
 use crate::priority::Standing;
 
-/// Who drives the lens.
+/// What drives the lens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
-    /// Nobody: the lens stays where it is put.
+    /// No policy: the lens goes to this focal power and stays there.
     Manual(FocalPower),
-    /// A fresh instance of a policy, from `start` if given, else from where the lens is.
+    /// A new instance of a policy.
     Policy {
-        /// Which.
+        /// Name of the policy.
         name: PolicyName,
-        /// Focal power to begin at.
+        /// Focal power to begin at; `None` for where the lens is.
         start: Option<FocalPower>,
     },
-    /// Nobody asks the policy and the lens holds still (a paused session).
+    /// Nothing: no policy is asked, and the lens holds still (a paused session).
     Hold {
-        /// Focal power to go to and hold, if given; else the lens stays where it is.
+        /// Focal power to go to and hold; `None` to stay where the lens is.
         at: Option<FocalPower>,
     },
 }
@@ -58,42 +58,42 @@ pub enum Drive {
 /// A command to the loop. Sending never blocks; the loop looks for commands between two frames.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
-    /// Change who drives, and mark every later step as belonging to `segment`.
+    /// Changes what drives the lens, and the segment of later steps.
     Drive {
         /// The new driver.
         drive: Drive,
-        /// The trial segment that later steps belong to.
+        /// The trial's segment to which later steps belong, if any.
         segment: Option<SegmentId>,
     },
-    /// The content area found by the imaging thread, or that none is seen.
+    /// The content area found by the imaging thread; `None` if it sees none.
     ContentArea(Option<ContentArea>),
 }
 
-/// One step of the loop: what telemetry keeps.
+/// One step of the loop, as recorded by telemetry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepRecord {
-    /// Frame's number.
+    /// The frame's number.
     pub frame: u64,
     /// End of the exposure.
     pub exposed_at: Moment,
-    /// Trial segment, if one is running.
+    /// The trial's segment, if one is running.
     pub segment: Option<SegmentId>,
     /// Policy that was asked, if any.
     pub policy: Option<PolicyName>,
-    /// Focal power asked of the lens after this frame.
+    /// Focal power that the lens was asked for after this frame.
     pub asked: FocalPower,
-    /// Focal power at the middle of the frame's exposure, by the lens's dynamics; none while the
-    /// lens is away.
+    /// Focal power at the middle of the frame's exposure, according to the lens's dynamics; `None` while the lens is
+    /// disconnected.
     pub measured: Option<FocalPower>,
-    /// The policy's focus metric.
+    /// The focus metric that the policy computed, if any.
     pub metric: Option<f64>,
-    /// Duration of the policy's step, microseconds.
+    /// Duration of the policy's step, in microseconds; 0 without one.
     pub policy_micros: u32,
-    /// From end of exposure to the lens command, microseconds.
+    /// Time from the end of the exposure to the lens command, in microseconds.
     pub latency_micros: u32,
-    /// Why the loop held the lens instead of following the policy, if it did.
+    /// Why the loop held the lens instead of following the policy; `None` if it did not.
     pub held: Option<Hold>,
-    /// The optimum, where a simulation knows it.
+    /// The optimum, if the camera is simulated and knows it.
     pub optimal: Option<FocalPower>,
 }
 
@@ -101,31 +101,31 @@ pub struct StepRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
-    /// The policy panicked; a fresh instance is being made.
+    /// The policy panicked. A new instance is being made.
     PolicyPanicked,
     /// The policy asked for an invalid focal power.
     PolicyNonsense,
-    /// The policy took longer than a frame.
+    /// The policy took longer than a frame, or is starting.
     PolicySlow,
-    /// The policy cannot run here, or there is none of that name.
+    /// The policy cannot run here, or no policy has that name.
     PolicyUnavailable,
-    /// The lens did not take the command.
+    /// The lens did not accept the command.
     LensFailed,
-    /// No frame came.
+    /// No frame came, or the frames are too small for a patch.
     CameraFailed,
     /// Paused on request.
     Paused,
 }
 
 impl Hold {
-    /// Whether the policy is the cause. Such holds tell policies apart: only learned ones take time
-    /// to start and to compute.
+    /// Whether the policy is the cause. Such holds could unblind a session: only learned policies take time to start
+    /// and to compute.
     #[must_use]
     pub const fn caused_by_policy(self) -> bool {
         matches!(self, Self::PolicyPanicked | Self::PolicyNonsense | Self::PolicySlow | Self::PolicyUnavailable)
     }
 
-    /// Its name, as in the database and in exports.
+    /// Name in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -140,92 +140,91 @@ impl Hold {
     }
 }
 
-/// A frame with everything the loop knew when it was done with it. Goes to the imaging thread.
+/// A frame with all results of its step. Goes to the imaging thread.
 #[derive(Debug, Clone)]
 pub struct ControlledFrame {
     /// The frame.
     pub frame: Frame,
-    /// Where the patch was.
+    /// Place of the patch in the frame.
     pub patch: PatchArea,
-    /// Content area in use.
+    /// Content area by which the patch was placed, if known.
     pub content_area: Option<ContentArea>,
-    /// The step taken on it.
+    /// The record of its step.
     pub record: StepRecord,
     /// The policy's belief, if it has one.
     pub belief: Option<Arc<[f32]>>,
 }
 
-/// The loop's state; published a few times a second and at every change. Each role is told a part
-/// of it.
+/// The loop's state, published a few times a second and at every important change. Each role gets only a part of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlStatus {
-    /// When the loop said so. One that says nothing for seconds has stalled.
+    /// Time of this status. If it is seconds old, the loop has stalled.
     pub at: Moment,
-    /// The camera.
+    /// The camera's health.
     pub camera: CameraHealth,
-    /// What can be changed on it while it runs.
+    /// The camera's settings that can be changed while it runs.
     pub camera_offer: CameraOffer,
-    /// The lens.
+    /// The lens's health.
     pub lens: LensHealth,
-    /// Policy in charge, if one is.
+    /// The policy that drives the lens, if any.
     pub policy: Option<PolicyName>,
-    /// Last focal power asked for.
+    /// The last focal power that the lens accepted.
     pub focal_power: FocalPower,
-    /// Why the lens is being held, if it is.
+    /// Why the lens is held; `None` if it is not.
     pub held: Option<Hold>,
-    /// For how long it has been held without a break, for the policy's sake or for other reasons:
-    /// where one follows the other, a policy's slow start after a long pause, it counts from there.
+    /// How long the lens has been held without a break because of the policy, or without a break for other causes. If
+    /// one follows the other, such as a policy's slow start after a long pause, the time starts again.
     pub held_for: Duration,
-    /// The hold in words, and what to do.
+    /// The reason for the hold in words, and what to do.
     pub message: Option<Arc<str>>,
-    /// Loop steps a second over the last second.
+    /// Steps of the loop in the last second.
     pub steps_per_second: f64,
-    /// Steps since the start.
+    /// Steps since the loop started.
     pub steps: u64,
-    /// Telemetry records dropped because the writer fell behind.
+    /// Telemetry records dropped because the writer was too slow.
     pub telemetry_dropped: u64,
-    /// Median latency from exposure to lens command over the last second, microseconds.
+    /// Median latency from the end of the exposure to the lens command over the last second, in microseconds.
     pub latency_p50_micros: u32,
-    /// 99th percentile of the same.
+    /// 99th percentile of the same latency, in microseconds.
     pub latency_p99_micros: u32,
-    /// How the loop stands to other programs.
+    /// Scheduling priority of the loop's thread.
     pub priority: Standing,
 }
 
 /// Access to the loop for the rest of the server.
 #[derive(Clone)]
 pub struct ControlHandle {
-    /// Commands in.
+    /// Sends commands to the loop.
     pub commands: mpsc::UnboundedSender<Command>,
-    /// Status out.
+    /// The loop's latest status.
     pub status: watch::Receiver<Arc<ControlStatus>>,
-    /// The latest frame out, for the imaging thread.
+    /// The latest frame, for the imaging thread.
     pub frames: Arc<LatestSlot<ControlledFrame>>,
-    /// The camera's settings, where it has any.
+    /// The camera's settings, if it has any.
     pub camera: Option<Controls>,
-    /// Where frames leave to be recorded.
+    /// Connects a recorder to the loop's frames.
     pub tap: Tap,
 }
 
 /// Access to the loop's state and frames, without the right to command it.
 #[derive(Clone)]
 pub struct ControlObserver {
-    /// The loop's state.
+    /// The loop's latest status.
     pub status: watch::Receiver<Arc<ControlStatus>>,
     /// The latest frame.
     pub frames: Arc<LatestSlot<ControlledFrame>>,
-    /// The camera's settings, where it has any.
+    /// The camera's settings, if it has any.
     pub camera: Option<Controls>,
 }
 
 impl ControlHandle {
-    /// The same without the right to command the loop.
+    /// The same access without the right to command the loop.
     #[must_use]
     pub fn observer(&self) -> ControlObserver {
         ControlObserver { status: self.status.clone(), frames: Arc::clone(&self.frames), camera: self.camera.clone() }
     }
 
-    /// Tells the loop something; what is sent after the loop's end is dropped.
+    /// Sends a command to the loop. After the loop's end it is dropped.
     pub fn send(&self, command: Command) {
         let _ = self.commands.send(command);
     }

@@ -1,4 +1,4 @@
-//! The pilot: asks the policy in charge, and replaces an instance that fails.
+//! The pilot: asks the policy in charge, and replaces its instance if it fails.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -10,25 +10,25 @@ use super::runner::Runner;
 use crate::autofocus::{FieldOfView, Observation, PolicyName, Registry};
 use crate::clock::{Clock, Moment};
 
-/// Time from a failure to the next attempt: long enough not to flood the log, short enough that the
-/// loop is back well within a second of the reason's end.
+/// Time from a failure to the next attempt. Long enough not to flood the log; short enough that the loop recovers well
+/// within a second after the cause is gone.
 const RETRY: Duration = Duration::from_millis(200);
-/// An instance that has answered before is given up when it is late by this much.
+/// Longest time for an answer of an instance that has answered before. After that the instance is abandoned.
 const HUNG: Duration = Duration::from_millis(250);
-/// A fresh instance may take this long for its first answer: it may have to load.
+/// Longest time for the first answer of a new instance, which may have to load.
 const STARTING: Duration = Duration::from_millis(500);
-/// While this many given-up threads still hang, a failed policy is not tried again.
+/// While so many abandoned threads still hang, a failed policy is not started again.
 const MOST_HUNG: usize = 4;
-/// While this many hang, a newly chosen policy is not tried either.
+/// While so many hang, a newly chosen policy is not started either.
 const MOST_HUNG_AT_ALL: usize = 32;
 
-/// Why the policy's advice cannot be followed, and what is being done. The words do not name the
-/// policy, so that they may be shown during a blinded session.
+/// Why the lens is held, and what is being done. The words do not name the policy, so that they can be shown during a
+/// blinded session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HoldReason {
-    /// The kind.
+    /// The kind of reason.
     pub hold: Hold,
-    /// In words.
+    /// The reason in words, and what to do.
     pub message: Arc<str>,
 }
 
@@ -40,11 +40,11 @@ impl HoldReason {
     }
 }
 
-/// Has at most one policy in charge, on a runner's thread.
+/// Keeps at most one policy in charge, on a runner's thread.
 pub struct Pilot {
     registry: Arc<Registry>,
     clock: Arc<dyn Clock>,
-    /// How long an answer is waited for: one frame.
+    /// Longest wait for an answer: one frame period.
     patience: Duration,
     policy: Option<PolicyName>,
     runner: Option<Runner>,
@@ -53,19 +53,19 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// Nobody in charge; answers will be waited for `patience` long.
+    /// A pilot without a policy. It will wait at most `patience` for an answer.
     pub fn new(registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let registry = Arc::new(registry);
         Self { registry, clock, patience, policy: None, runner: None, failed: None, hung: Vec::new() }
     }
 
-    /// Puts a fresh instance of `policy` in charge, or nobody.
+    /// Puts a new instance of `policy` in charge, or no policy.
     pub fn engage(&mut self, policy: Option<PolicyName>) {
         self.dismiss();
         self.failed = None;
         self.policy = policy;
         if self.policy.is_some() {
-            // A failure to start is met again, and reported, at the first question.
+            // A failure to start is reported at the first question, which tries again.
             let _ = self.start(MOST_HUNG_AT_ALL);
         }
     }
@@ -75,15 +75,15 @@ impl Pilot {
         self.policy.as_ref()
     }
 
-    /// What the policy in charge uses of a frame.
+    /// The field of view of the policy in charge.
     pub fn field_of_view(&self) -> FieldOfView {
         self.runner.as_ref().map_or(FieldOfView::Wide, Runner::field_of_view)
     }
 
-    /// What the policy advises on seeing this. Waits at most one frame.
+    /// Asks the policy for advice on `seen`. Waits at most one frame period.
     ///
     /// # Errors
-    /// When there is no advice to follow.
+    /// If there is no advice to follow.
     pub fn ask(&mut self, seen: &Observation<'_>) -> Result<Advice, HoldReason> {
         let now = self.clock.now();
         if self.runner.is_none() {
@@ -105,8 +105,8 @@ impl Pilot {
         }
     }
 
-    /// An instance still busy with an earlier frame is left to it for a while; its answer, being
-    /// late, is thrown away.
+    /// Handles an instance that is still busy with an earlier frame. It may take a while longer; its late answer is
+    /// discarded.
     fn clear_late_answer(&mut self, now: Moment) -> Result<(), HoldReason> {
         let Some(runner) = &mut self.runner else { return Ok(()) };
         let Some(since) = runner.open_since() else { return Ok(()) };
@@ -135,7 +135,7 @@ impl Pilot {
         if self.hung.len() >= most_hung {
             return Err(HoldReason::new(
                 Hold::PolicySlow,
-                "the policy hangs again and again; the lens is held: choose another one",
+                "the policy hangs again and again; the lens is held. Choose another policy",
             ));
         }
 
@@ -161,9 +161,8 @@ impl Pilot {
     }
 }
 
-/// Why the lens is held after `failure`. The details go to the debug log alone: the operator of a
-/// blinded session may read the log, and only some policies fail in these ways. Outside sessions
-/// the status shows them.
+/// The reason for a hold after `failure`. Only the debug log gets the details: the operator of a blinded session may
+/// read the log, and only some policies fail in these ways. Outside a session the status shows the kind of failure.
 fn hold_reason(failure: Failure) -> HoldReason {
     match failure {
         Failure::Panicked(message) => {
@@ -174,7 +173,7 @@ fn hold_reason(failure: Failure) -> HoldReason {
             tracing::debug!(%error, "the policy cannot be started");
             HoldReason::new(
                 Hold::PolicyUnavailable,
-                "the policy cannot run here; the lens is held: `parfocal policies` tells why",
+                "the policy cannot run here; the lens is held. `parfocal policies` shows the reason",
             )
         }
         Failure::InvalidTarget(target) => {

@@ -1,5 +1,4 @@
-//! A thread that runs one instance of a policy, so that an instance that hangs or panics takes
-//! nothing with it.
+//! A thread that runs one instance of a policy, so that an instance that hangs or panics stops nothing else.
 
 use std::any::Any;
 use std::io;
@@ -18,7 +17,7 @@ use crate::imaging::View;
 use crate::lens::FocalPower;
 use crate::priority::{self, Place};
 
-/// An observation of the thread's own.
+/// A copy of an observation for the policy's thread.
 #[derive(Debug)]
 struct Question {
     view: View,
@@ -28,32 +27,32 @@ struct Question {
 /// The outcome of a question.
 type Answer = Result<Advice, Failure>;
 
-/// One instance of a policy on a thread of its own. At most one question is open at a time.
-/// Dropping the runner ends the thread as soon as the policy's step returns, and waits for nothing.
+/// One instance of a policy on its own thread. At most one question is open at a time. Dropping the runner ends the
+/// thread as soon as the policy's step returns. The drop does not wait.
 #[derive(Debug)]
 pub struct Runner {
     questions: SyncSender<Question>,
     answers: Receiver<Answer>,
     thread: JoinHandle<()>,
-    /// The thread's number, once it runs.
+    /// The thread's number, once the thread runs.
     id: Arc<OnceLock<Pid>>,
-    /// What the instance uses of a frame, once it is made.
+    /// The instance's field of view, once the instance is built.
     field_of_view: Arc<OnceLock<FieldOfView>>,
-    /// Whether the thread is at real-time priority.
+    /// Whether the thread has real-time priority.
     urgent: bool,
     asked_at: Option<Moment>,
-    /// Whether the instance has answered once. Until then it may be loading.
+    /// Whether the instance has answered at least once. Until then it may be loading.
     pub proven: bool,
 }
 
-/// Name of the threads that policies run on.
+/// Name of the threads on which policies run.
 const THREAD: &str = "policy";
 
 impl Runner {
-    /// Starts a fresh instance of policy `name`; it is made on its own thread.
+    /// Starts a new instance of policy `name`. It is built on its own thread.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system has no thread left.
     pub fn start(registry: Arc<Registry>, name: PolicyName, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let (questions, questions_in) = sync_channel(1);
         let (answers_out, answers) = sync_channel(1);
@@ -73,28 +72,27 @@ impl Runner {
         Ok(Self { questions, answers, thread, id, field_of_view, urgent: false, asked_at: None, proven: false })
     }
 
-    /// What the instance uses of a frame. While it is being made, which takes a few frames, nobody
-    /// knows, so it is shown everything.
+    /// The instance's field of view. It is unknown while the instance is being built, for a few frames; until then it
+    /// is taken to be wide.
     pub fn field_of_view(&self) -> FieldOfView {
         self.field_of_view.get().copied().unwrap_or(FieldOfView::Wide)
     }
 
-    /// Asks; does not wait. Until [`Self::answer`] stops waiting the thread is at real-time
-    /// priority.
+    /// Asks the policy and does not wait. The thread has real-time priority until [`Self::answer`] stops waiting for
+    /// it.
     pub fn ask(&mut self, now: Moment, seen: &Observation<'_>) {
         self.hurry();
         self.asked_at = Some(now);
-        // A thread that has ended leaves its reason among the answers.
+        // If the thread has ended, the reason is among the answers.
         let _ = self.questions.try_send(Question { view: *seen.view, focal_power: seen.focal_power });
     }
 
-    /// When the open question was asked, if one is open.
+    /// Time at which the open question was asked; `None` if no question is open.
     pub const fn open_since(&self) -> Option<Moment> {
         self.asked_at
     }
 
-    /// Waits for the answer to the open question, for at most `timeout`; `None` when it did not
-    /// come.
+    /// Waits for the answer to the open question, for at most `timeout`; `None` if it did not come.
     pub fn answer(&mut self, timeout: Duration) -> Option<Result<Advice, Failure>> {
         let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer,
@@ -110,8 +108,8 @@ impl Runner {
         Some(answer)
     }
 
-    /// Gives the thread up; it ends when the policy's step returns, if ever. One that owes an
-    /// answer may be spinning, and goes behind all others; one that does not ends at once.
+    /// Abandons the thread. It ends when the policy's step returns, if ever. If an answer is missing, the policy may be
+    /// spinning, so its thread gets the lowest priority. Otherwise the thread ends at once.
     pub fn abandon(self) -> JoinHandle<()> {
         if self.asked_at.is_some()
             && let Some(thread) = self.running()
@@ -121,7 +119,7 @@ impl Runner {
         self.thread
     }
 
-    /// Lets the policy go before everything but the loop and the devices. It stays so between
+    /// Gives the policy's thread priority over everything except the loop and the devices. The thread keeps it between
     /// frames, while it waits.
     fn hurry(&mut self) {
         if !self.urgent
@@ -131,8 +129,8 @@ impl Runner {
         }
     }
 
-    /// A policy that the loop no longer waits for, since it is late or spins, has no claim on a
-    /// processor.
+    /// Takes the priority back: a policy that is late or spins, so that the loop no longer waits for it, must not
+    /// occupy a processor.
     fn take_time(&mut self) {
         if std::mem::take(&mut self.urgent)
             && let Some(thread) = self.running()
@@ -141,13 +139,13 @@ impl Runner {
         }
     }
 
-    /// The thread's number while it has not ended: later the number may be another thread's.
+    /// The thread's number; `None` after the thread has ended, when the number may belong to another thread.
     fn running(&self) -> Option<Pid> {
         self.id.get().copied().filter(|_| !self.thread.is_finished())
     }
 }
 
-/// A fresh instance of policy `name`, whose field of view is noted in `field_of_view`.
+/// Builds a new instance of policy `name`, and stores its field of view in `field_of_view`.
 fn instance(
     registry: &Registry,
     name: &PolicyName,
@@ -158,7 +156,7 @@ fn instance(
     Ok(policy)
 }
 
-/// Makes an instance with `build` and answers questions with it, until there are no more or it panics.
+/// Builds an instance with `build` and answers questions with it, until the questions end or it panics.
 fn serve(
     build: impl FnOnce() -> Result<Box<dyn Policy>, PolicyError>,
     clock: &dyn Clock,
@@ -187,8 +185,8 @@ fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answ
     Advice::new(decision, clock.now().since(began))
 }
 
-/// Keeps what a panicking policy says, and where in the code it stood, off the standard error from
-/// now on: the operator of a blinded session may sit before it.
+/// From now on, keeps the message and place of a policy's panic off standard error, which the operator of a blinded
+/// session may see.
 pub fn keep_policies_quiet() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -198,7 +196,7 @@ pub fn keep_policies_quiet() {
     }));
 }
 
-/// Runs `risky`; a panic becomes its message.
+/// Runs `risky` and turns a panic into an error with its message.
 pub fn guarded<T>(risky: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(risky)).map_err(|payload| message(&*payload))
 }

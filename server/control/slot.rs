@@ -1,9 +1,9 @@
-//! A slot that holds the latest value: putting never waits, taking waits for something new.
+//! A slot that holds only the latest value. Putting never waits; taking waits for a new value.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Latest wins: a value not taken before the next is put is dropped and counted.
+/// Holds the latest value. A value that is not taken before the next one is put is dropped and counted.
 #[derive(Debug)]
 pub struct LatestSlot<T> {
     state: Mutex<State<T>>,
@@ -24,9 +24,9 @@ impl<T> Default for LatestSlot<T> {
 }
 
 impl<T> LatestSlot<T> {
-    /// Puts `value` in, dropping one that was not taken.
+    /// Puts `value` into the slot. Drops the previous value if it was not taken.
     pub fn put(&self, value: T) {
-        // The old value is dropped after the lock is: freeing a frame takes longer than swapping it.
+        // The old value is dropped after the lock is released, because freeing a frame takes longer than swapping it.
         let _old = {
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
             let old = state.value.replace(value);
@@ -37,7 +37,7 @@ impl<T> LatestSlot<T> {
         self.fresh.notify_one();
     }
 
-    /// Waits for a value, for at most `timeout`; `None` when none came or the slot is closed.
+    /// Waits for a value, for at most `timeout`; `None` if none came or the slot is closed and empty.
     pub fn take(&self, timeout: Duration) -> Option<T> {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let (mut state, _) = self
@@ -47,12 +47,12 @@ impl<T> LatestSlot<T> {
         state.value.take()
     }
 
-    /// Values that were overwritten before anyone took them.
+    /// Number of values that were overwritten before they were taken.
     pub fn overwritten(&self) -> u64 {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).overwritten
     }
 
-    /// Wakes the taker and keeps it from waiting again: the producer has ended.
+    /// Marks that the producer has ended. Wakes the consumer, which never waits again.
     pub fn close(&self) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
         self.fresh.notify_all();

@@ -1,4 +1,4 @@
-//! The camera's thread: takes frames as they come and leaves the latest for the loop.
+//! The camera's thread: takes frames as they come, and keeps the latest for the loop.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,14 +13,14 @@ use super::runner::guarded;
 use crate::camera::{Camera, CameraError, CameraHealth, Frame};
 use crate::priority::{self, Place};
 
-/// How long the camera is waited for before it is asked again.
+/// Longest wait for one frame. After it the thread checks whether it should stop, and asks the camera again.
 const TIMEOUT: Duration = Duration::from_millis(200);
-/// Pause after a failure that came at once, so that a dead camera does not keep a core busy.
+/// Pause after a failure without a wait, so that a dead camera does not keep a core busy.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Frames and health of a camera that runs on its own thread.
+/// A camera that runs on its own thread: its frames and its health.
 pub struct Source {
-    /// The latest frame.
+    /// The slot with the latest frame.
     pub frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
     stop: Arc<AtomicBool>,
@@ -28,10 +28,10 @@ pub struct Source {
 }
 
 impl Source {
-    /// Starts to take frames from `camera`.
+    /// Starts a thread that takes frames from `camera`.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system has no thread left.
     pub fn start(camera: Box<dyn Camera>) -> io::Result<Self> {
         let frames = Arc::new(LatestSlot::default());
         let health = Arc::new(ArcSwap::from_pointee(camera.health()));
@@ -43,24 +43,24 @@ impl Source {
         Ok(Self { frames, health, stop, ended })
     }
 
-    /// The camera's health as of its last frame or failure.
+    /// The camera's health after its last frame or failure.
     pub fn health(&self) -> CameraHealth {
         CameraHealth::clone(&self.health.load())
     }
 
-    /// Ends the thread; waits for at most `timeout`. Whether it has ended.
+    /// Ends the thread and waits for at most `timeout`. Returns whether it has ended.
     pub fn stop(&self, timeout: Duration) -> bool {
         self.stop.store(true, Ordering::Relaxed);
         self.ended.recv_timeout(timeout) == Err(RecvTimeoutError::Disconnected)
     }
 }
 
-/// What the camera's thread works on.
+/// The state of the camera's thread.
 struct Feed {
     frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
     stop: Arc<AtomicBool>,
-    /// Dropped with the rest when the thread ends, which wakes [`Source::stop`].
+    /// Dropped when the thread ends, which wakes [`Source::stop`].
     _ending: SyncSender<()>,
 }
 
@@ -92,7 +92,7 @@ impl Feed {
                     thread::sleep(PAUSE);
                 }
             } else if failing {
-                tracing::info!("the camera delivers again");
+                tracing::info!("the camera delivers frames again");
             }
 
             failing = failure.is_some();

@@ -1,4 +1,4 @@
-//! The loop's thread: starts it, feeds the stepper, publishes what happened, and ends it.
+//! The loop's thread: starts it, passes frames to the stepper, publishes the results, and ends it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,53 +23,53 @@ use crate::imaging::Reconstructor;
 use crate::lens::{Lens, LensDynamics};
 use crate::priority::{self, Place, Standing};
 
-/// Longest wait for a frame before commands are looked at.
+/// Longest wait for a frame before the loop looks for commands.
 const TICK: Duration = Duration::from_millis(20);
 /// Time without a frame after which the camera counts as failed.
 const NO_FRAME: Duration = Duration::from_millis(300);
 /// Status is published this often, and at every change.
 const STATUS_INTERVAL: Duration = Duration::from_millis(200);
-/// How long a camera that does not answer is waited for at the end.
+/// Longest wait, at the end, for a camera that does not answer.
 const FAREWELL: Duration = Duration::from_secs(1);
 
 /// The parts of the loop.
 pub struct Rig {
-    /// Where frames come from.
+    /// The source of frames.
     pub camera: Box<dyn Camera>,
     /// The lens to move.
     pub lens: Box<dyn Lens>,
-    /// Makes the patch of a mosaic.
+    /// Reconstructs the patch from a mosaic.
     pub reconstructor: Reconstructor,
     /// The policies that can be put in charge.
     pub registry: Registry,
-    /// Time.
+    /// The clock for latencies and time limits.
     pub clock: Arc<dyn Clock>,
 }
 
 /// How the loop runs.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Time between two frames: how long a policy's answer is waited for.
+    /// Time between two frames. It is also the longest wait for a policy's answer.
     pub frame_period: Duration,
-    /// Telemetry records that may wait for their writer before further ones are dropped.
+    /// Capacity of the telemetry channel, in records. Further records are dropped.
     pub telemetry_capacity: usize,
-    /// How the lens was measured to move, if it was; else what its driver supposes.
+    /// The measured dynamics of the lens; `None` to use those that its driver assumes.
     pub dynamics: Option<LensDynamics>,
 }
 
-/// The running loop. Dropping it ends the loop and its camera, and waits for both: the lens is let
-/// go first; a camera that hangs is waited for a second at most.
+/// The running loop. Dropping it ends the loop and its camera, and waits for both. The lens is released first. A camera
+/// that hangs is waited for at most one second.
 pub struct ControlLoop {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl ControlLoop {
-    /// Starts the loop; the lens stays where it is until told otherwise. Also returned: what others
-    /// hold of it, and its telemetry, which is dropped and counted when it is not taken.
+    /// Starts the loop. The lens stays where it is until a command comes. Also returns the handle for the rest of the
+    /// server, and the telemetry; records that are not taken in time are dropped and counted.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system has no thread left.
     pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
         let Rig { camera, lens, reconstructor, registry, clock } = rig;
         let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
@@ -98,7 +98,7 @@ impl ControlLoop {
 }
 
 impl ControlLoop {
-    /// Ends the loop, as dropping it does.
+    /// Ends the loop, just like dropping it.
     pub fn stop(self) {
         drop(self);
     }
@@ -115,7 +115,7 @@ impl Drop for ControlLoop {
     }
 }
 
-/// Where what the loop made goes. None of them makes it wait.
+/// The outputs of the loop. None of them makes it wait.
 struct Outlets {
     telemetry: mpsc::Sender<StepRecord>,
     frames: Arc<LatestSlot<ControlledFrame>>,
@@ -128,19 +128,19 @@ struct Worker {
     source: Source,
     clock: Arc<dyn Clock>,
     outlets: Outlets,
-    /// Looked at for the status alone.
+    /// Read only for the status.
     controls: Option<Controls>,
     status: watch::Sender<Arc<ControlStatus>>,
     published_at: Moment,
     last_frame_at: Moment,
-    /// Why frames lead to nothing: none come, or they hold no patch.
+    /// Why there are no usable frames: none come, or they are too small for a patch.
     camera_fault: Option<HoldReason>,
-    /// Whether the policy caused the hold, and since when the lens has been held without a break.
+    /// Whether the policy caused the present hold, and since when the lens has been held for such a cause.
     held_since: Option<(bool, Moment)>,
     window: LatencyWindow,
     steps: u64,
     telemetry_dropped: u64,
-    /// How the thread stands to others.
+    /// Scheduling priority of the loop's thread.
     priority: Standing,
 }
 
@@ -196,19 +196,18 @@ impl Worker {
             while let Ok(command) = commands.try_recv() {
                 self.stepper.obey(command);
             }
-            // The last line of defence: whatever a frame brings to light, the next one gets its
-            // turn.
+            // The last line of defence: if a frame causes a panic, the loop continues with the next one.
             if let Err(panic) = guarded(|| self.turn(frame)) {
                 tracing::error!(panic, "a step of the control loop failed");
             }
         }
 
         let Self { stepper, source, outlets, .. } = self;
-        // First of all: a camera that hangs must not keep the lens under current.
+        // First, because a camera that hangs must not keep the lens under current.
         drop(stepper);
         outlets.frames.close();
         if !source.stop(FAREWELL) {
-            tracing::warn!("the camera hangs; its thread is left behind");
+            tracing::warn!("the camera does not respond; its thread was abandoned");
         }
     }
 
@@ -247,7 +246,7 @@ impl Worker {
         }
     }
 
-    /// Publishes the status if it is time to, or if something changed that people must see at once.
+    /// Publishes the status if it is due, or if something changed that people must see at once.
     fn publish(&mut self) {
         let now = self.clock.now();
         let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());

@@ -1,5 +1,4 @@
-//! One step of the loop: frame -> patch -> policy -> lens command. Knows no thread but the
-//! policy's.
+//! One step of the loop: frame -> patch -> policy -> lens command. Has no thread except the policy's.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,8 +16,8 @@ use crate::ids::SegmentId;
 use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth};
 
-/// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation
-/// faster than time.
+/// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation that runs faster than
+/// real time.
 pub struct Stepper {
     clock: Arc<dyn Clock>,
     lens: Box<dyn Lens>,
@@ -26,24 +25,22 @@ pub struct Stepper {
     pilot: Pilot,
     attribution: Attribution,
     drive: Drive,
-    /// Whether a frame was exposed with the lens where the policy is to begin. Until then the
-    /// policy is not asked.
+    /// Whether a frame was exposed after the lens had reached the policy's start. Until then the policy is not asked.
     placed: bool,
     segment: Option<SegmentId>,
     content_area: Option<ContentArea>,
-    /// The last command that the lens took.
+    /// The last focal power that the lens accepted.
     asked: FocalPower,
-    /// The next command for the lens: differs from `asked` only while it does not listen.
+    /// The focal power to command next. Differs from `asked` only while the lens does not accept commands.
     wanted: FocalPower,
-    /// Why the lens did not take the last command, if it did not.
+    /// Why the lens did not accept the last command; `None` if it did.
     lens_fault: Option<HoldReason>,
-    /// Why the last step followed no policy, if it was to hold.
+    /// Why the last step held the lens instead of following a policy; `None` if it did not.
     step_hold: Option<HoldReason>,
 }
 
 impl Stepper {
-    /// A loop that holds `lens` where it is until told otherwise, and waits for a policy at most
-    /// `patience` a frame.
+    /// A loop that holds `lens` where it is until a command comes. Waits for a policy at most `patience` per frame.
     #[must_use]
     pub fn new(lens: Box<dyn Lens>, eye: Eye, registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let start = lens.measured().unwrap_or(FocalPower::MIDDLE);
@@ -64,14 +61,14 @@ impl Stepper {
         }
     }
 
-    /// The same with a lens that was measured to move like this.
+    /// Uses `dynamics`, the measured dynamics of the lens, instead of those that its driver assumes.
     #[must_use]
     pub fn moving(mut self, dynamics: LensDynamics) -> Self {
         self.attribution = Attribution::new(dynamics, self.asked);
         self
     }
 
-    /// Obeys. Drive and segment change together, between two frames.
+    /// Carries out `command`. Drive and segment change together, between two frames.
     pub fn obey(&mut self, command: Command) {
         match command {
             Command::ContentArea(area) => self.content_area = area,
@@ -103,9 +100,9 @@ impl Stepper {
     /// Takes one step on `frame`.
     ///
     /// # Errors
-    /// When the picture holds no patch; the step is then not taken.
+    /// If the picture is too small for a patch. Nothing is commanded then.
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
-        // A lens that is away may be anywhere.
+        // While the lens is disconnected, its focal power is unknown.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
         let patch = self.eye.find(&frame.image, self.content_area.as_ref())?;
 
@@ -136,16 +133,16 @@ impl Stepper {
         Ok(ControlledFrame { frame, patch, content_area: self.content_area, record, belief })
     }
 
-    /// Between frames that do not come: keeps telling the lens, so that a hand on the slider works
-    /// without a camera and a lens that comes back is noticed.
+    /// Called while no frames come. Repeats the command to the lens, so that the slider works without a camera, and a
+    /// lens that is back is noticed.
     pub fn idle(&mut self) {
         self.tell_lens();
     }
 
-    /// Whether the policy is asked about `frame`.
+    /// Whether to ask the policy about `frame`.
     ///
     /// # Errors
-    /// When the lens is to be held instead.
+    /// If the lens must be held instead.
     fn asks_policy(&mut self, frame: &Frame) -> Result<bool, HoldReason> {
         match &self.drive {
             Drive::Manual(_) => return Ok(false),
@@ -162,15 +159,15 @@ impl Stepper {
         Ok(self.placed)
     }
 
-    /// Asks the policy about `frame`, whose patch is at `patch`. Only now is a view made, and no wider
-    /// than the policy needs.
+    /// Asks the policy about `frame`, whose patch is at `patch`. Makes the view only now, and only as wide as the
+    /// policy needs.
     fn ask(&mut self, frame: &Frame, patch: PatchArea) -> Result<Advice, HoldReason> {
         let view = self.eye.look(&frame.image, patch, self.pilot.field_of_view());
         let focal_power = self.attribution.focal_power(frame.middle());
         self.pilot.ask(&Observation { view: &view, focal_power })
     }
 
-    /// Tells the lens what was decided, and remembers the reason if it is to be held instead.
+    /// Commands the lens according to `outcome`. If the lens must be held, remembers the reason.
     fn act(&mut self, outcome: Result<Option<Advice>, HoldReason>) -> Option<Advice> {
         let (advice, hold) = match outcome {
             Ok(advice) => (advice, None),
@@ -184,7 +181,7 @@ impl Stepper {
 
         self.tell_lens();
         if advice.is_some() {
-            // Advice that the lens did not take is not followed later, when its frame is long past.
+            // Advice that the lens did not accept is not repeated later, when its frame is long past.
             self.wanted = self.asked;
         }
         advice
@@ -202,33 +199,33 @@ impl Stepper {
         };
 
         match (&failure, &self.lens_fault) {
-            (Some(error), None) => tracing::warn!(%error, "the lens does not take commands"),
-            (None, Some(_)) => tracing::info!("the lens takes commands again"),
+            (Some(error), None) => tracing::warn!(%error, "the lens does not accept commands"),
+            (None, Some(_)) => tracing::info!("the lens accepts commands again"),
             _ => (),
         }
 
         self.lens_fault = failure.map(|error| HoldReason::new(Hold::LensFailed, &format!("{error}; trying again")));
     }
 
-    /// The lens's health, in words.
+    /// The lens's health.
     #[must_use]
     pub fn lens_health(&self) -> LensHealth {
         self.lens.health()
     }
 
-    /// Last focal power that the lens took.
+    /// The last focal power that the lens accepted.
     #[must_use]
     pub const fn focal_power(&self) -> FocalPower {
         self.asked
     }
 
-    /// Policy in charge, if one is.
+    /// The policy that drives the lens, if any.
     #[must_use]
     pub const fn policy(&self) -> Option<&PolicyName> {
         self.pilot.policy()
     }
 
-    /// Why the lens is being held, if it is.
+    /// Why the lens is held; `None` if it is not.
     #[must_use]
     pub fn hold_reason(&self) -> Option<&HoldReason> {
         self.lens_fault.as_ref().or(self.step_hold.as_ref())

@@ -1,4 +1,4 @@
-//! Where frames leave the loop to be recorded, while someone records.
+//! Passes the loop's frames to a recorder while one is connected.
 
 use std::sync::Arc;
 
@@ -8,18 +8,18 @@ use super::ControlledFrame;
 use crate::camera::FrameImage;
 use crate::recording::{Intake, Shot};
 
-/// Hands every frame of the loop to a recorder, if one is connected. The loop never waits: what the recorder cannot
-/// take is lost and counted there. Clone freely.
+/// Passes every frame of the loop to a recorder, if one is connected. The loop never waits: frames that the recorder
+/// cannot take are lost and counted there. Clones share the connection.
 #[derive(Clone, Default)]
 pub struct Tap(Arc<ArcSwapOption<Intake>>);
 
 impl Tap {
-    /// From now on frames go to `intake`, in place of any other.
+    /// Connects `intake`, in place of any other: frames go there from now on.
     pub fn connect(&self, intake: Arc<Intake>) {
         self.0.store(Some(intake));
     }
 
-    /// From now on frames go nowhere.
+    /// Disconnects the recorder.
     pub fn disconnect(&self) {
         self.0.store(None);
     }

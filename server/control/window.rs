@@ -1,4 +1,4 @@
-//! Latencies of the last second.
+//! Statistics of the loop's latency over the last second.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use crate::clock::Moment;
 
 const LENGTH: Duration = Duration::from_secs(1);
 
-/// A window of one second that slides over the loop's steps.
+/// The loop's steps of the last second.
 #[derive(Debug, Default)]
 pub struct LatencyWindow {
     /// When each step ended, and its latency in microseconds.
@@ -15,19 +15,19 @@ pub struct LatencyWindow {
     sorted: Vec<u32>,
 }
 
-/// Latencies of some steps in short.
+/// Statistics of the latencies of some steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LatencyFigures {
-    /// Steps.
+    /// Number of steps.
     pub steps: usize,
-    /// Median, microseconds; 0 without steps.
+    /// Median latency in microseconds; 0 without steps.
     pub p50: u32,
-    /// 99th percentile, microseconds; 0 without steps.
+    /// 99th percentile of the latency in microseconds; 0 without steps.
     pub p99: u32,
 }
 
 impl LatencyFigures {
-    /// The figures of these latencies in microseconds, which it sorts; percentiles by nearest rank.
+    /// Computes the figures of `latencies` in microseconds, and sorts them. Percentiles are by nearest rank.
     #[must_use]
     pub fn of(latencies: &mut [u32]) -> Self {
         latencies.sort_unstable();

@@ -1,4 +1,4 @@
-//! The sensor's calibration: whether it is this camera's own, fits it, and how old it is.
+//! Checks the sensor's calibration: whether it is this camera's own, whether it fits, and how old it is.
 
 use jiff::civil::Date;
 
@@ -8,11 +8,11 @@ use crate::imaging::Calibration;
 
 const CALIBRATION: &str = "calibration";
 
-/// References older than this are to be taken again, days: light sources and filters age.
+/// Age in days above which references should be taken again: light sources and filters age.
 const OLD: i32 = 180;
 
-/// The calibration in use on the day `today`, for a camera whose mosaics are of `size`, width and height in samples;
-/// none for a camera that delivers colour pictures. A `simulated` camera senses as the typical unit does.
+/// Checks the calibration in use on the day `today`. `size` is the width and height of the camera's mosaics in samples;
+/// `None` means a camera that delivers colour pictures. A `simulated` camera senses like the typical sensor.
 #[must_use]
 pub fn calibration(calibration: &Calibration, size: Option<(usize, usize)>, simulated: bool, today: Date) -> Finding {
     if size.is_none() {
@@ -35,7 +35,7 @@ pub fn calibration(calibration: &Calibration, size: Option<(usize, usize)>, simu
     aged(&title, calibration.date.as_deref(), today)
 }
 
-/// A calibration that cannot be used.
+/// The finding about a calibration that cannot be used.
 #[must_use]
 pub fn unreadable_calibration(fault: &CalibrationFault) -> Finding {
     Finding::wrong(CALIBRATION, format!("It cannot be used: {fault}."), "Follow docs/bench.md, section 3.")
@@ -45,7 +45,7 @@ fn aged(title: &str, date: Option<&str>, today: Date) -> Finding {
     let found = format!("In use: {title}.");
     let again = "Take new references; docs/bench.md, section 3, says how.";
     let Some(taken) = date.and_then(|date| date.parse::<Date>().ok()) else {
-        let found = format!("{found} It does not say from when it is.");
+        let found = format!("{found} It has no date.");
         return Finding::advice(CALIBRATION, found, again);
     };
 

@@ -1,4 +1,4 @@
-//! The certificate that the server shows: whether tablets and laptops accept it, and for how long.
+//! Checks the server's certificate: whether tablets and laptops accept it, and for how long.
 
 use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
@@ -7,11 +7,11 @@ use super::finding::Finding;
 
 const CERTIFICATE: &str = "certificate";
 
-/// A certificate that ends sooner than this is told of. A local one is replaced before, so it ends this soon only when
-/// that has failed.
+/// The finding warns of a certificate that ends within this time. A local one is renewed earlier, so this happens to it
+/// only if renewal has failed.
 const SOON: SignedDuration = SignedDuration::from_hours(30 * 24);
 
-/// A certificate that ends at `until`. `local`: whether the server's own authority signs it.
+/// Checks a certificate that is valid until `until`. `local`: whether the server's own authority signed it.
 #[must_use]
 pub fn certificate(until: Timestamp, local: bool, now: Timestamp) -> Finding {
     let day = until.to_zoned(TimeZone::system()).date();

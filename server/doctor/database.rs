@@ -1,4 +1,4 @@
-//! The database: whether its file is whole.
+//! Checks whether the database's file is whole.
 
 use std::path::Path;
 
@@ -6,22 +6,23 @@ use super::finding::Finding;
 
 const DATABASE: &str = "database";
 
-/// How the database of a data folder was found.
+/// State of the database in a data folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DatabaseState {
-    /// There is none.
+    /// There is no database.
     Missing,
-    /// SQLite finds nothing wrong in these bytes.
+    /// SQLite finds nothing wrong. Holds the size in bytes.
     Whole(u64),
-    /// SQLite finds this wrong in it.
+    /// SQLite finds it damaged. Holds what is wrong.
     Damaged(String),
-    /// A newer version of parfocal made it.
+    /// It was made by a newer version of parfocal.
     Newer,
-    /// It cannot be read, for this reason.
+    /// It cannot be read. Holds the reason.
     Unreadable(String),
 }
 
-/// The database of the data folder `data`; nothing where the folder itself is not there.
+/// The finding about the database in the data folder `data`; `None` if the database is missing because the folder
+/// itself does not exist.
 #[must_use]
 pub fn database(data: &Path, state: DatabaseState) -> Option<Finding> {
     let folder = data.display();

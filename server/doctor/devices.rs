@@ -1,4 +1,5 @@
-//! The devices of a running server, by what it knows of them: nobody asks a device that the control loop holds.
+//! Checks the devices of a running server by what it already knows: a device that the control loop holds is never
+//! asked.
 
 use super::finding::Finding;
 use super::lens;
@@ -8,7 +9,7 @@ use crate::lens::{LensHealth, LensInfo};
 const CAMERA: &str = "camera";
 const LENS: &str = "lens";
 
-/// The camera; its message names the packets of a GigE camera.
+/// Checks the camera. For a GigE camera, its message includes the size of the packets.
 #[must_use]
 pub fn camera_in_use(health: &CameraHealth) -> Finding {
     let found = named(&health.name, &health.message);
@@ -25,7 +26,7 @@ pub fn camera_in_use(health: &CameraHealth) -> Finding {
     Finding::well(CAMERA, found)
 }
 
-/// The lens, with what it said of itself when the server started, if it did.
+/// Checks the lens. `info` is what it reported about itself when the server started, if it did.
 #[must_use]
 pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
     let found = named(&health.name, &health.message);
@@ -44,7 +45,7 @@ pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
     }
 }
 
-/// A device's name and its sentence.
+/// A device's name and message as one sentence.
 fn named(name: &str, message: &str) -> String {
     let end = if message.ends_with('.') { "" } else { "." };
     format!("{name}: {message}{end}")

@@ -1,9 +1,9 @@
-//! What was found when a machine was looked at.
+//! The result of checking one thing on a machine.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// What a check came to.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -11,20 +11,20 @@ pub enum Verdict {
     Well,
     /// A trial can run, but something could be better.
     Advice,
-    /// To be put right before a trial.
+    /// Must be fixed before a trial.
     Wrong,
 }
 
-/// One thing that was looked at.
+/// One thing that was checked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Finding {
-    /// What was looked at, for example `disk`.
+    /// What was checked, for example `disk`.
     pub subject: &'static str,
-    /// What it came to.
+    /// The result.
     pub verdict: Verdict,
-    /// What was found, in one sentence.
+    /// What was found, in words.
     pub found: String,
-    /// What to do about it; none where all is well.
+    /// What to do about it; none if all is well.
     pub advice: Option<String>,
 }
 

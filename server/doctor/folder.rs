@@ -1,4 +1,4 @@
-//! The data folder: its disk's room, and who may read and write it.
+//! Checks the data folder: free space on its disk, and who may read and write it.
 
 use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt;
@@ -7,9 +7,9 @@ use std::path::Path;
 use super::finding::Finding;
 use crate::recording::room;
 
-/// Room below which a trial should not begin, bytes: a day of sessions takes some 100 MB.
+/// Free bytes below which a trial should not begin: a day of sessions takes some 100 MB.
 pub const LEAST_ROOM: u64 = 1 << 30;
-/// Room below which recordings soon end, bytes.
+/// Free bytes below which recordings soon fill the disk.
 const AMPLE_ROOM: u64 = 20 << 30;
 /// Bytes a second of a mosaic recording at 25 frames a second, as docs/recordings.md measures it.
 const RECORDING_RATE: u64 = 41_000_000;
@@ -17,12 +17,12 @@ const RECORDING_RATE: u64 = 41_000_000;
 const DISK: &str = "disk";
 const FOLDER: &str = "data folder";
 
-/// Whether the disk of `data` has room.
+/// Whether the disk of `data` has enough free space.
 pub fn disk(data: &Path) -> Finding {
     let free = match room(data) {
         Ok(room) => room,
         Err(error) => {
-            let found = format!("The disk of {} does not tell its room: {error}.", data.display());
+            let found = format!("The disk of {} does not report its free space: {error}.", data.display());
             return Finding::wrong(DISK, found, "Check that the disk is connected and mounted.");
         }
     };
@@ -56,7 +56,7 @@ pub fn access(data: &Path) -> Finding {
             );
         }
         Err(error) => {
-            let found = format!("{folder} cannot be looked at: {error}.");
+            let found = format!("{folder} cannot be examined: {error}.");
             return Finding::wrong(FOLDER, found, "Run this as the user that runs the server.");
         }
     };
@@ -66,7 +66,7 @@ pub fn access(data: &Path) -> Finding {
         return Finding::wrong(FOLDER, found, "Name the server's data folder: --data-dir DIR.");
     }
 
-    // The file goes by itself, whatever happens.
+    // The temporary file is removed automatically, whatever happens.
     if let Err(error) = tempfile::tempfile_in(data) {
         let found = format!("{folder} cannot be written: {error}.");
         return Finding::wrong(FOLDER, found, "Run this as the user that runs the server, or give it the folder.");

@@ -1,17 +1,17 @@
-//! A lens that was asked about itself.
+//! Checks a lens by what it reports about itself.
 
 use super::finding::Finding;
 use crate::lens::{LensError, LensInfo};
 
 const LENS: &str = "lens";
 
-/// What a lens said of itself, or why it did not.
+/// Checks a lens; `asked` is what it reported about itself, or why it did not answer.
 #[must_use]
 pub fn lens(asked: Result<LensInfo, LensError>) -> Finding {
     let info = match asked {
         Ok(info) => info,
         Err(error) => {
-            let found = format!("There is no lens to use: {error}.");
+            let found = format!("No lens can be used: {error}.");
             return Finding::wrong(LENS, found, "Check its cable and power, and that no server uses it now.");
         }
     };

@@ -1,5 +1,5 @@
-//! Whether a machine is ready for a trial: what is well, what could be better, and what must be put
-//! right first, each with what to do.
+//! Checks whether a machine is ready for a trial: what is well, what could be better, and what must be fixed first,
+//! with advice on how.
 
 mod calibration;
 mod certificate;
@@ -26,7 +26,7 @@ pub use tablet::{Tablet, tablets};
 
 use crate::clock::Clock;
 
-/// Looks at everything but the database and the devices: the folder `data` and its disk, clock, network and rights.
+/// Checks everything except the database and the devices: the folder `data` and its disk, clock, network and rights.
 #[must_use]
 pub fn machine(data: &Path, clock: &dyn Clock) -> Vec<Finding> {
     let mut findings = vec![folder::disk(data), folder::access(data)];

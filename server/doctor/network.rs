@@ -5,34 +5,34 @@ use std::path::Path;
 
 use super::finding::Finding;
 
-/// Where Linux tells of network interfaces.
+/// Folder in which Linux lists the network interfaces.
 const INTERFACES: &str = "/sys/class/net";
-/// Bytes of a packet from which a GigE Vision camera's pictures come in few enough of them.
+/// Packet size in bytes from which a GigE Vision camera's pictures need few enough packets.
 const JUMBO: u32 = 8000;
-/// Megabits a second that a GigE Vision camera needs.
+/// Link speed that a GigE Vision camera needs, Mbit/s.
 const GIGABIT: u32 = 1000;
-/// A wired network's kind of hardware, as Linux numbers it (`ARPHRD_ETHER`).
+/// Linux's number for wired network hardware (`ARPHRD_ETHER`).
 const ETHERNET: u32 = 1;
 
 const NETWORK: &str = "network";
 const CAMERA: &str = "camera's network";
 
-/// Where others can reach this machine.
+/// The address at which other devices can reach this machine.
 pub fn addresses() -> Finding {
     match outward() {
         Some(address) => Finding::well(NETWORK, format!("A tablet can reach this machine at {address}.")),
         None => Finding::advice(
             NETWORK,
-            "This machine is in no network.",
+            "This machine is not connected to a network.",
             "Connect it to the tablet's network, unless all pages are opened on this machine.",
         ),
     }
 }
 
-/// The address that this machine would talk to the world from; none where it is in no network.
+/// The address from which this machine would reach the world; `None` if it is not in a network.
 ///
-/// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The address
-/// asked for is one set aside for documentation (RFC 5737).
+/// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The
+/// destination is an address reserved for documentation (RFC 5737).
 #[must_use]
 pub fn outward() -> Option<IpAddr> {
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
@@ -40,8 +40,7 @@ pub fn outward() -> Option<IpAddr> {
     socket.local_addr().ok().map(|address| address.ip())
 }
 
-/// Whether wired networks that are up could carry a GigE camera's pictures. None where there is no such
-/// network.
+/// Whether each wired network that is up could carry a GigE camera's pictures. Empty if there is no such network.
 pub fn camera_links() -> Vec<Finding> {
     let Ok(entries) = std::fs::read_dir(INTERFACES) else { return Vec::new() };
     let mut names: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -54,20 +53,20 @@ pub fn camera_links() -> Vec<Finding> {
 #[derive(Debug, PartialEq, Eq)]
 struct Link {
     name: String,
-    /// Most bytes of a packet.
+    /// Largest packet, bytes.
     mtu: u32,
-    /// Megabits a second; none where the interface does not tell.
+    /// Mbit/s; `None` if the interface does not report it.
     speed: Option<u32>,
 }
 
 impl Link {
-    /// The interface whose folder is `folder`; none where it is not wired, not real or not up.
+    /// Reads the interface in `folder`; `None` if it is not wired, is virtual, or is not up.
     fn read(folder: &Path) -> Option<Self> {
         let text = |name: &str| std::fs::read_to_string(folder.join(name)).ok().map(|text| text.trim().to_owned());
         let number = |name: &str| text(name).and_then(|text| text.parse::<u32>().ok());
 
         let wired = number("type") == Some(ETHERNET) && !folder.join("wireless").exists();
-        // Bridges and other made-up interfaces have no device.
+        // Bridges and other virtual interfaces have no device.
         let real = folder.join("device").exists();
         let up = text("operstate").as_deref() == Some("up");
         if !(wired && real && up) {
@@ -101,7 +100,7 @@ mod tests {
     use super::*;
     use crate::doctor::finding::Verdict;
 
-    /// An interface's folder, as Linux has it.
+    /// A folder like the one that Linux has for an interface.
     fn interface(mtu: &str, speed: &str, operstate: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("device")).unwrap();
@@ -117,7 +116,7 @@ mod tests {
         assert_eq!(verdict(&interface("9000\n", "1000\n", "up\n")), Verdict::Well);
         assert_eq!(verdict(&interface("1500\n", "1000\n", "up\n")), Verdict::Advice);
         assert_eq!(verdict(&interface("9000\n", "100\n", "up\n")), Verdict::Advice);
-        // A virtual machine's card tells no speed.
+        // A virtual machine's card reports no speed.
         assert_eq!(verdict(&interface("9000\n", "-1\n", "up\n")), Verdict::Well);
     }
 

@@ -1,4 +1,4 @@
-//! The machine itself: its clock, what the system allows the server, and the programs it calls.
+//! Checks the machine itself: its clock, what the system allows the server, and the programs that the server calls.
 
 use std::process::{Command, Stdio};
 
@@ -11,7 +11,7 @@ const REAL_TIME: &str = "real-time priority";
 const MEMORY: &str = "locked memory";
 const VIDEOS: &str = "videos";
 
-/// Whether the clock is kept by a time server: events of several machines are compared by it.
+/// Whether a time server keeps the clock: events of several machines are compared by their clocks.
 pub fn clock(clock: &dyn Clock) -> Finding {
     let asked = Command::new("timedatectl").args(["show", "--property=NTPSynchronized", "--value"]).output();
     let answer = asked.ok().filter(|output| output.status.success());
@@ -27,13 +27,13 @@ pub fn clock(clock: &dyn Clock) -> Finding {
         ),
         _ => Finding::advice(
             CLOCK,
-            format!("It is {now}; the system does not tell whether a time server keeps the clock."),
+            format!("It is {now}; the system does not report whether a time server keeps the clock."),
             "Compare it with a clock that is right.",
         ),
     }
 }
 
-/// Whether the threads from camera to lens may run before all other programs.
+/// Whether the threads from camera to lens may have real-time priority.
 pub fn real_time() -> Finding {
     if may_run_first() {
         return Finding::well(REAL_TIME, "Other programs cannot delay the focus.");
@@ -45,7 +45,7 @@ pub fn real_time() -> Finding {
     )
 }
 
-/// Whether the server's memory may be kept from being swapped out.
+/// Whether the server may lock its memory against being swapped out.
 pub fn memory() -> Finding {
     if may_lock_memory() {
         return Finding::well(MEMORY, "The server's memory stays in the machine's memory.");
@@ -57,7 +57,7 @@ pub fn memory() -> Finding {
     )
 }
 
-/// Whether videos can be read and written.
+/// Whether videos can be read and written: this needs ffmpeg.
 pub fn videos() -> Finding {
     let mut ffmpeg = Command::new("ffmpeg");
     let asked = ffmpeg.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();

@@ -1,23 +1,23 @@
-//! The surgeon's tablet, by what its page tells the server anyway.
+//! Checks the surgeon's tablet by what its page reports to the server anyway.
 
 use super::finding::Finding;
 
 const TABLET: &str = "tablet";
 
-/// A page of the surgeon that is open.
+/// A surgeon's page that is open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tablet {
-    /// What its browser calls itself.
+    /// The browser's user agent string.
     pub user_agent: String,
-    /// Pixels of its screen that the whole picture covers from left to right, once it has told.
+    /// Pixels of its screen that the whole picture covers from left to right; none until the page has reported them.
     pub picture_width: Option<u32>,
-    /// Whether it is on screen, and not behind another program or with the screen off.
+    /// Whether the page is on screen; false if it is behind another program or the screen is off.
     pub visible: bool,
-    /// Whether its connection carries the size of pictures that its screen can show.
+    /// Whether its connection is fast enough for the size of pictures that its screen can show.
     pub carries_all: bool,
 }
 
-/// The surgeon's pages that are open: one finding each, or that there is none.
+/// One finding for each open surgeon's page, or one that says that none is open.
 #[must_use]
 pub fn tablets(open: &[Tablet]) -> Vec<Finding> {
     if open.is_empty() {
@@ -43,9 +43,9 @@ fn finding(tablet: &Tablet) -> Finding {
     Finding::well(TABLET, found)
 }
 
-/// The browser and the device that `user_agent` names, for people.
+/// The browser and the device that `user_agent` names, in words.
 fn browser(user_agent: &str) -> String {
-    // Each names those before it too, to be taken for them.
+    // A browser's user agent may also name browsers further down, for compatibility, so the first match counts.
     const BROWSERS: [(&str, &str); 8] = [
         ("Edg", "Edge"),
         ("OPR/", "Opera"),
@@ -56,7 +56,7 @@ fn browser(user_agent: &str) -> String {
         ("Chrome", "Chrome"),
         ("Safari", "Safari"),
     ];
-    // An iPad says that it is a Mac.
+    // By default, an iPad says that it is a Mac.
     const DEVICES: [(&str, &str); 7] = [
         ("iPad", "an iPad"),
         ("iPhone", "an iPhone"),
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::doctor::Verdict;
 
-    /// As Safari on an iPad says by default, and Chrome on an Android tablet.
+    /// User agents of Safari on an iPad, with its default settings, and of Chrome on an Android tablet.
     const IPAD: &str = "Mozilla/5.0 (Macintosh; Intel Mac OS X 10_15_7) AppleWebKit/605.1.15 (KHTML, like Gecko) \
                         Version/18.1 Safari/605.1.15";
     const ANDROID: &str = "Mozilla/5.0 (Linux; Android 10; K) AppleWebKit/537.36 (KHTML, like Gecko) \

@@ -15,7 +15,7 @@ use crate::scans::ScanSet;
 use rollout::{NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
 use statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, wilcoxon};
 
-/// Name of the row that knows the next optimum.
+/// Name of the policy that knows the next optimum.
 pub const ORACLE: &str = "oracle";
 
 /// One policy's paths over the scans of a set.
@@ -34,7 +34,7 @@ pub struct Outcome {
 pub struct Row {
     /// The policy, or [`ORACLE`].
     pub policy: String,
-    /// Frames in all.
+    /// Number of frames over all scans.
     pub frames: usize,
     /// Mean absolute focal power error over all frames.
     pub mae: f64,
@@ -65,9 +65,9 @@ pub struct Comparison {
     pub test: &'static str,
     /// How p was computed.
     pub method: Method,
-    /// Its two-sided p.
+    /// The test's two-sided p.
     pub p: f64,
-    /// The same, corrected by Holm's method for all comparisons of the evaluation.
+    /// `p`, corrected by Holm's method for all comparisons of the evaluation.
     pub p_holm: f64,
 }
 
@@ -89,11 +89,11 @@ pub enum EvaluateError {
     },
 }
 
-/// Runs the named policies, and the oracle first, over `scans`, several at once where there are cores
-/// for it. `progress` is called after each policy's scan.
+/// Runs the oracle and then the named policies over `scans`, several scans at once if there are cores for it.
+/// `progress` is called after each policy's scan.
 ///
 /// # Errors
-/// When a policy is unknown or cannot run, or returns an invalid focal power.
+/// If a policy is unknown or cannot run, or returns an invalid focal power.
 pub fn evaluate(
     registry: &Registry,
     policies: &[PolicyName],
@@ -120,7 +120,8 @@ pub fn evaluate(
             path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
         };
 
-        // All of them first: of several that failed, the first is reported, however the cores took turns.
+        // All results are collected first. So if several scans fail, the first of them is reported, in whatever order
+        // the cores ran them.
         let paths: Vec<Result<_, EvaluateError>> = (0..count).into_par_iter().map(run).collect();
         let paths = paths.into_iter().collect::<Result<_, _>>()?;
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });
@@ -133,7 +134,8 @@ impl Outcome {
     /// The figures over all paths.
     #[must_use]
     pub fn row(&self) -> Row {
-        // Of whole paths: what happens from one part to the next counts, and parts are not of the same length.
+        // These figures are of whole paths, because what happens from one part to the next counts, and parts differ in
+        // length.
         let whole: Vec<PathFigures> = self.paths.iter().map(Path::figures).collect();
         let parts = self.paths.iter().flat_map(|path| path.parts(self.parts));
         let parts: Vec<PathFigures> = parts.map(|part| part.figures()).collect();
@@ -156,7 +158,7 @@ impl Outcome {
     }
 }
 
-/// Tests each pair of rows, the oracle left out.
+/// Tests each pair of rows, without the oracle.
 #[must_use]
 pub fn compare(rows: &[Row]) -> Vec<Comparison> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.policy != ORACLE).collect();

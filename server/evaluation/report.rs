@@ -19,9 +19,9 @@ use crate::scans::recorded::Between;
 /// What was evaluated.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Subject {
-    /// Which scans.
+    /// Kind of scans: `simulated`, `relief`, `phantom`, or the folder of a recorded scan.
     pub scans: String,
-    /// Seed of their courses.
+    /// Seed of the scans' courses.
     pub seed: u64,
     /// Number of scans.
     pub count: usize,
@@ -30,7 +30,7 @@ pub struct Subject {
     /// What a recorded scan shows between two of its focal powers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub between: Option<Between>,
-    /// Folder of weights in the place of those that ship, if any.
+    /// Folder of weights that replace those that ship, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights_folder: Option<String>,
     /// SHA-256 of the weights of each learned policy that was evaluated.
@@ -38,7 +38,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// Names the first thing in which it differs from `other`.
+    /// Names the first difference from `other`; `None` if there is none.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         let differences = [
@@ -62,9 +62,9 @@ pub struct Report {
     pub subject: Subject,
     /// Number of scans in which even the sharpest patch shows nothing to focus on.
     pub without_detail: usize,
-    /// One a policy.
+    /// One row for each policy.
     pub rows: Vec<Row>,
-    /// One a pair of policies.
+    /// One test for each pair of policies.
     pub comparisons: Vec<Comparison>,
 }
 
@@ -81,7 +81,7 @@ const SIMULATED: [PaperRow; 6] = [
     ("cnn-learned", 0.049, 0.072, 84.9),
 ];
 
-/// Its figures on a scan recorded by a robotic arm.
+/// The paper's figures on a scan recorded by a robotic arm.
 const ROBOTIC: [PaperRow; 6] = [
     ("fixed", 0.262, 0.161, 26.4),
     ("mgm-hill-climber", 0.146, 0.148, 46.4),
@@ -128,7 +128,7 @@ impl Report {
         text
     }
 
-    /// p of the test between any two policies, as Markdown; nothing where there is but one.
+    /// The p of each test between two policies, as Markdown; empty if there is only one policy.
     fn tests(&self) -> String {
         let names: Vec<&str> =
             self.rows.iter().map(|row| row.policy.as_str()).filter(|policy| *policy != ORACLE).collect();
@@ -142,7 +142,7 @@ impl Report {
         };
         let corrected = match self.comparisons.len() {
             1 => String::new(),
-            count => format!("; behind the stroke, by Holm's method corrected for {count} comparisons"),
+            count => format!("; after the slash, corrected by Holm's method for {count} comparisons"),
         };
 
         let mut text = format!("\np of the paired Wilcoxon signed-rank test over {over}, {method}{corrected}:\n\n");
@@ -158,7 +158,7 @@ impl Report {
         text
     }
 
-    /// A test's p, and the corrected one where there are several tests.
+    /// A test's p, and the corrected one if there are several tests.
     fn probabilities(&self, test: &Comparison) -> String {
         let p = probability(test.p);
         if self.comparisons.len() == 1 { p } else { format!("{p} / {}", probability(test.p_holm)) }
@@ -179,7 +179,7 @@ impl Report {
             None => "",
             Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
             Some(Between::Interpolated) => {
-                " A frame shows a mix of the pictures recorded at the two focal powers around."
+                " A frame shows a mix of the pictures recorded at the two nearest focal powers."
             }
         });
 
@@ -189,7 +189,7 @@ impl Report {
             match &self.subject.weights_folder {
                 None => text.push('.'),
                 Some(folder) => {
-                    let _ = write!(text, "; those in {folder} took the place of those that ship.");
+                    let _ = write!(text, "; those in {folder} replaced the shipped ones.");
                 }
             }
         }
@@ -225,7 +225,7 @@ impl Report {
     /// Writes `results.json`, `results.md`, `results.csv` and `figure.svg` (the first scan's paths) into `folder`.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// If a file cannot be written.
     pub fn write(&self, outcomes: &[Outcome], folder: &FilePath) -> io::Result<()> {
         fs::create_dir_all(folder)?;
         let write = |name: &str, text: String| replace(&folder.join(name), text.as_bytes());
@@ -236,7 +236,7 @@ impl Report {
     }
 }
 
-/// Columns of the table as CSV. New ones come at the end.
+/// Columns of the table as CSV. New ones are added at the end.
 const COLUMNS: [&str; 15] = [
     "policy",
     "frames",
@@ -255,7 +255,7 @@ const COLUMNS: [&str; 15] = [
     "weights",
 ];
 
-/// A p for people: `0.03`, or `4e-11` where it is below a thousandth.
+/// A p for people: `0.030`, or `4e-11` if it is below a thousandth.
 fn probability(p: f64) -> String {
     if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
@@ -340,7 +340,7 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("shows no detail. Weights, by "), "{text}");
-        assert!(text.contains("near 0123456789ab; those in runs/x took"), "{text}");
+        assert!(text.contains("near 0123456789ab; those in runs/x replaced"), "{text}");
     }
 
     #[test]
@@ -354,7 +354,7 @@ mod tests {
         let rows: Vec<Row> = outcomes.iter().map(Outcome::row).collect();
         let report = Report { comparisons: crate::evaluation::compare(&rows), rows, ..report() };
         let text = report.markdown();
-        assert!(text.contains("exact; behind the stroke, by Holm's method corrected for 3 comparisons:\n"), "{text}");
+        assert!(text.contains("exact; after the slash, corrected by Holm's method for 3 comparisons:\n"), "{text}");
         assert!(text.contains("| a | 0.125 / 0.375 | 0.125 / 0.375 |\n"), "{text}");
         let json = serde_json::to_value(&report).unwrap();
         let first = &json["comparisons"][0];

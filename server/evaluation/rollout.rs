@@ -1,4 +1,4 @@
-//! One policy on one focal-time scan: where it went, and how well that was.
+//! Runs one policy on one focal-time scan, and rates its path.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::scans::FocalTimeScan;
 /// Frames a second of simulated scans: the paper's clips hold 250 frames in 10 s.
 pub const FRAMES_A_SECOND: f64 = 25.0;
 
-/// Where the lens and the optimum stood, frame by frame.
+/// The focal power of the lens and the optimum, frame by frame.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Path {
     /// Focal power of each frame.
@@ -23,8 +23,8 @@ pub struct Path {
 pub struct PathFigures {
     /// Mean absolute focal power error.
     pub mae: f64,
-    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers, rounding decides
-    /// on which side errors of exactly that fall; `docs/notebook.md` says how much depends on it.
+    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers, rounding decides whether an error
+    /// of exactly this limit counts. `docs/notebook.md` says how much depends on it.
     pub in_focus: f64,
     /// Mean absolute change of focal power a frame.
     pub travel: f64,
@@ -38,7 +38,7 @@ impl Path {
         self.focal_power.iter().zip(&self.optimum).map(|(f, best)| (f - best).abs())
     }
 
-    /// Whether it has an optimum for each focal power, and both are on the scale of 0 to 1.
+    /// Whether it has an optimum for each focal power, and all values are within 0..=1.
     pub(super) fn is_plausible(&self) -> bool {
         let are_powers = |values: &[f64]| values.iter().all(|value| (0.0..=1.0).contains(value));
         self.focal_power.len() == self.optimum.len() && are_powers(&self.focal_power) && are_powers(&self.optimum)
@@ -72,7 +72,7 @@ impl Path {
     }
 }
 
-/// A policy's answer that is not a number.
+/// A policy's answer that is not a finite number.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("at frame {frame} it returned {target}, which is not a focal power")]
 pub struct NoTarget {
@@ -82,12 +82,12 @@ pub struct NoTarget {
     pub target: f64,
 }
 
-/// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. The next
-/// frame is seen at the focal power that the policy asks for.
+/// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. The next frame is seen at
+/// the focal power that the policy returns.
 ///
 /// # Errors
-/// When it asks for something that is not a number: in the live loop the watchdog would take over,
-/// and the rest of the path would not be the policy's.
+/// If the policy returns something that is not a finite number. In the live loop the watchdog would then take over, and
+/// the rest of the path would not be the policy's.
 pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: usize) -> Result<Path, NoTarget> {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();

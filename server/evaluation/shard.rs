@@ -14,36 +14,36 @@ use crate::scans::FocalTimeScan;
 use crate::scans::detail::{NothingToFocusOn, warning};
 
 const FORMAT: &str = "parfocal-evaluation-shard";
-/// Into so many stretches a path is cut at most.
+/// Most stretches into which a path is cut.
 const MOST_STRETCHES: usize = 1000;
 
 const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
 
-/// One of several parts of a set of scans: with n parts each n-th scan, so that every part has scans of all kinds.
+/// One of several parts of a set of scans: with n parts, every n-th scan. So every part has scans of all kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
-    /// Which, from 1.
+    /// Number of this part, from 1.
     index: usize,
     /// Number of parts.
     of: usize,
 }
 
 impl Part {
-    /// All scans.
+    /// The only part of a whole evaluation: all scans.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
-    /// Numbers of its scans among `count`, from 0.
+    /// Indices of its scans among `count`, from 0.
     #[must_use]
     pub fn scans(self, count: usize) -> Vec<usize> {
         (self.index.saturating_sub(1)..count).step_by(self.of.max(1)).collect()
     }
 
-    /// How many of `count` scans are its own.
+    /// Number of its scans among `count`.
     fn size(self, count: usize) -> usize {
         count.saturating_sub(self.index.saturating_sub(1)).div_ceil(self.of.max(1))
     }
 
-    /// Name of the file of its findings.
+    /// Name of the file with its results.
     #[must_use]
     pub fn file_name(self) -> String {
         format!("shard-{}-of-{}.json", self.index, self.of)
@@ -75,7 +75,7 @@ pub struct PartOf<S> {
 }
 
 impl<S: ScanSet> PartOf<S> {
-    /// Those of `set` that belong to `part`.
+    /// The scans of `set` that belong to `part`.
     pub fn new(set: S, part: Part) -> Self {
         let scans = part.scans(set.count());
         Self { set, scans }
@@ -96,18 +96,18 @@ impl<S: ScanSet> ScanSet for PartOf<S> {
     }
 }
 
-/// The findings of an evaluation on one part of its scans.
+/// The results of an evaluation on one part of its scans.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Shard {
     format: String,
     software: String,
-    /// Which part.
+    /// The part of the scans.
     pub part: Part,
-    /// What was evaluated, on all scans.
+    /// What was evaluated. It is the same for all parts.
     pub subject: Subject,
     /// Number of this part's scans without detail.
     pub without_detail: usize,
-    /// What each policy did on this part's scans, in their order.
+    /// Each policy's paths over this part's scans, in their order.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -124,7 +124,7 @@ pub enum MergeError {
         first: String,
         /// Another file.
         second: String,
-        /// In what.
+        /// The first difference between them.
         what: &'static str,
     },
     /// The same part was given twice.
@@ -146,14 +146,14 @@ pub enum MergeError {
 }
 
 impl Shard {
-    /// The findings on `part` of the scans of `subject`.
+    /// The results on `part` of the scans of `subject`.
     #[must_use]
     pub fn new(part: Part, subject: Subject, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
     }
 
-    /// Whether it holds a path for each policy and each of its scans. It comes from another machine, perhaps damaged on
-    /// the way: nothing of it is worked with before.
+    /// Whether it holds a plausible path for each policy and each of its scans. It may come from another machine and
+    /// may be damaged, so this is checked before anything in it is used.
     fn is_whole(&self) -> bool {
         let scans = self.part.size(self.subject.count);
         let Part { index, of } = self.part;
@@ -168,7 +168,7 @@ impl Shard {
             && self.outcomes.iter().all(is_whole)
     }
 
-    /// Names the first thing in which this shard's evaluation differs from that of `other`.
+    /// Names the first difference between this shard's evaluation and that of `other`; `None` if there is none.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let policies = |shard: &Self| shard.outcomes.iter().map(|outcome| outcome.policy.clone()).collect::<Vec<_>>();
 
@@ -189,7 +189,7 @@ impl Shard {
 /// Merges `shards`, each with the name of its file, into one report and each policy's paths.
 ///
 /// # Errors
-/// When they belong to several evaluations, some are missing, or there was nothing to focus on.
+/// If they belong to several evaluations, some are missing, or there was nothing to focus on.
 pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>), MergeError> {
     if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
         return Err(MergeError::NoShard(name.clone()));
@@ -197,7 +197,7 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>),
 
     shards.sort_by_key(|(_, shard)| shard.part.index);
 
-    // Sorted by part, so that a part given twice stands beside itself.
+    // The shards are sorted by part, so two copies of a part are neighbours.
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
         let first = first.clone();

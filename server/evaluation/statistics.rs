@@ -5,24 +5,24 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Mean; 0 of nothing.
+/// Mean; 0 if there are no values.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Standard deviation over the values at hand (divided by their number).
+/// Standard deviation of the values themselves (divided by their number, not by one less).
 #[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     let centre = mean(values);
     (values.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Resamples of a bootstrap.
+/// Number of resamples in a bootstrap.
 pub const RESAMPLES: usize = 2000;
 
-/// The 95 % percentile-bootstrap interval of the mean (Efron 1979) from [`RESAMPLES`] resamples drawn from `seed`; zeros
-/// of nothing.
+/// The 95 % percentile-bootstrap interval of the mean (Efron 1979) from [`RESAMPLES`] resamples drawn from `seed`;
+/// zeros if there are no values.
 #[must_use]
 pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
     let mean_of = |drawn: &[usize]| Some(drawn.iter().map(|&place| values[place]).sum::<f64>() / values.len() as f64);
@@ -30,7 +30,8 @@ pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
 }
 
 /// The 95 % percentile-bootstrap interval of any statistic of `count` units: `statistic` computes it from the places of
-/// the units that were drawn. Resamples without a statistic are left out; `None` where none has one.
+/// the units that were drawn. Resamples for which it returns `None` are left out. The result is `None` if no resample
+/// is left.
 #[must_use]
 pub fn bootstrap_statistic(count: usize, seed: u64, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
     if count == 0 {
@@ -51,7 +52,7 @@ pub fn bootstrap_statistic(count: usize, seed: u64, statistic: impl Fn(&[usize])
     Some((*low, *high))
 }
 
-/// Most pairs for which [`wilcoxon`]'s p is exact; `SciPy` and R have the same bound.
+/// Most differing pairs for which [`wilcoxon`]'s p is exact; `SciPy` and R have the same bound.
 const MOST_EXACT: usize = 50;
 
 /// How a [`SignedRank`]'s p was computed.
@@ -67,7 +68,7 @@ pub enum Method {
 /// Result of the paired Wilcoxon signed-rank test (Wilcoxon 1945).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignedRank {
-    /// Two-sided p; 1 where no pair differs.
+    /// Two-sided p; 1 if no pair differs.
     pub p: f64,
     /// How it was computed.
     pub method: Method,
@@ -80,8 +81,8 @@ pub struct SignedRank {
 }
 
 impl SignedRank {
-    /// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero less that below it
-    /// (Kerby 2014, Comprehensive Psychology 3:1); `None` where no pair differs.
+    /// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero minus that below zero
+    /// (Kerby 2014, Comprehensive Psychology 3:1). `None` if no pair differs.
     #[must_use]
     pub fn rank_biserial(&self) -> Option<f64> {
         let all = self.positive + self.negative;
@@ -89,8 +90,8 @@ impl SignedRank {
     }
 }
 
-/// Tests whether paired values differ. Pairs without a difference are left out; equal differences
-/// share their mean rank. p is exact for at most 50 pairs that differ, ties or not.
+/// Tests whether paired values differ. Pairs without a difference are left out; equal differences share their mean
+/// rank. p is exact for at most 50 pairs that differ, with or without ties.
 #[must_use]
 pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     let mut differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).filter(|d| *d != 0.0).collect();
@@ -114,7 +115,8 @@ pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     }
 }
 
-/// Twice the rank of each of these differences, which rise in size: a whole number, also where ties share a mean rank.
+/// Twice the rank of each of `differences`, which must rise in size. Twice a rank is a whole number even where ties
+/// share a mean rank.
 fn doubled_ranks(differences: &[f64]) -> Vec<usize> {
     let mut ranks = Vec::with_capacity(differences.len());
     while let Some(size) = differences.get(ranks.len()).map(|d| d.abs()) {
@@ -125,7 +127,7 @@ fn doubled_ranks(differences: &[f64]) -> Vec<usize> {
     ranks
 }
 
-/// Two-sided p of a sum of `ranks` of `positive` if each rank counted by the toss of a coin.
+/// Two-sided p of the sum `positive`, if each of `ranks` is added with probability 1/2.
 fn exact(ranks: &[usize], positive: usize) -> f64 {
     // Number of patterns of signs for each sum: below 2^50, exact as floating point.
     let mut patterns = vec![0.0; ranks.iter().sum::<usize>() + 1];
@@ -159,8 +161,8 @@ pub fn normal_two_sided(z: f64) -> f64 {
     complementary_error(z.abs() / std::f64::consts::SQRT_2)
 }
 
-/// Each p corrected by Holm's method (1979) for the number of comparisons: below 0.05 where the
-/// chance of any false finding among all of them is below 0.05.
+/// Each p corrected by Holm's method (1979) for the number of comparisons. If every corrected p below 0.05 counts as a
+/// finding, the chance of any false finding among all of them is below 0.05.
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
@@ -215,7 +217,7 @@ mod tests {
         p_holm: Vec<f64>,
     }
 
-    /// What `tests/vectors/wilcoxon.py` wrote.
+    /// The output of `tests/vectors/wilcoxon.py`.
     #[derive(Deserialize)]
     struct Vectors {
         cases: Vec<Case>,

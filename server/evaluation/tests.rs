@@ -1,4 +1,4 @@
-//! What an evaluation's figures are, worked by hand, and how it ends.
+//! An evaluation's figures, compared with values worked out by hand, and how an evaluation ends.
 
 use crate::scans::benchmark::{Benchmark, Conditions};
 use crate::scans::simulated::{ScanSettings, Scene};
@@ -17,7 +17,7 @@ fn row(focal_power: Vec<f64>, optimum: Vec<f64>) -> Row {
 
 #[test]
 fn figures_of_fewer_poses_than_parts_are_those_of_the_whole_path() {
-    // To and fro by a step, a frame at a time: 11 moves, 10 turns in 12 frames of 1/25 s.
+    // Forwards and backwards by one step, at every frame: 11 moves, 10 turns in 12 frames of 1/25 s.
     let to_and_fro = (0..12).map(|index| 0.5 + 0.05 * f64::from(index % 2)).collect();
     let row = row(to_and_fro, vec![0.5; 12]);
     assert_eq!((row.frames, row.scan_mae.len()), (12, 12));
@@ -49,7 +49,7 @@ fn figures_of_a_number_of_poses_that_parts_do_not_divide_are_those_of_the_whole_
     }
 }
 
-/// Answers no number from its third frame on.
+/// A policy that returns NaN from its third frame on.
 struct GivesUp(usize);
 
 impl Policy for GivesUp {

@@ -1,8 +1,8 @@
-//! Health: how the server is, for whoever watches it. Told from what the parts already know, so that a question is
-//! answered while the disk hangs.
+//! Health: how the running server is, for those who monitor it. It is derived from what the parts already know, so a
+//! request is answered even while the disk hangs.
 //!
-//! It is open to everyone who reaches the server. So it says nothing of a person or a policy, and names no device: its
-//! sentences are fixed.
+//! It is open to everyone who reaches the server. So it says nothing about a person or a policy, and names no device:
+//! its sentences are fixed.
 
 mod signs;
 mod watch;
@@ -13,7 +13,7 @@ pub use watch::HealthWatch;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// How the server is.
+/// The server's condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Condition {
@@ -29,21 +29,21 @@ pub enum Condition {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Code {
-    /// No frames come.
+    /// The camera delivers no frames.
     CameraSilent,
     /// The lens takes no commands.
     LensGone,
     /// The lens works, but not properly.
     LensWarns,
-    /// The disk of the data folder has little room.
+    /// The disk of the data folder has little free space.
     DiskNearlyFull,
-    /// The disk of the data folder does not tell its room.
+    /// The disk of the data folder does not report its free space.
     DiskSilent,
-    /// The last attempt to write to the database failed, or takes long.
+    /// The last write to the database failed, or a write takes long.
     DatabaseTroubled,
-    /// The database could not be written for a minute, or a write has been under way for minutes.
+    /// Writes to the database have failed for a minute, or a write has been under way for minutes.
     DatabaseUnwritable,
-    /// What stopped a session is not recorded yet.
+    /// The event that stopped a session is not recorded yet.
     EventsUnrecorded,
     /// Records of the focus loop were lost within the last ten minutes.
     TelemetryLost,
@@ -84,12 +84,14 @@ impl Code {
             Self::LensGone => "The lens takes no commands. Check its cable and power.",
             Self::LensWarns => "The lens works, but reports a condition. The operator's page says which.",
             Self::DiskNearlyFull => "The disk of the data folder has less than 1 GiB free. Make room.",
-            Self::DiskSilent => "The disk of the data folder does not tell its room. Check that it is connected.",
+            Self::DiskSilent => {
+                "The disk of the data folder does not report its free space. Check that it is connected."
+            }
             Self::DatabaseTroubled => {
                 "Writing to the database failed or takes long; it is tried again. Check the disk's room and cable."
             }
             Self::DatabaseUnwritable => {
-                "The database has not taken anything for a minute or more. Check that its disk has room and works."
+                "Nothing could be written to the database for a minute or more. Check that its disk works and has free space."
             }
             Self::EventsUnrecorded => "What stopped a session is not recorded yet. It is tried again.",
             Self::TelemetryLost => {

@@ -1,31 +1,32 @@
-//! What is looked at to tell how the server is, and what it comes to.
+//! The signs from which the server's health is judged, and the problems that they show.
 
 use std::time::Duration;
 
 use super::{Code, Condition, Problem};
 use crate::doctor::LEAST_ROOM;
 
-/// A loop that has said nothing for so long has stalled: it publishes five times a second, also without a camera.
+/// A control loop that has published nothing for this long has stalled: it publishes five times a second, even
+/// without a camera.
 const STALLED: Duration = Duration::from_secs(5);
 
-/// A write that takes so long is worth a look.
+/// A write that takes this long is reported as a problem.
 const SLOW: Duration = Duration::from_secs(10);
-/// A write that takes so long will not end. An erasure, which writes the whole file anew, takes less.
+/// A write that takes this long is taken to be stuck. Even an erasure, which rewrites the whole file, takes less.
 const STUCK: Duration = Duration::from_mins(5);
 
-/// Writes that have failed for so long, with an attempt since [`RECENT`], are no passing trouble.
+/// Writes that have failed for this long, the last time within [`RECENT`], are not a passing problem.
 const UNWRITABLE: Duration = Duration::from_mins(1);
 const RECENT: Duration = Duration::from_secs(30);
 
-/// What the disk said last.
+/// The disk's last answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DiskSign {
-    /// It was not asked yet.
+    /// The disk was not asked yet.
     #[default]
     NotAsked,
-    /// So many bytes are free.
+    /// Free space in bytes.
     Free(u64),
-    /// It does not answer, or says that it fails.
+    /// The disk does not answer, or reports an error.
     Silent,
 }
 
@@ -35,7 +36,7 @@ impl DiskSign {
     }
 }
 
-/// What the parts of the server know of themselves.
+/// What the parts of the server report about themselves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[allow(clippy::struct_excessive_bools, reason = "signs that are independent of each other")]
 pub struct Signs {
@@ -45,19 +46,19 @@ pub struct Signs {
     pub lens_works: bool,
     /// Whether the lens works, but not properly.
     pub lens_warns: bool,
-    /// How long ago the control loop said anything; none once it has ended.
+    /// Time since the control loop last published its status; none once it has ended.
     pub loop_spoke_ago: Option<Duration>,
-    /// For how long a write to the database has been under way, if one is.
+    /// How long a write to the database has been under way; none if there is none.
     pub write_under_way_for: Option<Duration>,
-    /// For how long writes have failed, if the last one did.
+    /// How long writes have been failing; none unless the last one failed.
     pub writes_failing_for: Option<Duration>,
-    /// How long ago a write failed, if one ever did.
+    /// Time since a write last failed; none if no write ever did.
     pub write_failed_ago: Option<Duration>,
-    /// Whether what stopped a session is not recorded yet.
+    /// Whether the event that stopped a session is not recorded yet.
     pub events_unrecorded: bool,
-    /// Whether telemetry was lost lately.
+    /// Whether telemetry was lost recently.
     pub telemetry_lost: bool,
-    /// The disk of the data folder.
+    /// Last answer of the data folder's disk.
     pub disk: DiskSign,
 }
 
@@ -78,7 +79,7 @@ impl Signs {
             (self.telemetry_lost, Code::TelemetryLost),
             (self.disk == DiskSign::Silent, Code::DiskSilent),
             (self.disk.has_less_than(LEAST_ROOM), Code::DiskNearlyFull),
-            // A loop that has stalled knows nothing of its devices.
+            // A stalled loop knows nothing about its devices.
             (!stalled && !self.camera_works, Code::CameraSilent),
             (!stalled && !self.lens_works, Code::LensGone),
             (!stalled && self.lens_works && self.lens_warns, Code::LensWarns),
@@ -89,13 +90,13 @@ impl Signs {
     fn is_unwritable(&self) -> bool {
         let stuck = self.write_under_way_for.is_some_and(|under_way| under_way >= STUCK);
         let failing = self.writes_failing_for.is_some_and(|failing| failing >= UNWRITABLE);
-        // Where nothing has been written since, because nobody said anything, it may work again.
+        // If nothing has been written since, because there was nothing to record, it may work again.
         let tried = self.write_failed_ago.is_some_and(|ago| ago <= RECENT);
         stuck || (failing && tried)
     }
 }
 
-/// How the server is that has these `problems`.
+/// The condition of a server with these `problems`: that of the worst.
 #[must_use]
 pub(super) fn condition(problems: &[Problem]) -> Condition {
     problems.iter().map(|problem| problem.condition).max().unwrap_or(Condition::Ok)

@@ -1,4 +1,4 @@
-//! Gathers the signs. The disk alone is asked, now and then and on a thread of its own; all else is known.
+//! Gathers the signs. Only the disk is asked, every few seconds and on a separate thread; everything else is known.
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -17,14 +17,14 @@ use crate::recording::room;
 use crate::store::Store;
 use crate::trial::view::OperatorView;
 
-/// How often the disk is asked, and lost telemetry is looked for.
+/// Interval at which the disk is asked and lost telemetry is counted.
 const EVERY: Duration = Duration::from_secs(5);
-/// A disk that does not answer within this time is silent.
+/// A disk that does not answer within this time counts as silent.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Telemetry that was lost this long ago is no news any more.
+/// How long a loss of telemetry is reported.
 const NEWS: Duration = Duration::from_mins(10);
 
-/// Watches how the server is. Clone freely.
+/// Watches the server's health. Clone freely.
 #[derive(Clone)]
 pub struct HealthWatch(Arc<Shared>);
 
@@ -36,18 +36,18 @@ struct Shared {
     looked: Mutex<Looked>,
 }
 
-/// What is looked at now and then.
+/// Results of the periodic checks.
 #[derive(Default)]
 struct Looked {
     disk: DiskSign,
-    /// Telemetry lost since the start, and when the latest of it was missed.
+    /// Telemetry records lost since the start. `lost_at` is when the number last rose.
     lost: u64,
     lost_at: Option<Moment>,
 }
 
 impl HealthWatch {
-    /// A watch over the loop with this `status`, the sessions and the database. Something has to await
-    /// [`HealthWatch::run`] for the disk and lost telemetry to be seen.
+    /// A watch over the loop with this `status`, the sessions and the database. It checks the disk and lost telemetry
+    /// only while [`HealthWatch::run`] is awaited.
     #[must_use]
     pub fn new(
         clock: Arc<dyn Clock>,
@@ -58,11 +58,11 @@ impl HealthWatch {
         Self(Arc::new(Shared { clock, status, session, store, looked: Mutex::default() }))
     }
 
-    /// Looks at the disk and at lost telemetry now and then. Never ends.
+    /// Checks the disk and lost telemetry every few seconds. Never ends.
     pub async fn run(self) {
         let mut ticks = interval(EVERY);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        // A disk that hangs keeps its thread; it is not asked again before that one has answered.
+        // A disk that hangs blocks its thread, so it is not asked again before that thread has answered.
         let mut asked = None;
 
         loop {
@@ -83,7 +83,7 @@ impl HealthWatch {
         }
     }
 
-    /// How the server is, and what is wrong, the worst first. Waits for nothing.
+    /// The server's condition and its problems, the worst first. Waits for nothing.
     #[must_use]
     pub fn now(&self) -> (Condition, Vec<Problem>) {
         let problems = self.0.signs().problems();
@@ -134,7 +134,7 @@ impl Shared {
     }
 }
 
-/// Asks the disk of `folder` for its room; may take as long as the disk does.
+/// Asks for the free space on the disk of `folder`; blocks until the disk answers.
 fn disk(folder: &Path) -> DiskSign {
     room(folder).map_or(DiskSign::Silent, |room| DiskSign::Free(room.available))
 }

@@ -1,4 +1,4 @@
-//! The leads' page on personal accounts: making them, and changing what they may do.
+//! The leads' page of personal accounts: makes them, and changes what they may do.
 
 use askama::Template;
 use axum::Json;
@@ -26,7 +26,7 @@ use crate::trial::refusal::Refusal;
 #[template(path = "accounts.html")]
 struct Page {
     nonce: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
     accounts: Vec<AccountLine>,
 }
@@ -38,7 +38,7 @@ impl Page {
         now::on_people(self.accounts.iter().any(|line| line.set_by_another && !line.account.disabled))
     }
 
-    /// When somebody last signed in, on the clock of the room.
+    /// When somebody last signed in, in local time.
     fn last_signed_in(at: Option<&Timestamp>) -> String {
         at.map_or_else(|| "never".to_owned(), |at| local(at, "%Y-%m-%d %H:%M"))
     }
@@ -84,13 +84,13 @@ async fn list(by: Researcher, State(app): State<AppState>) -> Result<Json<Vec<Ac
 struct NewAccount {
     /// The name that the person will sign in with: lower-case letters, digits, dots and dashes.
     account: String,
-    /// The person's name, as signatures will have it.
+    /// The person's name, as it will appear in signatures.
     display: String,
     /// What the person may do.
     role: AccountRole,
-    /// The passphrase for the person's first sign-in, who then chooses another.
+    /// The passphrase for the person's first sign-in, where the person then chooses another.
     first_passphrase: String,
-    /// The lead's own passphrase, once more.
+    /// The lead's own passphrase, entered again.
     passphrase: String,
 }
 
@@ -113,25 +113,25 @@ async fn make(
     Ok(Json(app.accounts.add(name, &new.display, new.role, first, Some(&lead.account)).await?))
 }
 
-/// What is to be done to an account.
+/// A change to make to an account.
 #[derive(Deserialize, ToSchema)]
 #[serde(tag = "change", rename_all = "kebab-case")]
 #[schema(as = AccountAction)]
 enum WantedChange {
-    /// Another role.
+    /// Gives the account another role.
     Role {
-        /// The role.
+        /// The new role.
         role: AccountRole,
     },
-    /// The person may not sign in any more; all sign-ins end.
+    /// Disables the account: the person can no longer sign in, and all sign-ins end.
     Disable,
-    /// The person may sign in again.
+    /// Enables the account: the person can sign in again.
     Enable,
-    /// All sign-ins end.
+    /// Ends all sign-ins.
     SignOut,
-    /// Another passphrase, for one sign-in, at which the person chooses another; all sign-ins end.
+    /// Sets a passphrase for one sign-in, where the person then chooses another. All sign-ins end.
     Passphrase {
-        /// The passphrase.
+        /// The passphrase for that sign-in.
         first_passphrase: String,
     },
 }
@@ -139,10 +139,10 @@ enum WantedChange {
 /// A change of an account, confirmed by a lead.
 #[derive(Deserialize, ToSchema)]
 struct ChangeAccount {
-    /// What is to be done.
+    /// The change.
     #[serde(flatten)]
     change: WantedChange,
-    /// The lead's own passphrase, once more.
+    /// The lead's own passphrase, entered again.
     passphrase: String,
 }
 
@@ -152,7 +152,7 @@ struct ChangeAccount {
     (status = 200, body = Vec<AccountLine>),
     (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
     (status = 404, description = "No such account", body = ErrorBody),
-    (status = 409, description = "It is the last account that leads", body = ErrorBody),
+    (status = 409, description = "It is the last lead who can sign in", body = ErrorBody),
     (status = 422, description = "A passphrase is missing or malformed", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
 async fn change(

@@ -1,4 +1,4 @@
-//! The analysis of an unblinded study: a page that prints, JSON, and a ZIP file. Each look at it is recorded.
+//! The analysis of an unblinded study: a printable page, JSON, and a ZIP file. Each access is recorded.
 
 use askama::Template;
 use axum::Json;
@@ -34,11 +34,11 @@ impl From<AnalysisError> for Error {
     }
 }
 
-/// The analysis of `study`, once it is recorded that it was looked at.
+/// Records that the analysis of `study` is viewed, then returns it.
 async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analysis, Error> {
     by.personally()?;
     let reader = app.conductor.reader();
-    // What is refused is not recorded.
+    // A refused request is not recorded.
     check(reader, study).await?;
     let access = Access::AnalysisViewed { study: study.to_owned() };
     app.conductor.recorder(by.actor()).record(&access).await.map_err(ConductError::from)?;
@@ -51,37 +51,37 @@ struct AnalysisPage {
     analysis: Analysis,
     /// When this page was made.
     made: Timestamp,
-    /// The head of the chain, and with it of every record that the analysis read.
+    /// The head of the chain, which covers every record that the analysis has read.
     chain: String,
-    /// The version that made it.
+    /// The version of parfocal that made this page.
     version: &'static str,
-    /// The line that committed to all orders.
+    /// The line that commits to all orders.
     commitment: Option<String>,
 }
 
 impl AnalysisPage {
-    /// When this page was made, in the words of the room.
+    /// When this page was made, in words and local time.
     fn made(&self) -> String {
         super::researcher::day_and_time(&self.made)
     }
 
-    /// When the study was unblinded, in the words of the room.
+    /// When the study was unblinded, in words and local time.
     fn unblinded(&self) -> String {
         super::researcher::day_and_time(&self.analysis.unblinded)
     }
 }
 
-/// What surgeons said in the settings of one policy, or beside all settings.
+/// What a surgeon said in the settings of one policy or, without one, outside all settings.
 fn said_of<'a>(surgeon: &'a SurgeonWords, policy: Option<&str>) -> Vec<&'a SettingWords> {
     surgeon.settings.iter().filter(|setting| setting.policy.as_deref() == policy).collect()
 }
 
-/// A number in a table.
+/// A number for a table, with three decimals; a dash if there is none.
 fn number(value: Option<&f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| decimals(*value, 3))
 }
 
-/// p of all policies in a table: Friedman's over permutations; of two policies Wilcoxon's.
+/// The p over all policies for a table: that of Friedman's permutation test, or for two policies of Wilcoxon's test.
 fn p_of_all(compared: &Comparison) -> String {
     let friedman = compared.difference.friedman.as_ref().map(|friedman| friedman.p_permutation);
     let only_pair = match compared.pairs.as_slice() {
@@ -91,13 +91,13 @@ fn p_of_all(compared: &Comparison) -> String {
     friedman.or(only_pair).map_or_else(|| "–".to_owned(), |p| p_words(p).replace("p = ", "").replace("p < ", "< "))
 }
 
-/// Kendall's W in a table.
+/// Kendall's W for a table; a dash if there is none.
 fn w_of(compared: &Comparison) -> String {
     let w = compared.difference.friedman.as_ref().map(|friedman| friedman.kendalls_w);
     w.map_or_else(|| "–".to_owned(), |w| decimals(w, 2))
 }
 
-/// The sessions of a protocol that do not count or of which something is to be known.
+/// The sessions of a protocol that have a remark, for example why they do not count.
 fn remarked(protocol: &ProtocolAnalysis) -> Vec<&crate::analysis::AnalysedSession> {
     protocol.sessions.iter().filter(|session| session.remark.is_some()).collect()
 }
@@ -121,7 +121,7 @@ async fn analysis_page(
     AnalysisPage { analysis, made, chain, version, commitment }.render().map(Html).map_err(|_| Error::Internal)
 }
 
-/// The analysis of a study. Each look at it is recorded.
+/// The analysis of a study. Each access is recorded.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/analysis", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, body = Analysis),
@@ -150,7 +150,7 @@ async fn analysis_zip(
     let name = Analysis::folder_name(&study);
     let (zip, bytes) = ZipStream::new(name.clone());
 
-    // On a thread of its own: compressing would hold up the streams.
+    // On a separate thread: compressing would delay the streams.
     tokio::task::spawn_blocking(move || {
         if let Err(error) = Handle::current().block_on(analysis.into_zip(zip)) {
             tracing::warn!(%study, %error, "the download of an analysis was cut off");

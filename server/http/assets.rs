@@ -1,5 +1,5 @@
-//! Static files, part of the program. Their addresses hold a hash of all of them: they can be kept forever, and a new
-//! version of the program is never mixed with old files.
+//! Static files, built into the program. Their addresses contain a hash of all of them, so browsers can keep them
+//! forever, and a new version of the program is never mixed with old files.
 
 use std::sync::LazyLock;
 
@@ -24,7 +24,7 @@ macro_rules! assets {
     };
 }
 
-/// Every file of `web/static/`, by folder and name. A test compares this table with the folder.
+/// All files of `web/static/`, by folder and name. A test compares this table with the folder.
 static ASSETS: &[Asset] = &assets![
     "accounts/people.js",
     "accounts/sign_in.js",
@@ -133,7 +133,7 @@ static ASSETS: &[Asset] = &assets![
     "trust/verdict.js",
 ];
 
-/// Hash of all files, in hexadecimal.
+/// Hash of all files: the first 8 bytes of a SHA-256, in hexadecimal.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let mut hash = Sha256::new();
     for asset in ASSETS {
@@ -150,7 +150,7 @@ pub fn url(name: &str) -> String {
     format!("/static/{}/{name}", *VERSION)
 }
 
-/// Hash of all files, as in their addresses.
+/// Hash of all files, as it appears in their addresses.
 #[must_use]
 pub fn version() -> &'static str {
     &VERSION
@@ -161,7 +161,7 @@ pub fn urls_in(folder: &str) -> impl Iterator<Item = String> {
     ASSETS.iter().filter(move |asset| asset.name.split('/').next() == Some(folder)).map(|asset| url(asset.name))
 }
 
-/// What static file `name` holds; nothing where there is no such file.
+/// The content of static file `name`; `None` if there is no such file.
 #[must_use]
 pub fn body(name: &str) -> Option<&'static [u8]> {
     ASSETS.iter().find(|asset| asset.name == name).map(|asset| asset.body)
@@ -190,7 +190,8 @@ async fn asset(
     let name = format!("{folder}/{name}");
     let body = body(&name).ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
 
-    // A page of an older program asks by the older hash. It gets the present file, and must not keep it.
+    // A page of an older version of the program asks with the older hash. It gets the current file, and must not keep
+    // it.
     let cache = if version == *VERSION { "public, max-age=31536000, immutable" } else { "no-cache" };
     let etag = format!("\"{}\"", *VERSION);
     let common = [(CACHE_CONTROL, cache.to_owned()), (ETAG, etag.clone())];

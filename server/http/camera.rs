@@ -1,4 +1,4 @@
-//! What an operator may change on a camera while it runs: exposure, gain, frame rate.
+//! The camera settings that an operator may change while the camera runs: exposure, gain, frame rate.
 
 use axum::Json;
 use axum::extract::State;
@@ -14,24 +14,25 @@ use super::{App, AppState};
 use crate::camera::{CameraOffer, ControlError, Setting};
 use crate::store::DeviceEvent;
 
-/// What can be changed now, with the camera's own bounds. Empty for a camera that has nothing to change, or is away.
+/// What can be changed now, with the camera's own bounds. Empty for a camera without such settings, or one that is
+/// disconnected.
 #[utoipa::path(get, path = "/api/operator/camera", tag = "operator", responses((status = 200, body = CameraOffer)))]
 async fn offer(_: Operator, State(app): State<AppState>) -> Json<CameraOffer> {
     Json(app.control.camera.as_ref().map(crate::camera::Controls::offered).unwrap_or_default())
 }
 
-/// A setting to be changed.
+/// A setting to change.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Change {
-    /// Which.
+    /// The setting.
     setting: Setting,
-    /// To what: microseconds, the camera's unit of gain, or frames a second.
+    /// The new value: microseconds, the camera's unit of gain, or frames a second.
     value: f64,
 }
 
-/// Changes a setting, before the next frame.
+/// Changes a setting before the next frame.
 ///
-/// What the camera makes of it is in `/api/operator/camera` and the live status.
+/// `/api/operator/camera` and the live status show the value that the camera then uses.
 #[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
     (status = 204, description = "The camera was asked"),
     (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
@@ -54,7 +55,7 @@ async fn change(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Logs the change, so that a picture that changed can be explained later.
+/// Logs the change, so that a change in the picture can be explained later.
 async fn record(app: &App, message: String) -> Result<(), Error> {
     let working = app.control.status.borrow().camera.working;
     let wall = app.clock.wall();

@@ -1,5 +1,5 @@
-//! The operator's card that says whether everything is ready for a trial: what `parfocal doctor` says of the machine,
-//! and what the running server knows of its devices and of the surgeon's tablet.
+//! The operator's card that says whether everything is ready for a trial: the checks of `parfocal doctor` on the
+//! machine, and what the running server knows about its devices and the surgeon's tablet.
 
 use std::sync::Arc;
 
@@ -19,19 +19,20 @@ use super::{App, AppState};
 use crate::doctor::{self, Finding};
 use crate::store::database_state;
 
-/// What was found.
+/// Results of all checks.
 #[derive(Debug, Serialize, ToSchema)]
 struct Checks {
-    /// When, by the server's wall clock.
+    /// When the checks were made, by the server's wall clock.
     #[schema(value_type = String)]
     at: Timestamp,
-    /// What was looked at, and what to do.
+    /// One result for each thing that was checked.
     findings: Vec<Finding>,
 }
 
 /// Whether everything is ready for a trial.
 ///
-/// Looks at the machine and the database anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
+/// Checks the machine and the database again.
+/// Devices are not asked, because the focus loop holds them: the server reports what it already knows.
 #[utoipa::path(get, path = "/api/operator/checks", tag = "operator", responses((status = 200, body = Checks)))]
 async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;

@@ -1,4 +1,4 @@
-//! Connections: accepts them, as many as there are places, and sees to it that no queue forms behind a slow one.
+//! Accepts connections, as many as there are places, and prevents queues behind slow ones.
 
 use std::io;
 use std::net::SocketAddr;
@@ -23,30 +23,30 @@ use super::door::Door;
 use super::places::Places;
 use super::shutdown::ended;
 
-/// What one connection may hold back in this process: about half a frame, so that a stream gets a new frame only when
-/// the last has gone to the kernel.
+/// Bytes that one connection may buffer in this process: about half a frame, so that a stream gets a new frame only
+/// when the last one has gone to the kernel.
 const BUFFER: usize = 16 * 1024;
 
-/// The limit of a request's headers over HTTP/2; over HTTP/1 the buffer is.
+/// Largest headers of a request over HTTP/2, bytes. Over HTTP/1 [`BUFFER`] is the limit.
 const HEADERS: u32 = 16 * 1024;
 
-/// What the kernel may hold unsent before it takes no more; it would take megabytes, which is seconds of pictures.
+/// Unsent bytes at which the kernel takes no more. By default it would take megabytes, which is seconds of pictures.
 const UNSENT: u32 = 16 * 1024;
 
-/// A browser that has not said what it wants by then never will.
+/// Time limit for a request's headers over HTTP/1.
 const HEADERS_WITHIN: Duration = Duration::from_secs(30);
 
-/// Wait after a failed accept: the system is out of something, and will be at once again.
+/// Wait after a failed accept: the system has run out of some resource, and an immediate retry would fail too.
 const BREATHER: Duration = Duration::from_millis(50);
 
-/// A browser shakes hands within two round trips, once it has been asked whether it trusts the certificate.
+/// Time limit for the TLS handshake. It takes a browser two round trips, once it trusts the certificate.
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(10);
 
-/// Over HTTP/2 a browser is asked so often whether it is still there, and given so long to answer.
+/// Over HTTP/2, a browser is asked at this interval whether it is still there, and has as long to answer.
 const STILL_THERE: Duration = Duration::from_secs(20);
 
-/// Lets connections on `listener` in through `door` until `shutdown` turns true. They then end when what is under way is
-/// answered; each holds `shutdown` until it has.
+/// Accepts connections on `listener` and opens them with `door` until `shutdown` turns true. Each connection then ends
+/// once its requests under way are answered, and holds a clone of `shutdown` until then.
 pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch::Receiver<bool>) {
     let places = Places::default();
     loop {
@@ -75,7 +75,7 @@ async fn serve_one(
     door: Door,
     mut shutdown: watch::Receiver<bool>,
 ) {
-    // Where a socket cannot be tuned it still works.
+    // A socket that cannot be tuned still works.
     let _ = stream.set_nodelay(true);
     let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
 
@@ -90,7 +90,7 @@ async fn serve_one(
 
     let opened = match opened {
         Ok(Ok(opened)) => opened,
-        // Most often a device that does not trust the certificate.
+        // Most often this is a device that does not trust the certificate.
         Ok(Err(error)) => {
             tracing::debug!(%peer, %error, "a handshake failed");
             return;
@@ -129,8 +129,8 @@ async fn serve_one(
     }
 }
 
-/// How requests are read and answered. A WebSocket comes over HTTP/1 also from a browser that uses HTTP/2 for pages: a
-/// connection of their own, in which no page's bytes stand before a picture.
+/// How requests are read and answered. A WebSocket always comes over HTTP/1, even from a browser that uses HTTP/2 for
+/// pages. So it has its own connection, in which no page's bytes are queued before a picture.
 fn builder(http2: bool) -> Builder<TokioExecutor> {
     let builder = Builder::new(TokioExecutor::new());
     let mut builder = if http2 { builder.http2_only() } else { builder.http1_only() };
@@ -144,7 +144,8 @@ fn builder(http2: bool) -> Builder<TokioExecutor> {
     builder
 }
 
-/// HTTP/2 names the host in the request's address (RFC 9113, 8.3.1). Everything after this looks for it in the header.
+/// Copies the host into the header, where all later code looks for it: HTTP/2 names it in the request's address
+/// (RFC 9113, 8.3.1).
 fn name_host(request: &mut Request<Incoming>) {
     if request.version() != Version::HTTP_2 {
         return;

@@ -1,4 +1,5 @@
-//! What the headers of a request show: a role's cookie or key, the surgeon's link to one session, an account's token.
+//! The credentials in a request's headers: a role's cookie or key, the surgeon's link to one session, an account's
+//! token.
 
 use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, COOKIE};
@@ -11,7 +12,7 @@ use crate::trial::role::Role;
 /// The cookie of a browser that is signed in under a personal account.
 pub(super) const ACCOUNT_COOKIE: &str = "parfocal-account";
 
-/// Whether a request with these headers speaks for `role`: by its cookie or its bearer token.
+/// Whether a request with these headers holds `role`, by its cookie or its bearer token.
 pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
     if role == Role::Surgeon {
         return pass(headers, keys).is_some();
@@ -20,16 +21,16 @@ pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
         || bearer(headers).is_some_and(|key| keys.role_of(key) == Some(role))
 }
 
-/// What lets a tablet in as the surgeon.
+/// The link by which a tablet acts as the surgeon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pass {
-    /// The link of the role: for sessions outside studies.
+    /// The link of the role, for sessions outside studies.
     Shared,
     /// The link to one session of a study.
     Session(SessionId),
 }
 
-/// What a request with these headers shows to speak for the surgeon, whether or not its session has ended.
+/// The surgeon's link that a request with these headers holds, even if its session has ended.
 pub(super) fn pass(headers: &HeaderMap, keys: &Keys) -> Option<Pass> {
     let by_cookie = cookie(headers, cookie_name(Role::Surgeon)).and_then(|token| {
         let shared = keys.opens(Role::Surgeon, token).then_some(Pass::Shared);
@@ -42,7 +43,7 @@ pub(super) fn pass(headers: &HeaderMap, keys: &Keys) -> Option<Pass> {
     })
 }
 
-/// A name of the link that gave `pass`: it opens nothing, and tells one link from another.
+/// A name for the link of `pass`. It grants no access, and is different for each link.
 pub(super) fn link_name(pass: Pass, keys: &Keys) -> String {
     let token = match pass {
         Pass::Shared => keys.token(Role::Surgeon),
@@ -52,7 +53,7 @@ pub(super) fn link_name(pass: Pass, keys: &Keys) -> String {
     hex::encode(&digest[..8])
 }
 
-/// The cookie that shows `role`.
+/// Name of the cookie for `role`.
 pub(super) const fn cookie_name(role: Role) -> &'static str {
     match role {
         Role::Surgeon => "parfocal-surgeon",
@@ -62,8 +63,8 @@ pub(super) const fn cookie_name(role: Role) -> &'static str {
     }
 }
 
-/// The header that sets cookie `name` for `seconds`: for this site's own requests alone, and where the server is
-/// `encrypted` never sent in the clear.
+/// The header that sets cookie `name` for `seconds`. Browsers send it only with this site's own requests, and if the
+/// server is `encrypted` only over TLS.
 pub(super) fn set_cookie(name: &str, value: &str, seconds: u64, encrypted: bool) -> String {
     let secure = if encrypted { "; Secure" } else { "" };
     format!("{name}={value}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict{secure}")

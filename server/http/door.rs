@@ -1,7 +1,7 @@
-//! The door: what a new connection speaks, and which pages it gets.
+//! The door: finds out which protocol a new connection speaks, and which pages it gets.
 //!
-//! An encrypted server tells by a connection's first byte whether it begins a TLS handshake. Any other is a browser that
-//! does not encrypt: it is led to the encrypted page, on the same port.
+//! An encrypted server sees from a connection's first byte whether it begins a TLS handshake. Otherwise it is from a
+//! browser that does not encrypt, which is redirected to the encrypted page on the same port.
 
 use std::io;
 use std::pin::Pin;
@@ -18,30 +18,30 @@ use super::places::Place;
 /// The first byte of a TLS handshake (RFC 8446, 5.1); no method of HTTP begins with it.
 const HANDSHAKE: u8 = 22;
 
-/// How HTTP/2 is called when client and server choose (RFC 9113, 3.1).
+/// Name of HTTP/2 in the negotiation between client and server (RFC 9113, 3.1).
 const HTTP2: &[u8] = b"h2";
 
-/// What connections get.
+/// The pages that connections get.
 #[derive(Clone)]
 pub(super) enum Door {
-    /// Every page, to everyone in the clear.
+    /// Every page, unencrypted.
     Plain { pages: Router },
-    /// Every page encrypted; in the clear, only what leads there.
+    /// Encrypted, every page; unencrypted, only the pages that lead to the encrypted ones (`plain`).
     Encrypted { tls: TlsAcceptor, pages: Router, plain: Router },
 }
 
 /// A connection that is ready for requests.
 pub(super) struct Opened {
     pub(super) line: Box<dyn Line>,
-    /// Whether both ends have agreed on HTTP/2; it is HTTP/1 otherwise.
+    /// Whether both ends have agreed on HTTP/2; otherwise it is HTTP/1.
     pub(super) http2: bool,
-    /// What it gets.
+    /// The pages that this connection gets.
     pub(super) pages: Router,
 }
 
 impl Door {
-    /// Finds out what `stream` speaks, and shakes hands. Takes as long as the other end likes. Encryption holds back at
-    /// most `buffer` bytes.
+    /// Finds out which protocol `stream` speaks, and does the handshake. There is no time limit here. Encryption
+    /// buffers at most `buffer` bytes.
     pub(super) async fn open(self, stream: TcpStream, place: Arc<Place>, buffer: usize) -> io::Result<Opened> {
         let (tls, pages, plain) = match self {
             Self::Plain { pages } => {
@@ -57,7 +57,7 @@ impl Door {
             return Ok(Opened { line: Box::new(placed), http2: false, pages: plain });
         }
 
-        // A picture that waits here would be seen late.
+        // A picture that waits in this buffer would be seen late.
         let stream = tls.accept_with(placed, |connection| connection.set_buffer_limit(Some(buffer))).await?;
         let http2 = stream.get_ref().1.alpn_protocol() == Some(HTTP2);
         Ok(Opened { line: Box::new(stream), http2, pages })
@@ -69,7 +69,7 @@ pub(super) trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
 
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
 
-/// A connection with its place, which it keeps also as a WebSocket.
+/// A connection with its place. It keeps the place when it becomes a WebSocket.
 struct Placed {
     stream: TcpStream,
     _place: Arc<Place>,

@@ -1,4 +1,4 @@
-//! What the server knows of its devices from its start: the focus loop holds them, so they are not asked again.
+//! What the server learned about its devices when it started. The focus loop holds them, so they are not asked again.
 
 use std::sync::Arc;
 
@@ -7,20 +7,20 @@ use tokio::sync::Mutex;
 use crate::imaging::Calibration;
 use crate::lens::LensInfo;
 
-/// What the server knows of its devices from its start.
+/// What the server learned about its devices when it started.
 pub struct Equipment {
-    /// What the lens said of itself, if it did.
+    /// What the lens reported about itself, if it did.
     pub lens: Option<LensInfo>,
     /// The sensor's calibration.
     pub calibration: Arc<Calibration>,
-    /// Width and height of the camera's mosaics, samples; none of a camera that delivers colour pictures.
+    /// Width and height of the camera's mosaics, samples; `None` for a camera that delivers colour pictures.
     pub mosaics: Option<(usize, usize)>,
-    /// Held while the machine is looked at. A disk that hangs then holds one thread, however often somebody asks.
+    /// Held while the machine is checked, so that a hanging disk blocks only one thread, however often somebody asks.
     pub(super) look: Arc<Mutex<()>>,
 }
 
 impl Equipment {
-    /// A lens, a calibration and a camera as they were found.
+    /// A lens, a calibration and a camera as they were at the start.
     #[must_use]
     pub fn new(lens: Option<LensInfo>, calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
         Self { lens, calibration, mosaics, look: Arc::default() }

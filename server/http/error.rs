@@ -1,4 +1,5 @@
-//! Errors as people meet them: a page with a way on for a browser, `{"error": "…"}` for a program.
+//! Errors as people and programs get them: for a browser a page that says what to do next, for a program
+//! `{"error": "…"}`.
 
 use askama::Template;
 use axum::Json;
@@ -16,22 +17,22 @@ use crate::accounts::AccountError;
 use crate::conductor::ConductError;
 use crate::trial::role::Role;
 
-/// Why a request was not done. The text is for the person who reads it.
+/// The reason why a request was not done. The text is written for people.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum Error {
-    /// There is no such thing.
+    /// What was asked for does not exist.
     #[error("{0}")]
     NotFound(String),
-    /// It does not fit the present state; nothing was changed.
+    /// The request does not fit the current state; nothing was changed.
     #[error("{0}")]
     Conflict(String),
-    /// The request makes no sense.
+    /// The request is invalid.
     #[error("{0}")]
     Invalid(String),
-    /// The browser has not been let in to this role.
+    /// The browser does not hold this role.
     #[error("This page is for the {role}. Open it with the {role}'s link{}.", whence(*.0), role = role_name(*.0))]
     NeedsRole(Role),
-    /// The browser has not been let in to any role.
+    /// The browser holds no role.
     #[error(
         "This browser has not been let in yet. Open it with the link of your role: the server prints all three \
          when it starts; a surgeon gets the link from the operator."
@@ -39,20 +40,20 @@ pub enum Error {
     NoRole,
     /// The key in the link is not one of this server's.
     #[error(
-        "This link is not, or no longer, valid. A surgeon gets the link from the operator; \
+        "This link is not valid, or no longer valid. A surgeon gets the link from the operator; \
          the server printed all of them when it last started."
     )]
     WrongKey,
-    /// A surgeon's link to a session that is over.
+    /// The surgeon's link is to a session that has ended.
     #[error(
-        "This link was for one session, which has ended. What this tablet still holds of it is taken all the same. \
+        "This link was for one session, which has ended. This tablet can still send what it holds from that session. \
          For the next session the operator shows a new code."
     )]
     SessionOver,
-    /// The surgeon's shared link, in a session of a study.
-    #[error("The session under way has a link of its own. Scan the code on the operator's page.")]
+    /// The surgeon's shared link was used in a session of a study.
+    #[error("The session under way has its own link. Scan the code on the operator's page.")]
     NeedsSessionLink,
-    /// Nobody is signed in whose role may do this in a study.
+    /// In a study, this needs a sign-in under an account with this role.
     #[error(
         "This belongs to a study, where everybody but the surgeon acts under a personal account. The link of the \
          {role} is not enough: sign in at /sign-in with an account that may act as {role}.",
@@ -62,19 +63,19 @@ pub enum Error {
     /// Too many attempts to sign in failed.
     #[error("{0}")]
     TooMany(String),
-    /// Another role does this.
+    /// This role or account may not do this.
     #[error("{0}")]
     Forbidden(String),
-    /// A request that another site made.
+    /// The request was made by another site.
     #[error("This request came from another site and was not done. Go back to the page and try again from there.")]
     CrossSite,
-    /// A name that the server does not go by.
+    /// The server was asked for by a name that it does not accept.
     #[error(
         "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, \
          start it with --bind 0.0.0.0:8080 --tls."
     )]
     WrongHost,
-    /// A request to change something that could be read on the way.
+    /// A request that changes something was sent unencrypted.
     #[error(
         "This server takes encrypted requests alone. Send this one to https://{0} instead. A key or passphrase in it \
          could be read on the way: change it if others use this network."
@@ -83,18 +84,18 @@ pub enum Error {
     /// Members have no place left.
     #[error("Too many pages are open at once. Close some of them, then try again.")]
     Busy,
-    /// Disk or database failed; nothing was acknowledged.
+    /// The disk or the database failed; nothing was acknowledged.
     #[error("Could not be saved: {0}")]
     Storage(String),
-    /// Something in the database is of another version.
+    /// Something in the database comes from another version of parfocal.
     #[error("{0}")]
     Unreadable(String),
-    /// The server's own fault.
-    #[error("The server failed at this request; what was saved before is safe. The server's log says more.")]
+    /// The server itself failed.
+    #[error("The server failed to handle this request. What was saved before is safe. The server's log says more.")]
     Internal,
 }
 
-/// A failure as programs get it.
+/// An error as programs get it.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ErrorBody {
     /// What happened and what to do.
@@ -105,7 +106,7 @@ pub struct ErrorBody {
 }
 
 impl Error {
-    /// The status that goes with it.
+    /// The HTTP status of this error.
     #[must_use]
     pub const fn status(&self) -> StatusCode {
         match self {
@@ -158,7 +159,8 @@ impl From<AccountError> for Error {
 }
 
 impl IntoResponse for Error {
-    /// Leaves the error with the response; [`render`] makes the body once it knows who asked.
+    /// Attaches the error to the response. [`render`] makes the body, because it knows whether a browser or a program
+    /// asked.
     fn into_response(self) -> Response {
         let mut response = self.status().into_response();
         response.extensions_mut().insert(self);
@@ -171,18 +173,18 @@ impl IntoResponse for Error {
 struct ErrorPage<'a> {
     title: &'a str,
     message: &'a str,
-    /// Whether to load the page once more: a browser that followed another site's link keeps strict cookies back the
-    /// first time, and sends them when our own page asks.
+    /// Whether to load the page again: a browser that followed another site's link does not send strict cookies with
+    /// the first request, but sends them when our own page asks.
     reload: bool,
-    /// Where to sign in, and then come back here; none where that does not help.
+    /// Address to sign in, which leads back here; `None` if signing in does not help.
     sign_in: Option<String>,
 }
 
-/// Marks a failed response that keeps the body that its handler gave it.
+/// Marks a failed response that keeps the body from its handler.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnBody;
 
-/// Gives every failed response its body: a page for a browser on its way to a page, JSON for everyone else.
+/// Gives every failed response its body: a page if a browser asked for a page, otherwise JSON.
 pub async fn render(request: Request, next: Next) -> Response {
     let page = wants_page(request.headers());
     let from_elsewhere = request.headers().get("sec-fetch-site").is_some_and(|site| site == "cross-site");
@@ -203,12 +205,12 @@ pub async fn render(request: Request, next: Next) -> Response {
     let message = match &error {
         Some(error @ (Error::NeedsRole(_) | Error::NoRole)) if !page => format!("{error} {FOR_PROGRAMS}"),
         Some(error) => error.to_string(),
-        // What a parser said of an address is for programmers.
+        // A parser's message about an address is for programmers.
         None if page && status == StatusCode::BAD_REQUEST => MISSPELLED.to_owned(),
         None => message_of(status, &parts.headers, body).await,
     };
 
-    // A sign-in that has ended leaves its cookie: whoever had only that is asked to sign in again.
+    // The cookie outlives its sign-in. Somebody who held a role only by that sign-in is asked to sign in again.
     let sign_in = matches!(error, Some(Error::NeedsAccount(_))) || was_signed_in && may_sign_in(error.as_ref());
     parts.headers.remove(CONTENT_LENGTH);
     parts.headers.remove(CONTENT_TYPE);
@@ -229,7 +231,7 @@ pub async fn render(request: Request, next: Next) -> Response {
     }
 }
 
-/// Whether a page offers to sign in: also where the role's link was expected, since an account opens it too.
+/// Whether a page offers to sign in. It also does if the role's link was expected, because an account is accepted too.
 const fn may_sign_in(error: Option<&Error>) -> bool {
     matches!(error, Some(Error::NeedsAccount(_) | Error::NeedsRole(Role::Operator | Role::Researcher) | Error::NoRole))
 }
@@ -243,7 +245,7 @@ fn wants_page(headers: &HeaderMap) -> bool {
     headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()).is_some_and(|accept| accept.contains("text/html"))
 }
 
-/// The words of a failure that another layer made: its own if it gave any, else what the status means.
+/// The message of an error that another layer made: its own text if it has any, otherwise the meaning of the status.
 async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::Body) -> String {
     let is_text = status != StatusCode::PAYLOAD_TOO_LARGE
         && headers.get(CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/plain"));
@@ -268,13 +270,13 @@ fn title_of(status: StatusCode) -> &'static str {
     match status {
         StatusCode::NOT_FOUND => "Nothing here",
         StatusCode::FORBIDDEN | StatusCode::MISDIRECTED_REQUEST => "Not open to this browser",
-        StatusCode::CONFLICT => "That does not fit just now",
+        StatusCode::CONFLICT => "Not possible now",
         status if status.is_server_error() => "The server failed",
         _ => "That did not work",
     }
 }
 
-/// Where to get the link of `role`: a surgeon has not seen the server start.
+/// Where to get the link of `role`. A surgeon does not see what the server prints at its start.
 const fn whence(role: Role) -> &'static str {
     match role {
         Role::Surgeon => ": the operator has it",

@@ -1,4 +1,4 @@
-//! Exports for the researcher's browser, and the dictionary of what is in them.
+//! Exports for the researcher's browser, and the data dictionary that describes them.
 
 use askama::Template;
 use axum::body::Body;
@@ -33,7 +33,7 @@ impl From<ExportError> for Error {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct ExportQuery {
-    /// Whether to tell which policy ran in which setting; only after unblinding.
+    /// Whether to include which policy ran in which setting; only after unblinding.
     #[serde(default)]
     unblinded: bool,
 }
@@ -55,7 +55,7 @@ async fn zip(
     let export = Export::prepare(&app.conductor.recorder(by), session, query.unblinded).await?;
     let (zip, bytes) = ZipStream::new(name.clone());
 
-    // On a thread of its own: compressing would hold up the streams.
+    // On a separate thread: compressing would delay the streams.
     tokio::task::spawn_blocking(move || {
         if let Err(error) = Handle::current().block_on(export.into_zip(zip)) {
             tracing::warn!(%session, %error, "an export was cut off");

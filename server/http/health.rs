@@ -1,7 +1,7 @@
-//! `/healthz`: how the server is, for monitoring. Says nothing that a surgeon must not know.
+//! `/healthz`: the server's health, for monitoring. Says nothing that a surgeon must not know.
 //!
-//! A monitor restarts a service that answers 503. So only a server that cannot do its work answers so: in a session a
-//! loose cable must not cost a restart.
+//! A monitor restarts a service that answers 503. So the server answers 503 only if it cannot do its work: a loose
+//! cable during a session must not cause a restart.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use super::AppState;
 use super::error::OwnBody;
 use crate::health::{Condition, Problem};
 
-/// How the server is.
+/// The server's health.
 #[derive(Debug, Serialize, ToSchema)]
 struct Health {
-    /// Whether all is well.
+    /// The server's condition.
     status: Condition,
     /// The program's version.
     version: &'static str,
@@ -27,15 +27,15 @@ struct Health {
     camera: bool,
     /// Whether the lens takes commands.
     lens: bool,
-    /// Whether the picture or the lens is not of the real world.
+    /// Whether the camera or the lens is simulated.
     simulated: bool,
     /// What is wrong, the worst first.
     problems: Vec<Problem>,
 }
 
-/// How the server is, and what is wrong.
+/// The server's health, and what is wrong.
 ///
-/// Answers at once, also while the disk hangs.
+/// Answers at once, even while the disk hangs.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses(
     (status = 200, description = "It does its work: `ok`, or `degraded` where something needs a person", body = Health),
     (status = 503, description = "It cannot do its work: `failing`", body = Health)))]

@@ -8,11 +8,11 @@ use serde_json::Value;
 
 use super::error::Error;
 
-/// The greatest whole number up to which a JSON number has one meaning, whatever reads it.
+/// 2^53. Below it, every JSON reader represents whole numbers exactly.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// The body of a request, read from JSON. In JSON, and so in the description of this interface, 3.0
-/// is the whole number 3: it is read so here too.
+/// is the whole number 3, so it is accepted as an integer here too.
 pub(super) struct JsonBody<T>(pub(super) T);
 
 impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
@@ -29,7 +29,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
     }
 }
 
-/// Makes integers of the whole numbers in `value`.
+/// Turns whole numbers in `value` into integers.
 fn make_whole(value: &mut Value) {
     match value {
         Value::Number(number) => {

@@ -1,4 +1,4 @@
-//! The three roles' keys: unguessable, kept in the data folder, compared in constant time.
+//! The keys of the three roles: unguessable, stored in the data folder, compared in constant time.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,10 +34,10 @@ pub enum KeyError {
     Io {
         /// The key file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The file is not what was written.
+    /// The content of the file is not valid.
     #[error("{} is damaged ({reason}); delete it to make new keys", path.display())]
     Damaged {
         /// The key file.
@@ -45,7 +45,7 @@ pub enum KeyError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The system has no randomness to give.
+    /// The system gave no random numbers.
     #[error("the system gave no random numbers: {0}")]
     Random(getrandom::Error),
 }
@@ -60,10 +60,10 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// The keys kept in `data_dir`; made on first use, readable by their owner alone.
+    /// The keys stored in `data_dir`. They are made on first use, and only their owner can read the file.
     ///
     /// # Errors
-    /// When the file cannot be read or written, or is damaged.
+    /// If the file cannot be read or written, or is damaged.
     pub fn load_or_create(data_dir: &Path) -> Result<Self, KeyError> {
         let path = data_dir.join(FILE);
         let io = |source| KeyError::Io { path: path.clone(), source };
@@ -82,10 +82,10 @@ impl Keys {
         }
     }
 
-    /// New keys, kept nowhere.
+    /// New keys, which are not stored.
     ///
     /// # Errors
-    /// When the system gives no random numbers.
+    /// If the system gives no random numbers.
     pub fn random() -> Result<Self, KeyError> {
         let key = || {
             let mut bytes = [0; KEY_BYTES];
@@ -111,7 +111,7 @@ impl Keys {
         replace_private(path, format!("{HEADER}{keys}").as_bytes())
     }
 
-    /// The key of `role`; empty, and opening nothing, for [`Role::System`].
+    /// The key of `role`. It is empty for [`Role::System`], and grants nothing.
     #[must_use]
     pub fn of(&self, role: Role) -> &str {
         match role {
@@ -122,12 +122,12 @@ impl Keys {
         }
     }
 
-    /// The role that `key` opens. Takes as long whatever is offered.
+    /// The role that `key` grants. Takes the same time for every key of the same length.
     #[must_use]
     pub fn role_of(&self, key: &str) -> Option<Role> {
         let mut found = None;
 
-        // No early exit: the time must not depend on the key offered.
+        // No early exit: the time must not depend on the given key.
         for role in ROLES {
             if bool::from(self.of(role).as_bytes().ct_eq(key.as_bytes())) {
                 found = Some(role);
@@ -137,15 +137,16 @@ impl Keys {
         found
     }
 
-    /// The value of the cookie of `role`. It is derived from the key one way, so that a cookie seen
-    /// gives no link away, and stays the same after a restart, so that a tablet stays let in.
+    /// The value of the cookie of `role`. It is a hash of the key, so a stolen cookie does not reveal the link. It
+    /// stays the same after a restart, so a tablet stays let in.
     #[must_use]
     pub fn token(&self, role: Role) -> String {
         let digest = Sha256::new().chain_update(b"parfocal cookie 1:").chain_update(self.of(role)).finalize();
         hex::encode(digest)
     }
 
-    /// The key of the surgeon's link to `session` alone: the session's id, and a proof that only this server can make.
+    /// The key of the surgeon's link to `session` only: the session's identifier, and a proof that only this server can
+    /// make.
     #[must_use]
     pub fn of_session(&self, session: SessionId) -> String {
         format!("{}{}", session.0.simple(), self.session_proof("link", session))
@@ -157,7 +158,7 @@ impl Keys {
         self.proven("link", key)
     }
 
-    /// The value of the surgeon's cookie for `session` alone.
+    /// The value of the surgeon's cookie for `session` only.
     #[must_use]
     pub fn session_token(&self, session: SessionId) -> String {
         format!("{}{}", session.0.simple(), self.session_proof("cookie", session))
@@ -169,7 +170,7 @@ impl Keys {
         self.proven("cookie", token)
     }
 
-    /// 128 bits that follow one way from the surgeon's key, `purpose` and `session`.
+    /// The first 128 bits of a hash of the surgeon's key, `purpose` and `session`, in hexadecimal.
     fn session_proof(&self, purpose: &str, session: SessionId) -> String {
         let digest = Sha256::new()
             .chain_update(b"parfocal session 1:")

@@ -1,4 +1,4 @@
-//! The surgeon's link, as text and as a code for a tablet's camera.
+//! The surgeon's link, as text and as a QR code for a tablet's camera.
 
 use axum::http::HeaderMap;
 use axum::http::header::HOST;
@@ -10,10 +10,10 @@ use super::error::Error;
 use super::security::is_loopback_name;
 use crate::trial::role::Role;
 
-/// The link that lets a browser in as the surgeon: by the name that the operator's browser came by, unless that leads
-/// nowhere from a tablet.
+/// The link that lets a browser in as the surgeon. It has the host name that the operator's browser used, unless a
+/// tablet cannot reach the server by that name.
 ///
-/// In a session of a study the link is to that session alone, and only somebody who is `signed_in` is told it.
+/// In a session of a study the link is valid only for that session, and only somebody who is `signed_in` gets it.
 pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
     let host = tablets_host(app, headers);
     let key = match app.linked_session() {
@@ -23,29 +23,30 @@ pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
     app.reach.link_by(&host, &key)
 }
 
-/// The page on which a tablet learns to trust the server, if it must.
+/// Address of the page that helps a tablet to trust the server; `None` if it need not.
 pub(super) fn trust_page(app: &App, headers: &HeaderMap) -> Option<String> {
     app.reach.trust_page_by(&tablets_host(app, headers))
 }
 
-/// The name that a request came by.
+/// The host name that the request was sent to.
 pub(super) fn asked_host(headers: &HeaderMap) -> Option<&str> {
     headers.get(HOST).and_then(|host| host.to_str().ok())
 }
 
-/// The name that a request came by, unless that leads nowhere from a tablet.
+/// The host name that the request was sent to, or one by which a tablet can reach the server if that is a loopback
+/// name.
 fn tablets_host(app: &App, headers: &HeaderMap) -> String {
     let asked = asked_host(headers).filter(|host| !is_loopback_name(host));
     asked.map_or_else(|| app.reach.host(), str::to_owned)
 }
 
-/// `link` as the inside of a page: an `<svg>` element.
+/// `link` as a QR code, for embedding in a page: an `<svg>` element.
 ///
 /// # Errors
-/// When the link is too long for a code.
+/// If the link is too long for a QR code.
 pub fn qr_svg(link: &str) -> Result<String, Error> {
     let code = QrCode::new(link).map_err(|_| Error::Internal)?;
     let picture = code.render::<svg::Color<'_>>().quiet_zone(false).min_dimensions(132, 132).build();
-    // What comes before the element is for files.
+    // Whatever precedes the element is needed only in a file.
     Ok(picture.find("<svg").map_or_else(String::new, |start| picture[start..].to_owned()))
 }

@@ -1,6 +1,6 @@
-//! `/metrics`: counters for Prometheus, for operator and researcher. No counter tells policies apart. Times, from
-//! which a policy may be guessed, are left out while a session is under way, and those of the loop and of pictures
-//! are not kept of a setting at all.
+//! `/metrics`: counters for Prometheus, for operator and researcher. No counter tells policies apart. A policy could be
+//! guessed from times, so they are left out while a session is under way. Times of the loop and of pictures are not
+//! even recorded during a setting.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -33,7 +33,7 @@ async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoR
     Ok(([(CONTENT_TYPE, "application/openmetrics-text; version=1.0.0; charset=utf-8")], text))
 }
 
-/// The label of what is counted for each size of pictures.
+/// The label of metrics that are counted by size of pictures.
 type SizeLabel = [(&'static str, &'static str); 1];
 
 const fn label(size: Size) -> SizeLabel {
@@ -50,7 +50,7 @@ fn by_size(count: impl Fn(Size) -> u64) -> Family<SizeLabel, Counter> {
 }
 
 fn collect(app: &App) -> Registry {
-    // Not borrowed for long: the loop waits for the borrowing to end.
+    // Borrow only briefly: the loop waits until the borrow ends.
     let status = Arc::clone(&app.control.status.borrow());
     let counts = app.live.counts();
     let telemetry = app.store.telemetry_counts();
@@ -113,7 +113,7 @@ fn collect(app: &App) -> Registry {
     registry
 }
 
-/// How long things take.
+/// Registers the histograms of times.
 fn register_times(registry: &mut Registry, app: &App) {
     let counts = app.live.counts();
     let latency = counts.latency().clone();

@@ -1,7 +1,7 @@
 //! `/stream.mjpeg`: plain motion JPEG, for programs and for browsers without scripts.
 //!
-//! The headers of the next part follow each frame at once: a browser shows a part when it sees where it ends, and would
-//! otherwise be a frame late.
+//! The headers of the next part are sent directly after each frame. A browser shows a part only when it sees the end of
+//! it, so it would otherwise be a frame late.
 
 use axum::body::Body;
 use axum::extract::State;
@@ -22,12 +22,12 @@ const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
 const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
 
-/// The live picture as motion JPEG, one pixel a mosaic cell, without end.
+/// The live picture as an endless motion JPEG, one pixel per mosaic cell.
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
 async fn mjpeg(State(app): State<AppState>, roles: Roles) -> impl IntoResponse {
-    // Where nothing but a surgeon's link shows a role, the stream ends with what the link is for.
+    // If the browser's only role comes from a surgeon's link, the stream ends when the link is no longer valid.
     let pass = roles.pass().filter(|_| roles.is_surgeon_alone());
     ([(CONTENT_TYPE, KIND)], Body::from_stream(parts(app, pass).map(Ok::<_, std::convert::Infallible>)))
 }

@@ -66,13 +66,13 @@ use utoipa_axum::router::OpenApiRouter;
 use door::Door;
 use error::Error;
 
-/// The largest body that is read: a comment of the greatest length in JSON, with room.
+/// Largest request body in bytes: the longest comment in JSON, with some margin.
 const BODY_LIMIT: usize = 256 * 1024;
 
-/// The longest that a handler may take to begin its answer; streams begin at once.
+/// Time limit for a handler to begin its answer; streams begin at once.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
-/// Every route with everything around it.
+/// All routes, with all layers around them.
 pub fn router(app: AppState) -> Router {
     let document = openapi::Finished::default();
     let (router, api) = OpenApiRouter::with_openapi(openapi::Document::openapi())
@@ -118,13 +118,13 @@ pub fn router(app: AppState) -> Router {
     router.fallback(|| async { StatusCode::NOT_FOUND }).layer(layers).with_state(app)
 }
 
-/// The path alone: a query may hold a key.
+/// Logs only the path of a request: the query may contain a key.
 fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
     tracing::debug_span!("request", method = %request.method(), path = request.uri().path())
 }
 
-/// Serves `app` on `listener`, encrypted if there are settings for `tls`, until `app.shutdown` turns true and what is
-/// under way is answered.
+/// Serves `app` on `listener`, encrypted if `tls` is given, until `app.shutdown` turns true. Connections may outlast
+/// this call: each holds a clone of `app.shutdown` until its requests under way are answered.
 pub async fn run(listener: TcpListener, app: AppState, tls: Option<Arc<ServerConfig>>) {
     let shutdown = app.shutdown.clone();
     let door = match tls {

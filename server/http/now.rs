@@ -1,9 +1,10 @@
-//! One line at the top of each of the researcher's pages: what to do now. It follows from what the page shows anyway.
+//! One line at the top of each of the researcher's pages: what to do now. It depends only on what the page shows
+//! anyway.
 
 use crate::trial::phase::SessionStatus;
 use crate::trial::study::stage::Stage;
 
-/// On the list of sessions.
+/// The line on the list of sessions. `some`: whether there are any sessions.
 pub(super) const fn on_sessions(some: bool, under_way: bool) -> &'static str {
     match (some, under_way) {
         (_, true) => "A session is under way. Export it when it has ended.",
@@ -12,24 +13,24 @@ pub(super) const fn on_sessions(some: bool, under_way: bool) -> &'static str {
     }
 }
 
-/// What the line on the page of a session follows from.
+/// The state of a session on which the line on its page depends.
 #[derive(Clone, Copy)]
 pub(super) struct Session {
-    /// How far it came.
+    /// Whether the session is under way, completed or aborted.
     pub(super) status: SessionStatus,
     /// Whether the participant withdrew.
     pub(super) withdrawn: bool,
-    /// Whether it is known which policies ran.
+    /// Whether the session is unblinded.
     pub(super) unblinded: bool,
-    /// Whether it belongs to a study.
+    /// Whether the session belongs to a study.
     pub(super) in_study: bool,
 }
 
-/// On the page of a session.
+/// The line on the page of a session.
 pub(super) const fn on_session(session: Session) -> &'static str {
     match session {
         Session { withdrawn: true, .. } => {
-            "The participant withdrew: the session’s data are kept out of sight. Erase its words if that was asked for."
+            "The participant withdrew, so the session’s data are hidden. Erase its words if the participant asked for that."
         }
         Session { status: SessionStatus::UnderWay, .. } => {
             "Wait until the session has ended. Then correct and export it."
@@ -40,7 +41,8 @@ pub(super) const fn on_session(session: Session) -> &'static str {
     }
 }
 
-/// On the page of accounts. `waiting`: whether somebody was given a passphrase and has not signed in with it yet.
+/// The line on the page of accounts. `waiting`: whether somebody was given a passphrase and has not signed in with it
+/// yet.
 pub(super) const fn on_people(waiting: bool) -> &'static str {
     if waiting {
         "Tell each new person the passphrase for the first sign-in. Then plan the study."
@@ -49,7 +51,7 @@ pub(super) const fn on_people(waiting: bool) -> &'static str {
     }
 }
 
-/// On the list of studies.
+/// The line on the list of studies.
 pub(super) const fn on_studies(has_accounts: bool, signed_in: bool) -> &'static str {
     match (has_accounts, signed_in) {
         (false, _) => "For a study, make an account first: “parfocal account add” on the server.",
@@ -58,7 +60,7 @@ pub(super) const fn on_studies(has_accounts: bool, signed_in: bool) -> &'static 
     }
 }
 
-/// On the page of a study, for somebody who leads it or not.
+/// The line on the page of a study. `leads`: whether the reader is a lead.
 pub(super) const fn on_study(stage: Stage, leads: bool) -> &'static str {
     match (stage, leads) {
         (Stage::Planned, _) => "Read the plan. If it is right, draw the orders and open the study.",
@@ -67,7 +69,7 @@ pub(super) const fn on_study(stage: Stage, leads: bool) -> &'static str {
         }
         (Stage::Closed, true) => "Check and correct the sessions. Then lock the study.",
         (Stage::Closed, false) => "Check and correct the sessions. A lead then locks the study.",
-        (Stage::Locked, true) => "Unblind the study when no tablet holds anything more.",
+        (Stage::Locked, true) => "Unblind the study when all tablets have sent everything.",
         (Stage::Locked, false) => "Wait until a lead unblinds the study.",
         (Stage::Unblinded, _) => "Read the analysis, and export the sessions.",
     }

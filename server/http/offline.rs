@@ -1,8 +1,8 @@
 //! The surgeon's page without a network: a service worker keeps the page and its files in the browser.
 //!
-//! The worker is given the addresses of all files of one version of the program. It is another worker with each
-//! version, so that a browser that comes back to a newer server takes the newer worker and forgets the older files. What
-//! the browser keeps is the page as it is for everyone: nothing of a session, and nothing that another role sees.
+//! The worker's script contains the addresses of all files of one version of the program, so each version is another
+//! worker. A browser that comes back to a newer server takes the newer worker and drops the older files. It keeps the
+//! page as it is for everyone: nothing of a session, and nothing that another role sees.
 
 use axum::http::HeaderName;
 use axum::http::header::{CONTENT_TYPE, HeaderValue};
@@ -14,23 +14,23 @@ use super::error::Error;
 use super::roles::SurgeonsTablet;
 use super::{AppState, assets};
 
-/// Tells the worker that an answer is the surgeon's page, and of which version. Nothing else may be kept.
+/// Header that tells the worker that an answer is the surgeon's page, and its version. Nothing else may be kept.
 pub(super) const PAGE_VERSION: HeaderName = HeaderName::from_static("parfocal-page-version");
 
-/// How far a worker may reach beyond its own folder.
+/// Header that allows a worker a scope beyond its own folder.
 const ALLOWED: HeaderName = HeaderName::from_static("service-worker-allowed");
 
-/// The one address that the worker is for.
+/// The scope of the worker: the surgeon's page only.
 const PAGE: &str = "/surgeon";
 
-/// What the worker has to know.
+/// What the worker must know: its version and the addresses of its files.
 #[derive(Serialize)]
 struct Offline {
     version: &'static str,
     files: Vec<String>,
 }
 
-/// The service worker of the surgeon's page, which opens the page where there is no network.
+/// The service worker of the surgeon's page, which opens the page if there is no network.
 #[utoipa::path(get, path = "/surgeon/worker.js", tag = "surgeon",
     responses((status = 200, description = "The script", content_type = "text/javascript")))]
 async fn worker(_: SurgeonsTablet) -> Result<Response, Error> {

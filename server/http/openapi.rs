@@ -1,4 +1,4 @@
-//! `/api/openapi.json`: every endpoint, described from the code that serves it.
+//! `/api/openapi.json`: the description of every endpoint, derived from the code that serves it.
 
 use std::sync::{Arc, OnceLock};
 
@@ -17,7 +17,7 @@ use super::error::{Error, ErrorBody, role_name};
 use super::keys::ROLES;
 use super::roles::Roles;
 
-/// What the document says of the server as a whole.
+/// The part of the document that describes the server as a whole.
 #[derive(OpenApi)]
 #[openapi(
     info(
@@ -34,7 +34,7 @@ pub struct Document;
 /// The finished document, filled in once every route is known.
 pub type Finished = Arc<OnceLock<String>>;
 
-/// What answers without a key.
+/// Paths that answer without a key.
 const OPEN: [&str; 10] = [
     "/api/sign-in",
     "/api/sign-out",
@@ -48,7 +48,7 @@ const OPEN: [&str; 10] = [
     "/trust/check",
 ];
 
-/// Answers that any request may get.
+/// Failures that any request may get: status and description.
 const ALWAYS: [(&str, &str); 5] = [
     ("400", "The request cannot be read"),
     ("408", "It took too long"),
@@ -57,17 +57,17 @@ const ALWAYS: [(&str, &str); 5] = [
     ("503", "Too many pages are open at once"),
 ];
 
-/// Answers that a request with a body may get.
+/// Failures that a request with a body may get: status and description.
 const WITH_BODY: [(&str, &str); 3] = [
     ("413", "The body is too long"),
     ("415", "The body is not said to be application/json"),
     ("422", "The body is JSON, but not as described"),
 ];
 
-/// The scheme of a key that a program sends.
+/// Name of the security scheme for keys and tokens that programs send.
 const KEY: &str = "key";
 
-/// Limits that a derived schema cannot state: where, which, what.
+/// Limits that a derived schema cannot express: place in the schemas, keyword, value.
 const LIMITS: [(&str, &str, Limit); 10] = [
     ("Focus/oneOf/0", "additionalProperties", Limit::None),
     ("Focus/oneOf/1", "additionalProperties", Limit::None),
@@ -75,25 +75,25 @@ const LIMITS: [(&str, &str, Limit); 10] = [
     ("Focus/oneOf/0/properties/focal_power", "maximum", Limit::Number(1)),
     ("Said/oneOf/0/properties/text", "pattern", Limit::Text(NOT_BLANK)),
     ("Said/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
-    // A mark says nothing: what somebody said must not be lost as its text.
+    // The last two kinds have no text. Words that are sent with them by mistake must be refused, not lost.
     ("Said/oneOf/2/properties", "text", Limit::None),
     ("Said/oneOf/3/properties", "text", Limit::None),
     ("AnswerValue/oneOf/0", "maximum", Limit::Number(u8::MAX)),
     ("AnswerValue/oneOf/1/items", "maximum", Limit::Number(u8::MAX)),
 ];
 
-/// A text that is more than blanks.
+/// Pattern of a text that is not blank.
 const NOT_BLANK: &str = r"\S";
 
-/// What a limit is.
+/// Value of a limit.
 enum Limit {
-    /// There are no others.
+    /// `false`: nothing is allowed here.
     None,
     Number(u8),
     Text(&'static str),
 }
 
-/// The whole document.
+/// The whole document as JSON.
 pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String> {
     complete(&mut api);
     let mut document = serde_json::to_value(api)?;
@@ -110,8 +110,8 @@ pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String>
     serde_json::to_string(&document)
 }
 
-/// Adds to every operation what its handler does not decide, and so does not describe: what the
-/// layers around it may answer, and how a role is shown.
+/// Adds to every operation what its handler does not decide, and so does not describe: the answers of the
+/// layers around it, and the ways to authenticate.
 fn complete(api: &mut utoipa::openapi::OpenApi) {
     for (path, item) in &mut api.paths.paths {
         for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
@@ -136,14 +136,14 @@ fn complete(api: &mut utoipa::openapi::OpenApi) {
     }
 }
 
-/// The operation's id, with its tag in front: two roles have handlers of the same name, and ids must differ.
+/// The operation's id, prefixed with its tag: two roles have handlers of the same name, and ids must differ.
 fn unique_id(operation: &Operation) -> Option<String> {
     let id = operation.operation_id.as_deref()?;
     let tag = operation.tags.iter().flatten().next();
     Some(tag.map_or_else(|| id.to_owned(), |tag| format!("{tag}_{id}")))
 }
 
-/// What the layers around the handler of `operation` may answer.
+/// The failures that the layers around the handler of `operation` may answer with.
 fn around(path: &str, operation: &Operation) -> Vec<(&'static str, &'static str)> {
     let mut statuses = ALWAYS.to_vec();
     if !OPEN.contains(&path) {
@@ -159,14 +159,14 @@ fn around(path: &str, operation: &Operation) -> Vec<(&'static str, &'static str)
     statuses
 }
 
-/// A failure, as a program gets it and as a browser on its way to a page does.
+/// A failure: JSON for a program, a page for a browser.
 fn failure(words: &str) -> Response {
     let json = Content::new(Some(Ref::from_schema_name("ErrorBody")));
     let page = Content::default();
     ResponseBuilder::new().description(words).content("application/json", json).content("text/html", page).build()
 }
 
-/// The ways to show a role that may ask for `operation`: that of its tag, or any.
+/// The ways to authenticate for `operation`: as the role in its tags, or as any role if there is none.
 fn shown_by(operation: &Operation) -> Vec<SecurityRequirement> {
     let tags = operation.tags.iter().flatten();
     let its_own = ROLES.into_iter().find(|role| tags.clone().any(|tag| tag == role_name(*role)));

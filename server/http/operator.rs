@@ -1,4 +1,4 @@
-//! The operator's page and what it sends: who focuses, participants, sessions.
+//! The operator's page and its requests: focus, participants, sessions.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use crate::trial::consent::NewConsent;
 use crate::trial::role::Role;
 use crate::trial::view::OperatorView;
 
-/// What [`ParticipantCode`](crate::trial::participant::ParticipantCode) takes, for browsers to check while typing.
+/// What [`ParticipantCode`](crate::trial::participant::ParticipantCode) accepts, for browsers to check while typing.
 const CODE_PATTERN: &str = r"[A-Z0-9\-]{2,16}";
 const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-01";
 
@@ -36,27 +36,27 @@ const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-0
 struct Page {
     nonce: String,
     chain: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
-    /// Whether this browser is let in as the researcher too.
+    /// Whether this browser also holds the researcher's role.
     researcher: bool,
     surgeon_link: String,
-    /// Whether that link leads here from this machine alone.
+    /// Whether that link works only on this machine.
     loopback_only: bool,
-    /// The link as an SVG picture.
+    /// The link as a QR code in SVG.
     qr: String,
-    /// Where a device learns to trust the server, if it must.
+    /// The page that helps a device to trust the server, if that is needed.
     trust: Option<Trust>,
     code_pattern: &'static str,
     code_hint: &'static str,
 }
 
-/// Where a device learns to trust the server.
+/// The page that helps a device to trust the server.
 struct Trust {
     link: String,
-    /// The link as an SVG picture.
+    /// The link as a QR code in SVG.
     qr: String,
-    /// The fingerprint to compare.
+    /// The authority's fingerprint, to be compared on the device.
     fingerprint: String,
 }
 
@@ -102,18 +102,18 @@ async fn page(
     page.render().map(Html).map_err(|_| Error::Internal)
 }
 
-/// The surgeon's link, as text and as a code.
+/// The surgeon's link, as text and as a QR code.
 #[derive(Debug, Serialize, ToSchema)]
 struct SurgeonLink {
     /// The link.
     link: String,
-    /// The same as an SVG picture.
+    /// The link as a QR code in SVG.
     qr: String,
-    /// The session that it is for, in a study; none for the link that opens every session outside studies.
+    /// The session in a study that the link is for; none for the link to every session outside studies.
     session: Option<SessionId>,
 }
 
-/// The surgeon's link: in a session of a study, to that session alone, which it ends with.
+/// The surgeon's link. In a session of a study it is valid only for that session, and ends with it.
 #[utoipa::path(get, path = "/api/operator/surgeon-link", tag = "operator", responses(
     (status = 200, body = SurgeonLink)))]
 async fn link(by: Operator, State(app): State<AppState>, headers: HeaderMap) -> Result<Json<SurgeonLink>, Error> {
@@ -131,11 +131,11 @@ async fn link(by: Operator, State(app): State<AppState>, headers: HeaderMap) -> 
 struct Choices {
     /// Codes of the participants.
     participants: Vec<String>,
-    /// Protocols.
+    /// The protocols.
     protocols: Vec<ProtocolSummary>,
-    /// Studies that take sessions now.
+    /// Studies in which sessions can be made now.
     studies: Vec<OpenStudy>,
-    /// Policies.
+    /// The policies.
     #[schema(value_type = Vec<Object>)]
     policies: Vec<PolicyEntry>,
 }
@@ -156,7 +156,7 @@ async fn codes(app: &App) -> Result<Vec<String>, Error> {
     Ok(participants.into_iter().map(|participant| participant.code).collect())
 }
 
-/// Lets a policy focus, or sets the focal power by hand. Not while a session is under way.
+/// Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session is under way.
 #[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
     (status = 204, description = "Done"),
     (status = 404, description = "No such policy", body = ErrorBody),
@@ -170,7 +170,7 @@ async fn focus(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// A participant to be added.
+/// A participant to add.
 #[derive(Debug, Deserialize, ToSchema)]
 struct NewParticipant {
     /// 2 to 16 capital letters, digits and dashes; never a name.
@@ -178,7 +178,7 @@ struct NewParticipant {
     code: String,
 }
 
-/// Adds a participant; one that is there already stays as it is. Answers with all codes.
+/// Adds a participant; one that exists already stays as it is. Answers with all codes.
 #[utoipa::path(post, path = "/api/operator/participants", tag = "operator", request_body = NewParticipant, responses(
     (status = 200, body = Vec<String>), (status = 422, description = "No such code", body = ErrorBody)))]
 async fn add_participant(
@@ -190,19 +190,19 @@ async fn add_participant(
     codes(&app).await.map(Json)
 }
 
-/// A session to be prepared.
+/// A session to prepare.
 #[derive(Debug, Deserialize, ToSchema)]
 struct NewSession {
-    /// Participant's code.
+    /// Code of the participant.
     participant: String,
-    /// Protocol's name.
+    /// Name of the protocol.
     protocol: String,
-    /// The study that it belongs to; none outside any study.
+    /// The study that the session belongs to; none outside studies.
     #[serde(default)]
     study: Option<StudyPlace>,
 }
 
-/// Where in a study a session is to be made.
+/// A study and the site at which a session is made.
 #[derive(Debug, Deserialize, ToSchema)]
 struct StudyPlace {
     /// The study's name.
@@ -213,7 +213,7 @@ struct StudyPlace {
 
 type View = Json<Option<Arc<OperatorView>>>;
 
-/// The session under way; null when there is none.
+/// The session under way; null if there is none.
 #[utoipa::path(get, path = "/api/operator/session", tag = "operator", responses(
     (status = 200, body = Option<OperatorView>),
 ))]
@@ -241,7 +241,7 @@ async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBo
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
-/// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
+/// Moves the session on; repeating an action changes nothing. Answers with the session as it is then.
 #[utoipa::path(post, path = "/api/operator/actions", tag = "operator", request_body = Act, responses(
     (status = 200, body = Option<OperatorView>),
     (status = 403, description = "Another role does this", body = ErrorBody),
@@ -258,7 +258,7 @@ async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<
 #[utoipa::path(post, path = "/api/operator/consents", tag = "operator", request_body = NewConsent, responses(
     (status = 200, body = Option<OperatorView>),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 422, description = "Something is missing, the day is yet to come, or the protocol requires another \
+    (status = 422, description = "Something is missing, the day is in the future, or the protocol requires another \
                                   version of the text", body = ErrorBody)))]
 async fn consent(
     by: Operator,
@@ -270,7 +270,7 @@ async fn consent(
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
-/// A session to be taken off the screens.
+/// A session to take off the screens.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Dismissal {
     /// The session.

@@ -1,7 +1,7 @@
-//! Who is signed in, and under which account a request acts.
+//! Finds out who is signed in, and under which account a request acts.
 //!
-//! Outside studies a role's link is enough. In a study everybody but the surgeon acts under a personal account:
-//! [`Acting::for_session`] and [`Acting::personally`] ask for it.
+//! Outside studies a role's link is enough. In a study everybody except the surgeon acts under a personal account:
+//! [`Acting::for_session`] and [`Acting::personally`] require it.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, Ipv4Addr};
@@ -25,11 +25,11 @@ use crate::trial::role::Role;
 pub(super) struct Person {
     /// The account.
     pub(super) account: Account,
-    /// The token that shows it.
+    /// The token of the sign-in.
     pub(super) token: Token,
 }
 
-/// Whoever is signed in, if anybody is.
+/// The person who is signed in, if there is one.
 pub(super) struct SignedIn(pub(super) Option<Person>);
 
 impl<S: Sync> FromRequestParts<S> for SignedIn {
@@ -52,7 +52,7 @@ impl<S: Sync> FromRequestParts<S> for From {
     }
 }
 
-/// The token of a request with these headers, whether or not anybody is signed in with it.
+/// The token in these headers, whether or not anybody is signed in with it.
 pub(super) fn token(headers: &HeaderMap) -> Option<Token> {
     let sent = |shown: Option<&str>| shown.and_then(Token::sent);
     sent(bearer(headers)).or_else(|| sent(cookie(headers, ACCOUNT_COOKIE)))
@@ -64,31 +64,31 @@ pub(super) async fn find(app: &App, headers: &HeaderMap) -> Option<Person> {
     match app.accounts.signed_in(&token).await {
         Ok(account) => account.map(|account| Person { account, token }),
         Err(error) => {
-            tracing::error!("it could not be looked up who is signed in: {error}");
+            tracing::error!("could not look up who is signed in: {error}");
             None
         }
     }
 }
 
-/// Proof that a request speaks for a role, and under which account.
+/// Proof that a request holds a role, and under which account.
 pub(super) trait Acting {
     /// The role.
     const ROLE: Role;
 
-    /// The account, where somebody is signed in whose role may do this.
+    /// The account, if somebody is signed in whose account may act in this role.
     fn account(&self) -> Option<&Account>;
 
-    /// Who acts, where a role's link is enough.
+    /// Who acts, for actions for which a role's link is enough.
     fn actor(&self) -> Actor {
         Actor { role: Self::ROLE, account: self.account().map(|account| account.account.clone()) }
     }
 
-    /// The account, where a role's link is not enough.
+    /// The account, for actions for which a role's link is not enough.
     fn personally(&self) -> Result<&Account, Error> {
         self.account().ok_or(Error::NeedsAccount(Self::ROLE))
     }
 
-    /// Who acts on `session`: of a study, only somebody who is signed in.
+    /// Who acts on `session`. If it belongs to a study, this must be somebody who is signed in.
     async fn for_session(&self, app: &App, session: SessionId) -> Result<Actor, Error> {
         if app.conductor.study_of(session).await?.is_some() {
             self.personally()?;
@@ -97,7 +97,7 @@ pub(super) trait Acting {
     }
 }
 
-/// The account of a lead who is signed in.
+/// The account, if it is that of a lead.
 pub(super) fn lead(by: &impl Acting) -> Result<&Account, Error> {
     let account = by.personally()?;
     if account.role.leads() {
@@ -109,7 +109,7 @@ pub(super) fn lead(by: &impl Acting) -> Result<&Account, Error> {
     )))
 }
 
-/// The account of a lead who gave the passphrase once more, before something that matters to all others.
+/// The account of a lead who has confirmed with the passphrase, as needed for actions that affect everybody.
 pub(super) async fn confirmed_lead<'a>(
     app: &App,
     by: &'a impl Acting,

@@ -1,9 +1,9 @@
-//! Places: how many connections there may be, of one host and in all, and who gives way.
+//! Places: the limits on the number of connections, per host and in total, and which connection gives way.
 //!
-//! A connection is a stranger until one of its requests shows a role's key or cookie; from then on it
-//! is a member's. Strangers and members have places of their own, so that no number of strangers
-//! takes a member's. Where strangers have no place left, the newest gets that of the oldest: a client
-//! with a key shows it at once, one that only wants to fill the places waits.
+//! A connection is a stranger until one of its requests shows a role's key or cookie, or the token of somebody who is
+//! signed in. From then on it is a member. Strangers and members have separate places, so that no number of strangers
+//! can take a member's place. If strangers have no place left, the newest gets the place of the oldest: a client with a
+//! key shows it at once, but one that only wants to fill the places waits.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -15,21 +15,21 @@ use tokio::sync::oneshot;
 use super::credentials::holds;
 use super::keys::{Keys, ROLES};
 
-/// How many connections there may be of a kind.
+/// Largest number of connections of a kind.
 #[derive(Debug, Clone, Copy)]
 struct Room {
-    /// Of one host.
+    /// From one host.
     host: usize,
-    /// In all.
+    /// From all hosts together.
     all: usize,
 }
 
-/// A browser opens up to six connections, and several may stand behind one address.
+/// Limits for strangers. A browser opens up to six connections, and several browsers may share one address.
 const STRANGERS: Room = Room { host: 32, all: 128 };
 
-/// Some fifteen pages of one host: each holds a WebSocket, and up to six more connections while it
-/// loads. With the strangers' and what the server itself has open, well below the 1,024 files that a
-/// process may usually have.
+/// Limits for members: some fifteen pages per host. Each page holds a WebSocket, and up to six more connections while
+/// it loads. Together with strangers and the server's own files, this is well below the 1,024 files that a process may
+/// usually have open.
 const MEMBERS: Room = Room { host: 128, all: 512 };
 
 /// All places.
@@ -38,7 +38,7 @@ pub struct Places(Arc<Mutex<Taken>>);
 
 #[derive(Default)]
 struct Taken {
-    /// By number: the oldest comes first.
+    /// By number, so the oldest comes first.
     connections: BTreeMap<u64, Connection>,
     next: u64,
 }
@@ -46,22 +46,22 @@ struct Taken {
 struct Connection {
     host: IpAddr,
     member: bool,
-    /// Dropped to ask it to give way.
+    /// Dropped to make the connection give way.
     _stay: oneshot::Sender<()>,
 }
 
-/// A connection's place, given back when dropped.
+/// A connection's place; freed when dropped.
 pub struct Place {
     number: u64,
     places: Places,
 }
 
-/// There is no place left.
+/// Error: there is no place left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Full;
 
 impl Places {
-    /// A stranger's place for a connection from `address`. What comes with it ends when the connection must give way.
+    /// Gives a connection from `address` a stranger's place. The receiver fails when the connection must give way.
     pub fn take(&self, address: IpAddr) -> (Place, oneshot::Receiver<()>) {
         let host = host(address);
         let mut taken = self.taken();
@@ -105,10 +105,10 @@ impl Place {
         taken.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
     }
 
-    /// Makes it a member's, if a request with `headers` shows one of `keys`, or somebody is `signed_in`.
+    /// Makes the connection a member if a request with `headers` shows one of `keys`, or if somebody is `signed_in`.
     ///
     /// # Errors
-    /// When members have no place left.
+    /// If members have no place left.
     pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), Full> {
         if self.is_members() || !signed_in && !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
             return Ok(());
@@ -123,7 +123,7 @@ impl Place {
     fn make_members(&self) -> Result<(), Full> {
         let mut taken = self.places.taken();
         let Some(there) = taken.connections.get(&self.number) else {
-            // It gave way in this moment.
+            // It has just given way.
             return Err(Full);
         };
 
@@ -148,8 +148,8 @@ impl Drop for Place {
     }
 }
 
-/// What counts as one host: an address, or a whole IPv6 network, in which one machine can use every
-/// address it likes.
+/// What counts as one host: an IPv4 address, or a whole IPv6 network (/64), because one machine can use any address
+/// in it.
 fn host(address: IpAddr) -> IpAddr {
     const NETWORK: u128 = !0 << 64;
     match address.to_canonical() {
@@ -175,7 +175,7 @@ mod tests {
         member.0.make_members().unwrap();
         let mut strangers: Vec<_> = (0..=STRANGERS.host).map(|_| places.take(HOST)).collect();
         assert!(gave_way(&mut strangers[0]) && !gave_way(&mut strangers[1]) && !gave_way(&mut member));
-        // One that left made room.
+        // A stranger that leaves frees its place.
         strangers.pop();
         let _another = places.take(HOST);
         assert!(!gave_way(&mut strangers[1]));

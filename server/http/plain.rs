@@ -1,5 +1,5 @@
-//! What an encrypted server answers to a browser that does not encrypt: how to trust it, and the way to the encrypted
-//! page. Nothing else, and nothing that needs a key.
+//! What an encrypted server answers on unencrypted connections: how to trust it, static files, and a redirect to the
+//! encrypted page. Nothing else, and nothing that needs a key.
 
 use axum::Router;
 use axum::extract::{Request, State};
@@ -15,7 +15,7 @@ use utoipa_axum::router::OpenApiRouter;
 use super::error::{self, Error};
 use super::{AppState, assets, security, trust};
 
-/// The routes of connections that are not encrypted. None of them reads a body or waits for anything.
+/// The routes for unencrypted connections. None of them reads a body or waits for anything.
 pub(super) fn router(app: AppState) -> Router {
     let (router, _) = OpenApiRouter::new().merge(trust::routes()).merge(assets::routes()).split_for_parts();
 
@@ -27,8 +27,8 @@ pub(super) fn router(app: AppState) -> Router {
     router.fallback(on_to_the_encrypted_page).layer(layers).with_state(app)
 }
 
-/// Sends a browser on to the same address, encrypted. A request that changes something is refused instead: whoever wrote
-/// the program behind it should learn that what it sends can be read on the way.
+/// Redirects a browser to the same address, encrypted. A request that changes something is refused instead, so that the
+/// author of the program that sent it learns that others can read what it sends.
 async fn on_to_the_encrypted_page(State(app): State<AppState>, request: Request) -> Result<Response, Error> {
     let asked = request.headers().get(HOST).and_then(|host| host.to_str().ok());
     let asked = asked.and_then(|host| host.parse::<Authority>().ok());
@@ -39,6 +39,6 @@ async fn on_to_the_encrypted_page(State(app): State<AppState>, request: Request)
     }
 
     let path = request.uri().path_and_query().map_or("/", |path| path.as_str());
-    // Temporary: a browser would remember a permanent one, also when the server is started without TLS one day.
+    // Temporary: a browser would remember a permanent redirect even if the server is later started without TLS.
     Ok(Redirect::temporary(&format!("https://{host}{path}")).into_response())
 }

@@ -30,7 +30,7 @@ impl From<PlaybackError> for Error {
     }
 }
 
-/// The recordings of an unblinded session, with the times of their frames; each look at them is recorded.
+/// The recordings of an unblinded session, with the times of their frames. Each access is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionRecordings),
@@ -50,14 +50,14 @@ async fn recordings(
     Ok(Json(found))
 }
 
-/// How finely a mosaic is developed.
+/// The resolution at which a mosaic is developed.
 #[derive(Debug, Clone, Copy, Default, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 enum PictureSize {
-    /// One pixel a mosaic cell.
+    /// One pixel per mosaic cell.
     #[default]
     Cell,
-    /// Two by two pixels a mosaic cell.
+    /// Two by two pixels per mosaic cell.
     Half,
 }
 
@@ -73,7 +73,8 @@ impl From<PictureSize> for Size {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct PictureQuery {
-    /// How finely mosaics are developed. A recording of the view has its pictures as they were recorded.
+    /// The resolution at which mosaics are developed. Pictures of a recording of the view are sent as they were
+    /// recorded.
     #[serde(default)]
     #[param(inline)]
     size: PictureSize,

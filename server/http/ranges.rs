@@ -1,4 +1,4 @@
-//! A part of a whole, as a browser asks for it while it plays (RFC 9110, section 14): one range of bytes.
+//! Answers range requests, as browsers send them during playback (RFC 9110, section 14): one range of bytes.
 
 use std::ops::Range;
 
@@ -7,14 +7,14 @@ use axum::http::header::{ACCEPT_RANGES, CONTENT_RANGE, RANGE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 
-/// What a request asks for of a whole.
+/// The part that a request asks for.
 #[derive(Debug, PartialEq, Eq)]
 enum Wanted {
-    /// All of it. So is what is asked for in a form that need not be understood, such as several ranges.
+    /// All of it. Also used for forms that a server may ignore, such as several ranges.
     Whole,
     /// These bytes.
     Part(Range<usize>),
-    /// Bytes behind its end.
+    /// Bytes beyond its end.
     Beyond,
 }
 
@@ -45,7 +45,7 @@ fn wanted(asked: Option<&str>, length: usize) -> Wanted {
     let part = match (first.parse::<usize>(), last.parse::<usize>()) {
         (Ok(first), Ok(last)) if first <= last => first..last.saturating_add(1).min(length),
         (Ok(first), Err(_)) if last.is_empty() => first..length,
-        // The last bytes, however many there are.
+        // The last `count` bytes, or all if there are fewer.
         (Err(_), Ok(count)) if first.is_empty() => length.saturating_sub(count)..length,
         _ => return Wanted::Whole,
     };

@@ -1,4 +1,4 @@
-//! How others reach the server: the host in links, and whether connections are encrypted.
+//! How other devices reach the server: the host in links, and whether connections are encrypted.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
@@ -8,35 +8,35 @@ use jiff::Timestamp;
 use crate::doctor::outward;
 use crate::tls::{Certificates, PublicAuthority};
 
-/// How others reach the server.
+/// How other devices reach the server.
 #[derive(Debug, Clone)]
 pub struct Reach {
-    /// Where it listens.
+    /// The address and port on which the server listens.
     listening: SocketAddr,
-    /// The certificate that it shows; none where it does not encrypt.
+    /// The server's certificate; `None` if it does not encrypt.
     certificates: Option<Arc<Certificates>>,
 }
 
 impl Reach {
-    /// A server that listens on `listening`, and encrypts where it has `certificates`.
+    /// A server that listens on `listening`, and encrypts if it has `certificates`.
     #[must_use]
     pub const fn new(listening: SocketAddr, certificates: Option<Arc<Certificates>>) -> Self {
         Self { listening, certificates }
     }
 
-    /// Host and port, as links name them. Asked for each time: the machine gets another address when it joins another
-    /// network or its cable is plugged in, and a link to the old one leads nowhere.
+    /// Host and port for links. They are determined anew at each call: the machine gets another address when it joins
+    /// another network or its cable is plugged in, and a link to the old address no longer works.
     #[must_use]
     pub fn host(&self) -> String {
         let outward = if self.listening.ip().is_unspecified() { outward() } else { None };
         self.host_from(outward)
     }
 
-    /// The same, for a machine that talks to the world from the address `outward`.
+    /// The same, for a machine that reaches the world from the address `outward`.
     fn host_from(&self, outward: Option<IpAddr>) -> String {
         let ip = match outward {
             Some(address) => address,
-            // In no network only this machine itself reaches the server.
+            // Without a network, only this machine itself reaches the server.
             None if self.listening.ip().is_unspecified() => Ipv4Addr::LOCALHOST.into(),
             None => self.listening.ip(),
         };
@@ -44,44 +44,46 @@ impl Reach {
         self.certificates.as_ref().map_or_else(|| address.to_string(), |certificates| certificates.host(address))
     }
 
-    /// Whether connections are encrypted by the server itself.
+    /// Whether the server itself encrypts connections.
     #[must_use]
     pub const fn encrypted(&self) -> bool {
         self.certificates.is_some()
     }
 
-    /// Whether the server listens on the machine itself alone, where no tablet reaches it.
+    /// Whether the server listens only on the loopback interface, where no tablet reaches it.
     #[must_use]
     pub const fn loopback_only(&self) -> bool {
         self.listening.ip().is_loopback()
     }
 
-    /// The local authority that signed the server's certificate, and that each device must trust.
+    /// The local authority that signed the server's certificate and that each device must trust; `None` if there is
+    /// none.
     #[must_use]
     pub fn authority(&self) -> Option<&PublicAuthority> {
         self.certificates.as_ref()?.authority()
     }
 
-    /// When the certificate ends that the server shows.
+    /// When the server's certificate expires; `None` if the server does not encrypt.
     #[must_use]
     pub fn certificate_until(&self) -> Option<Timestamp> {
         self.certificates.as_ref().map(|certificates| certificates.until())
     }
 
-    /// How links to the server begin.
+    /// The scheme of links to the server.
     #[must_use]
     pub const fn scheme(&self) -> &'static str {
         if self.encrypted() { "https" } else { "http" }
     }
 
-    /// The link that lets a browser in with `key`, by one of the server's names.
+    /// The link that lets a browser in with `key`; `host` is one of the server's names.
     #[must_use]
     pub fn link_by(&self, host: &str, key: &str) -> String {
         format!("{}://{host}/enter?key={key}", self.scheme())
     }
 
-    /// The page on which a device learns to trust the server, if it must, by one of the server's names. Not encrypted: a
-    /// device that does not trust the server yet can open it without a warning.
+    /// Address of the page that helps a device to trust the server; `None` if that is not needed. `host` is one of the
+    /// server's names. The page is not encrypted, so a device that does not trust the server yet can open it without a
+    /// warning.
     #[must_use]
     pub fn trust_page_by(&self, host: &str) -> Option<String> {
         self.authority().map(|_| format!("http://{host}/trust"))

@@ -1,4 +1,4 @@
-//! The operator's recordings: started, stopped, and how they stand.
+//! Starts and stops the operator's recordings, and reports their state.
 
 use axum::Json;
 use axum::extract::State;
@@ -12,7 +12,7 @@ use super::json::JsonBody;
 use super::roles::Operator;
 use crate::recorder::{RecordingStatus, StartError};
 
-/// How recording stands, and how long the disk will last.
+/// The state of recording, and how long the disk will last.
 #[utoipa::path(get, path = "/api/operator/recording", tag = "operator", responses(
     (status = 200, body = RecordingStatus),
 ))]
@@ -20,14 +20,14 @@ async fn status(_: Operator, State(app): State<AppState>) -> Json<RecordingStatu
     Json(app.recordings.status())
 }
 
-/// What is to happen.
+/// Whether to start or to stop recording.
 #[derive(Debug, Deserialize, ToSchema)]
 struct RecordingOrder {
-    /// Whether mosaics are to be recorded.
+    /// True to start recording mosaics, false to stop.
     record: bool,
 }
 
-/// Starts or stops recording. Stopping again changes nothing. Answers with how recording stands then.
+/// Starts or stops recording. Stopping again changes nothing. Answers with the new state of recording.
 #[utoipa::path(post, path = "/api/operator/recording", tag = "operator", request_body = RecordingOrder, responses(
     (status = 200, body = RecordingStatus),
     (status = 409, description = "A recording is under way, or the camera has no mosaics", body = ErrorBody),

@@ -1,4 +1,4 @@
-//! What a researcher does to a session's records: corrections, erasures, and a withdrawal.
+//! A researcher's changes to a session's records: corrections, erasures, and a withdrawal.
 
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
@@ -16,7 +16,7 @@ use crate::trial::action::Action;
 use crate::trial::correction::NewCorrection;
 use crate::trial::erasure::NewErasure;
 
-/// Corrects something of a session that has ended. The original stays; the correction stands beside it.
+/// Corrects a record of a session that has ended. The original stays; the correction is kept beside it.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/corrections", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = NewCorrection, responses(
@@ -36,7 +36,7 @@ async fn correct(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Erases words for good. Once this has answered, they are nowhere in the database; their record and its hash stay.
+/// Erases words permanently. Once this has answered, they are nowhere in the database. Their record and its hash stay.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/erasures", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = NewErasure, responses(
@@ -55,16 +55,16 @@ async fn erase(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Why all words of a session are erased.
+/// An erasure of all words of a session.
 #[derive(Debug, Deserialize, ToSchema)]
 struct EraseAll {
-    /// Kept with each erasure. It must not repeat the words.
+    /// Why; stored with each erasure. It must not repeat the words.
     #[schema(pattern = r"\S")]
     reason: String,
 }
 
-/// Erases all words of a withdrawn session for good: comments with their sound, answers in words, and notes. Once this
-/// has answered, they are nowhere in the database; their records and hashes stay.
+/// Erases all words of a withdrawn session permanently: comments with their sound, answers in words, and notes. Once
+/// this has answered, they are nowhere in the database. Their records and hashes stay.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/erasures/all", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = EraseAll, responses(
@@ -84,10 +84,10 @@ async fn erase_all(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Why a participant withdrew.
+/// A participant's withdrawal.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Withdraw {
-    /// Kept in the audit trail.
+    /// Why the participant withdrew; stored in the audit trail.
     #[schema(pattern = r"\S")]
     reason: String,
 }

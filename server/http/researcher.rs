@@ -31,10 +31,10 @@ use crate::trial::question::AnswerValue;
 use crate::trial::role::Role;
 use crate::trial::study::signature::Signature;
 
-/// Points of the focal path for each setting: about as many as there are pixels to draw them on.
+/// Points of the focal path per setting: about as many as there are pixels to draw them.
 const POINTS: u32 = 600;
 
-/// When a session was made, on the clock of the room.
+/// When a session was made, in local time.
 pub(super) fn made(line: &SessionLine) -> String {
     local(&line.created, "%Y-%m-%d %H:%M")
 }
@@ -44,7 +44,7 @@ pub(super) fn in_studies(lines: &[SessionLine]) -> bool {
     lines.iter().any(|line| line.study.is_some())
 }
 
-/// How far a session came, in words.
+/// State and progress of a session, in words.
 pub(super) fn state(line: &SessionLine) -> String {
     match line.status {
         SessionStatus::UnderWay => format!("under way, {} of {} settings", line.finished_settings, line.settings),
@@ -61,7 +61,7 @@ pub(super) fn local(at: &Timestamp, format: &str) -> String {
 #[template(path = "researcher.html")]
 struct ListPage {
     nonce: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
     chain: String,
     sessions: Vec<SessionLine>,
@@ -75,7 +75,7 @@ impl ListPage {
     }
 }
 
-/// The list of sessions, practice apart.
+/// The list of sessions, with practice sessions listed separately.
 #[utoipa::path(get, path = "/researcher", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn list_page(
@@ -95,16 +95,16 @@ async fn list_page(
 #[template(path = "session.html")]
 struct SessionPage {
     nonce: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
     chain: String,
     detail: SessionDetail,
-    /// Questions after a setting, each with its answer in every setting: those answered by a number.
+    /// Questions after a setting that are not answered in words, each with its answer in every setting.
     questions: Vec<QuestionRow>,
-    /// Those answered in words, which no column holds.
+    /// Questions after a setting that are answered in words, which do not fit into a column.
     written: Vec<QuestionRow>,
     closing: Vec<AnswerLine>,
-    /// The participants there are: one of them may be the right one.
+    /// Codes of all participants, to choose from when the session's participant is corrected.
     participants: Vec<String>,
 }
 
@@ -117,7 +117,7 @@ struct QuestionRow {
 }
 
 impl QuestionRow {
-    /// The settings that were answered, each with the answer.
+    /// The settings in which the question was answered, from 1, each with the answer.
     fn given(&self) -> impl Iterator<Item = (usize, &AnswerLine)> {
         (1..).zip(&self.answers).filter_map(|(setting, answer)| Some((setting, answer.as_ref()?)))
     }
@@ -137,7 +137,7 @@ impl SessionPage {
         Self { nonce, person, chain, detail, questions, written, closing, participants }
     }
 
-    /// The policy of `setting`, once the session was unblinded.
+    /// The policy of `setting` (from 1); `None` until the session is unblinded.
     fn policy(&self, setting: usize) -> Option<&PolicyName> {
         self.detail.unblinding.as_ref()?.policies.get(setting.wrapping_sub(1))
     }
@@ -157,7 +157,7 @@ impl SessionPage {
     }
 }
 
-/// One row for each question, in the order of the first answers.
+/// One row per question, in the order of the first answers.
 fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
     let mut places = BTreeMap::new();
     let mut rows: Vec<QuestionRow> = Vec::new();
@@ -178,7 +178,7 @@ fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
     rows
 }
 
-/// A score with its name.
+/// A score's name and value, rounded to one decimal.
 pub(super) fn score_words(score: &Measure) -> String {
     let value = score.value.map_or_else(|| "–".to_owned(), |value| tenths(value).to_string());
     format!("{} {value}", score.label)
@@ -188,7 +188,7 @@ fn tenths(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// An answer as it stands in a table: its scores where it has any, else the answer itself.
+/// An answer for a table cell: its scores if it has any, otherwise the answer itself.
 pub(super) fn cell(answer: &AnswerLine) -> String {
     if answer.scores.is_empty() {
         return answer.words.clone();
@@ -196,7 +196,7 @@ pub(super) fn cell(answer: &AnswerLine) -> String {
     answer.scores.iter().map(score_words).collect::<Vec<_>>().join(", ")
 }
 
-/// When something happened, in the words of the room.
+/// When something happened, in words and local time.
 pub(super) fn day_and_time(at: &Timestamp) -> String {
     local(at, "%Y-%m-%d at %H:%M")
 }
@@ -226,14 +226,14 @@ async fn session_page(
     SessionPage::new(nonce, person, chain, detail, participants).render().map(Html).map_err(|_| Error::Internal)
 }
 
-/// The sessions, newest first, practice included and marked.
+/// The sessions, newest first, including practice sessions, which are marked.
 #[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher",
     responses((status = 200, body = Vec<SessionLine>)))]
 async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
     Ok(Json(app.conductor.sessions(true).await?))
 }
 
-/// One session in detail; its policies once it was unblinded.
+/// One session in detail; with its policies once it is unblinded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionDetail), (status = 404, description = "No such session", body = ErrorBody)))]
@@ -246,7 +246,7 @@ async fn session(
     Ok(Json(app.conductor.session_detail(id).await?))
 }
 
-/// One session over time without its focal path.
+/// One session over time, without its focal path.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/course", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
@@ -261,7 +261,7 @@ async fn course(
     Ok(Json(Timeline { points: Vec::new(), ..timeline }))
 }
 
-/// One session over time with its focal path, which may tell policies apart: each look at it is recorded.
+/// One session over time with its focal path. The path may tell policies apart, so each access is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
@@ -284,11 +284,11 @@ struct ChainHead {
     number: i64,
     /// Its hash: SHA-256, hexadecimal.
     hash: String,
-    /// Both as they stand on the pages, for `parfocal verify --head`.
+    /// Number and hash as the pages show them, for `parfocal verify --head`.
     head: String,
 }
 
-/// The head of the chain: whoever notes it can prove later that nothing recorded before it was changed.
+/// The head of the chain. A note of it can later prove that nothing recorded before it was changed.
 #[utoipa::path(get, path = "/api/chain/head", tag = "service", responses(
     (status = 200, body = ChainHead),
     (status = 403, description = "For operator and researcher", body = ErrorBody)))]
@@ -298,28 +298,28 @@ async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<Ch
     Ok(Json(ChainHead { number: head.number, head: head.to_string(), hash: head.hash }))
 }
 
-/// The chain's head as the pages show it. A page opens without it, too.
+/// The chain's head as the pages show it, or the error in words: a page also opens if the head cannot be read.
 pub(super) async fn chain_words(app: &AppState) -> String {
     app.conductor.reader().head().await.map_or_else(|error| format!("cannot be read: {error}"), |head| head.to_string())
 }
 
-/// Why policies are to be told.
+/// A request to unblind a session.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Unblind {
-    /// Kept in the audit trail.
+    /// Why; stored in the audit trail.
     #[schema(pattern = r"\S")]
     reason: String,
-    /// Whether to do it though something may be outstanding, which would then not count any more.
+    /// Whether to unblind even though something may be outstanding, which would then no longer count.
     #[serde(default)]
     despite_outstanding: bool,
-    /// The passphrase of the lead who is signed in, once more: needed for a session of a study.
+    /// The passphrase of the lead who is signed in, entered again: needed for a session of a study.
     #[serde(default)]
     #[schema(min_length = 1)]
     passphrase: Option<String>,
 }
 
-/// Tells which policies ran; on a session still under way, or of a study that is still blinded, this is emergency
-/// unblinding and marked so for good.
+/// Unblinds a session. If it is still under way, or belongs to a study that is still blinded, this is emergency
+/// unblinding and permanently marked as such.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = Unblind, responses(

@@ -1,8 +1,8 @@
-//! Roles: who a request speaks for, and the links that let a browser in.
+//! Roles: which roles a request holds, and the links that let a browser in.
 //!
-//! A role is shown by its cookie, or by its key as a bearer token (programs). One cookie a role, so that one laptop can
-//! be operator and researcher at a time. Whoever is signed in has the roles of the account, too. Nothing else shows a
-//! role: where a request comes from tells only which proxy handed it on.
+//! A request proves a role by the role's cookie, or by its key as a bearer token (programs). Each role has its own
+//! cookie, so one laptop can be operator and researcher at the same time. Somebody who is signed in also has the roles
+//! of the account. Nothing else proves a role: the address of a request may be only that of a proxy.
 
 use std::sync::Arc;
 
@@ -24,46 +24,46 @@ use crate::store::Access;
 use crate::trial::account::Account;
 use crate::trial::role::Role;
 
-/// A cookie outlives a study day, not a study.
+/// Lifetime of a role's cookie: it outlives a study day, but not a study.
 const COOKIE_SECONDS: u64 = 30 * 24 * 3600;
 
-/// Proof that the request speaks for the surgeon of the session on the screens.
+/// Proof that the request comes from the surgeon of the session on the screens.
 #[derive(Debug, Clone, Copy)]
 pub struct Surgeon;
 
-/// Proof that the request comes from a surgeon's tablet, whatever session it was let in to: what was said is taken
-/// after its session, too.
+/// Proof that the request comes from a surgeon's tablet, whichever session it was let in to: comments and answers are
+/// accepted even after their session has ended.
 #[derive(Debug, Clone, Copy)]
 pub struct SurgeonsTablet;
 
-/// Proof that the request speaks for the operator, with the account of whoever is signed in.
+/// Proof that the request holds the operator's role, with the account if somebody is signed in.
 #[derive(Debug, Clone)]
 pub struct Operator(Option<Account>);
 
-/// Proof that the request speaks for the researcher, with the account of whoever is signed in.
+/// Proof that the request holds the researcher's role, with the account if somebody is signed in.
 #[derive(Debug, Clone)]
 pub struct Researcher(Option<Account>);
 
-/// Proof that the request speaks for somebody who may read what researchers read. For a request that changes nothing
-/// that was recorded, whatever its method: monitors may make it, too.
+/// Proof that the request comes from somebody who may read what researchers read. It is for requests that change no
+/// records, whatever their method: monitors may make them too.
 #[derive(Debug, Clone)]
 pub struct ResearchReader(Option<Account>);
 
-/// The roles that the request speaks for, at least one.
+/// The roles that the request holds, at least one.
 #[derive(Debug, Clone)]
 pub struct Roles {
     held: Vec<Role>,
-    /// What shows the surgeon, if anything does.
+    /// The surgeon's link that the request holds, if any.
     pass: Option<Pass>,
-    /// Those of them that a link shows.
+    /// The roles among `held` that are proven by a link.
     by_link: Vec<Role>,
 }
 
 impl Roles {
-    /// `wanted` if it is held; without a wish, the one that may see least.
+    /// Returns `wanted` if it is held; if nothing is wanted, the held role that may see least.
     ///
     /// # Errors
-    /// When `wanted` is not held.
+    /// If `wanted` is not held.
     pub fn choose(&self, wanted: Option<Role>) -> Result<Role, Error> {
         match wanted {
             Some(role) if self.held.contains(&role) => Ok(role),
@@ -72,17 +72,17 @@ impl Roles {
         }
     }
 
-    /// Whether nothing but an account shows `role`.
+    /// Whether `role` is held only by an account.
     pub(super) fn by_account_alone(&self, role: Role) -> bool {
         !self.by_link.contains(&role)
     }
 
-    /// Whether the surgeon is the only role.
+    /// Whether the surgeon's is the only role.
     pub(super) fn is_surgeon_alone(&self) -> bool {
         self.held == [Role::Surgeon]
     }
 
-    /// What shows the surgeon, if anything does.
+    /// The surgeon's link that the request holds, if any.
     pub(super) const fn pass(&self) -> Option<Pass> {
         self.pass
     }
@@ -105,7 +105,7 @@ impl FromRequestParts<AppState> for SurgeonsTablet {
     }
 }
 
-/// The account of a request, if somebody is signed in who may act as `role` in it.
+/// The account of a request, if somebody is signed in whose account may make it as `role`.
 fn account_as(parts: &Parts, role: Role) -> Option<Account> {
     let changes = !parts.method.is_safe();
     let person = parts.extensions.get::<Person>()?;
@@ -184,7 +184,7 @@ impl FromRequestParts<AppState> for Roles {
     }
 }
 
-/// The page of `role`.
+/// Path of the page of `role`.
 #[must_use]
 pub const fn home(role: Role) -> &'static str {
     match role {
@@ -217,7 +217,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
     };
     let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted());
 
-    // The door opens on a full disk, too: the log then tells of it alone.
+    // A browser is let in even if the disk is full. Then only the log records it.
     match app.conductor.recorder(role).record(&Access::Entered).await {
         Ok(_) => tracing::info!(role = role_name(role), "a browser was let in"),
         Err(error) => {
@@ -227,12 +227,12 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Redirect::to(home(role))))
 }
 
-/// The start page: on to the page of the role that the browser holds.
+/// The start page: redirects to the page of the role that the browser holds.
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "On to the role's page"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
 async fn start(Roles { held, .. }: Roles) -> Redirect {
-    // Whoever holds more than one role works here rather than being a subject of the trial.
+    // Somebody who holds more than one role works here, and is not a participant of the trial.
     Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
 }
 

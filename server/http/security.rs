@@ -1,5 +1,5 @@
-//! Security of every request and response: headers with a nonce per response, no requests from
-//! other sites, no host names but our own.
+//! Security of every request and response: security headers with a nonce per response, no requests from other sites,
+//! no host names except our own.
 
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use super::error::Error;
 use super::people;
 use super::places::Place;
 
-/// The header that says what of the device a page may use.
+/// The header that says which features of the device a page may use.
 pub const PERMISSIONS_POLICY: HeaderName = HeaderName::from_static("permissions-policy");
 
-/// What the surgeon's page may use of the device where the protocol asks for voice.
+/// Value of that header for the surgeon's page if the protocol asks for voice.
 pub const WITH_MICROPHONE: HeaderValue =
     HeaderValue::from_static("camera=(), display-capture=(), geolocation=(), microphone=(self)");
 
@@ -38,7 +38,7 @@ impl<S: Sync> FromRequestParts<S> for Nonce {
     }
 }
 
-/// Makes the nonce, and adds the headers that keep a page to what we wrote.
+/// Makes the nonce, and adds the headers that restrict a page to our own scripts, styles and resources.
 pub async fn headers(mut request: Request, next: Next) -> Response {
     let mut bytes = [0; 16];
     if getrandom::fill(&mut bytes).is_err() {
@@ -58,8 +58,9 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
 
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
-    // No Strict-Transport-Security: a device that has forgotten the local authority, or a new one that somebody took past
-    // its warning, could then open the page that explains how to trust the server no more. Cookies are Secure instead.
+    // We send no Strict-Transport-Security. With it, a device that has forgotten the local authority, or a new one on
+    // which somebody skipped the warning, could no longer open the page that explains how to trust the server. Cookies
+    // are Secure instead.
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(PERMISSIONS_POLICY).or_insert(HeaderValue::from_static(PERMISSIONS));
     headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
@@ -67,14 +68,14 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
     response
 }
 
-/// Where the researcher's page of a session is, the only one that plays sound.
+/// Beginning of the path of the researcher's page of a session, the only page that plays sound.
 const PLAYS_SOUND: &str = "/researcher/sessions/";
 
-/// The surgeon's page, the only one that a service worker keeps.
+/// Path of the surgeon's page, the only page that a service worker keeps.
 const OPENS_OFFLINE: &str = "/surgeon";
 
-/// What a page may not use of the device. The surgeon's page takes the microphone back where the protocol asks for
-/// voice.
+/// The features of the device that a page may not use. The surgeon's page may use the microphone if the protocol asks
+/// for voice.
 const PERMISSIONS: &str = "camera=(), display-capture=(), geolocation=(), microphone=()";
 
 fn content_security_policy(nonce: &str, plays_sound: bool, opens_offline: bool) -> String {
@@ -87,9 +88,9 @@ fn content_security_policy(nonce: &str, plays_sound: bool, opens_offline: bool) 
     )
 }
 
-/// Gives the connection of a request that shows a key a member's place. Rejects requests from other
-/// sites and, on a loopback server, host names that are not this machine's own: a site whose name
-/// is made to point here (DNS rebinding) has no role's cookie, and does not even get the page that says so.
+/// Gives the connection a member's place if the request shows a key or a sign-in. Rejects requests from other
+/// sites and, on a loopback server, host names that are not this machine's own. A site whose name is made to point
+/// here (DNS rebinding) has no role's cookie anyway, and does not even get the page that says so.
 pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let person = people::find(&app, request.headers()).await;
     let headers = request.headers();
@@ -115,10 +116,10 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
 }
 
 /// Judges by `Sec-Fetch-Site` and `Origin`, whichever the browser sends. A client that sends
-/// neither is not a browser, and has no cookie to be tricked out of.
+/// neither is not a browser, so it has no cookies that another site could misuse.
 ///
-/// A page that came unencrypted may hold anything that somebody put in on the way: an `encrypted` server does nothing
-/// for it. One that is not encrypted itself may stand behind a proxy that encrypts.
+/// A page that was loaded unencrypted may have been changed on the way, so an `encrypted` server refuses its requests.
+/// A server that does not encrypt itself accepts `https` origins too, because it may be behind a proxy that encrypts.
 fn is_same_origin(headers: &HeaderMap, host: &str, encrypted: bool) -> bool {
     let site_fits = headers.get("sec-fetch-site").is_none_or(|site| site == "same-origin");
     let origin_fits = headers.get(ORIGIN).is_none_or(|origin| {

@@ -1,8 +1,8 @@
-//! The server's end, as streams wait for it.
+//! Lets streams wait for the server's shutdown.
 
 use tokio::sync::watch;
 
-/// Waits until the server is to end.
+/// Waits until the server is told to shut down.
 pub(crate) async fn ended(shutdown: &mut watch::Receiver<bool>) {
     let _ = shutdown.wait_for(|end| *end).await;
 }

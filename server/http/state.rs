@@ -26,23 +26,23 @@ use crate::trial::permission::{CurrentSession, may_see_focal_power};
 use crate::trial::role::Role;
 use crate::trial::view::{OperatorView, SurgeonView};
 
-/// The server's parts, made once at start.
+/// The parts of the server, made once at the start.
 pub struct App {
-    /// Both clocks.
+    /// Monotonic and wall clock.
     pub clock: Arc<dyn Clock>,
-    /// The control loop as far as it can be seen. People command the lens through the conductor alone.
+    /// Read-only access to the control loop. People command the lens only through the conductor.
     pub control: ControlObserver,
-    /// Pictures.
+    /// Source of the live pictures.
     pub live: LiveHandle,
     /// The database.
     pub store: Store,
-    /// How the server is.
+    /// The server's health.
     pub health: HealthWatch,
-    /// Trial sessions.
+    /// Conductor of the trial sessions.
     pub conductor: Conductor,
-    /// What is being recorded.
+    /// The recorder.
     pub recordings: Recordings,
-    /// What was recorded.
+    /// Playback of recordings.
     pub player: Player,
     /// The session under way as surgeons may see it.
     pub surgeon_view: watch::Receiver<Option<Arc<SurgeonView>>>,
@@ -56,28 +56,28 @@ pub struct App {
     pub accounts: Accounts,
     /// Keys of the three roles.
     pub keys: Keys,
-    /// How others reach the server.
+    /// How other devices reach the server.
     pub reach: Reach,
-    /// The devices as they were found.
+    /// What the server learned about its devices when it started.
     pub equipment: Equipment,
     /// The surgeon's pages that are open.
     pub tablets: OpenTablets,
     /// Counters for Prometheus.
     pub metrics: Metrics,
-    /// Turns true when the server is to end; streams then close by themselves.
+    /// Turns true when the server must shut down; streams then close by themselves.
     pub shutdown: watch::Receiver<bool>,
 }
 
-/// Counters of HTTP itself.
+/// Counters of the HTTP server.
 #[derive(Debug, Clone, Default)]
 pub struct Metrics {
     /// Frames sent to viewers.
     pub frames_sent: Counter<u64, AtomicU64>,
-    /// Bytes of those.
+    /// Bytes of these frames.
     pub bytes_sent: Counter<u64, AtomicU64>,
 }
 
-/// The state of every route.
+/// The state that every route gets.
 pub type AppState = Arc<App>;
 
 impl App {
@@ -87,7 +87,7 @@ impl App {
         view.as_ref().filter(|view| view.study.is_some()).map(|view| view.surgeon.session)
     }
 
-    /// The session of a study on the screens that has not ended: the surgeon gets a link to it alone.
+    /// The session on the screens, if it belongs to a study and has not ended. The surgeon's link is then to it only.
     #[must_use]
     pub fn linked_session(&self) -> Option<SessionId> {
         self.study_session().filter(|session| self.session_goes_on(*session))
@@ -100,7 +100,7 @@ impl App {
         view.as_ref().is_some_and(|view| view.surgeon.session == session && !view.surgeon.phase.has_ended())
     }
 
-    /// Whether what tells policies apart is now kept from operator and researcher too.
+    /// Whether values that tell policies apart are now hidden from operator and researcher too.
     #[must_use]
     pub fn blinded(&self) -> bool {
         let phase = self.operator_view.borrow().as_ref().map(|view| view.surgeon.phase);

@@ -1,4 +1,4 @@
-//! The researcher's pages on studies, and what they send: plan, open, close, lock, unblind, withdrawals.
+//! The researcher's pages of studies, and their requests: plan, open, close, lock, unblind, withdrawals.
 
 use askama::Template;
 use axum::Json;
@@ -28,14 +28,14 @@ use crate::trial::study::state::Change;
 #[template(path = "studies.html")]
 struct ListPage {
     nonce: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
     has_accounts: bool,
     studies: Vec<StudyLine>,
 }
 
 impl ListPage {
-    /// Whether whoever looks may make accounts.
+    /// Whether the reader is a lead, who may make accounts.
     fn leads(&self) -> bool {
         self.person.as_ref().is_some_and(|account| account.role.leads())
     }
@@ -64,19 +64,19 @@ async fn studies_page(
 #[template(path = "study.html")]
 struct StudyPage {
     nonce: String,
-    /// Who is signed in.
+    /// The account that is signed in, if any.
     person: Option<Account>,
     chain: String,
     detail: StudyDetail,
 }
 
 impl StudyPage {
-    /// Whether whoever looks may lock and unblind.
+    /// Whether the reader is a lead, who may lock and unblind.
     fn leads(&self) -> bool {
         self.person.as_ref().is_some_and(|account| account.role.leads())
     }
 
-    /// Whether whoever looks may change the study.
+    /// Whether the reader may change the study.
     fn may_change(&self) -> bool {
         self.person.as_ref().is_some_and(|account| account.role.may_act_as(Role::Researcher, true))
     }
@@ -95,8 +95,8 @@ impl StudyPage {
         match self.detail.line.stage {
             Stage::Planned => "Planned. Opening it draws the orders; then sessions can be made.",
             Stage::Open => "Open. The operator can make sessions in it.",
-            Stage::Closed => "Closed. No sessions can be made. It can be opened again, or locked for good.",
-            Stage::Locked => "Locked. Nothing changes any more. It can be unblinded.",
+            Stage::Closed => "Closed. No sessions can be made. It can be opened again, or locked permanently.",
+            Stage::Locked => "Locked. Nothing can be changed. It can be unblinded.",
             Stage::Unblinded => "Unblinded. Each session tells which policy ran in which setting.",
         }
     }
@@ -122,7 +122,7 @@ impl StudyPage {
     }
 }
 
-/// What becomes of a place, in words.
+/// What happens to the place of an aborted or withdrawn session, in words.
 pub(super) const fn replacement(rule: Replacement) -> &'static str {
     match rule {
         Replacement::Keep => "its place stays used; nobody is added",
@@ -131,7 +131,7 @@ pub(super) const fn replacement(rule: Replacement) -> &'static str {
     }
 }
 
-/// Whether a surgeon may have a second session, in words.
+/// What happens if a surgeon comes for a second session, in words.
 pub(super) const fn repetition(rule: Repetition) -> &'static str {
     match rule {
         Repetition::Refuse => "refused",
@@ -139,7 +139,7 @@ pub(super) const fn repetition(rule: Repetition) -> &'static str {
     }
 }
 
-/// How far a session came, in words.
+/// The state of a session, in words.
 pub(super) const fn session_state(session: &StudySession) -> &'static str {
     match session.status {
         SessionStatus::UnderWay => "under way",
@@ -174,7 +174,7 @@ async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json
     Ok(Json(app.conductor.studies().lines().await?))
 }
 
-/// One study in detail. It tells no order.
+/// One study in detail, without the orders.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, body = StudyDetail), (status = 404, description = "No such study", body = ErrorBody)))]
@@ -187,15 +187,15 @@ async fn study(
     Ok(Json(app.conductor.studies().detail(&name).await?))
 }
 
-/// A study to be planned.
+/// A study to plan.
 #[derive(Debug, Deserialize, ToSchema)]
 struct PlanStudy {
-    /// The definition: TOML, as docs/study.md describes it.
+    /// The definition in TOML, as docs/study.md describes it.
     definition: String,
-    /// The sites of it that this database runs; all of them where none are named.
+    /// The sites of the study that this database runs; all sites if none are named.
     #[serde(default)]
     sites: Vec<String>,
-    /// Why.
+    /// The reason, which is signed.
     #[schema(pattern = r"\S")]
     reason: String,
 }
@@ -216,17 +216,17 @@ async fn plan_study(
     Ok(Json(app.conductor.studies().detail(name.as_str()).await?))
 }
 
-/// A change of a study, signed.
+/// A signed change of a study.
 #[derive(Debug, Deserialize, ToSchema)]
 struct ChangeStudy {
-    /// What is to be done.
+    /// The change.
     #[serde(flatten)]
     change: Change,
-    /// The passphrase of the lead who is signed in, once more: needed to lock and to unblind.
+    /// The passphrase of the lead who is signed in, entered again: needed to lock and to unblind.
     #[serde(default)]
     #[schema(min_length = 1)]
     passphrase: Option<String>,
-    /// Why.
+    /// The reason, which is signed.
     #[schema(pattern = r"\S")]
     reason: String,
 }
@@ -258,7 +258,7 @@ async fn change_study(
     Ok(Json(app.conductor.studies().detail(&name).await?))
 }
 
-/// The signature of a change by whoever is signed in to `account`.
+/// The signature of a change by the person of `account`.
 fn signed(account: &Account, reason: &str) -> Result<Signature, Error> {
     Signature::of_account(account, reason).map_err(|refusal| ConductError::from(refusal).into())
 }

@@ -1,4 +1,4 @@
-//! The export of a whole study for the researcher's browser: started, followed, downloaded.
+//! The export of a whole study for the researcher's browser: starts it, reports its progress, and sends the file.
 
 use axum::Json;
 use axum::body::Body;
@@ -35,16 +35,16 @@ impl From<StudyExportError> for Error {
     }
 }
 
-/// What is to be exported.
+/// What to export.
 #[derive(Debug, Deserialize, ToSchema)]
 struct ExportStudy {
-    /// Whether to tell which policy ran in which setting; only after unblinding.
+    /// Whether to include which policy ran in which setting; only after unblinding.
     #[serde(default)]
     unblinded: bool,
 }
 
-/// Begins to export all sessions of a study as one package, in the background. While one is being made, no other
-/// begins: the answer then tells how far that one has come.
+/// Begins to export all sessions of a study as one package, in the background. If an export is already being made, no
+/// other begins, and the answer gives the progress of that one.
 #[utoipa::path(post, path = "/api/researcher/studies/{study}/export", tag = "researcher",
     params(("study" = String, Path)), request_body = ExportStudy, responses(
     (status = 200, body = StudyExportState),
@@ -61,8 +61,8 @@ async fn start_study_export(
     Ok(Json(app.study_exports.start(app.conductor.recorder(by.actor()), &study, wanted.unblinded)))
 }
 
-/// How the latest export of a study stands. A finished one is kept for an hour, unless a surgeon withdraws or words are
-/// erased.
+/// The state of the latest export of a study. A finished export is kept for an hour, unless a surgeon withdraws or
+/// words are erased.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/export", tag = "researcher",
     params(("study" = String, Path)), responses((status = 200, body = StudyExportState)))]
 async fn study_export(
@@ -93,9 +93,9 @@ async fn study_export_zip(
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
     let (zip, bytes) = ZipStream::new(name.clone());
 
-    // On a thread of its own: compressing would hold up the streams.
+    // On a separate thread: compressing would delay the streams.
     tokio::task::spawn_blocking(move || {
-        // It holds the export, whose files stay until all of them are sent.
+        // This holds `made`, so its files stay until all of them are sent.
         if let Err(error) = Handle::current().block_on(zip.send_folder(&made.folder)) {
             tracing::warn!(%study, %error, "the download of a study's export was cut off");
         }

@@ -1,4 +1,4 @@
-//! The surgeon's page and what it sends: actions, comments, answers. Sees no view but the surgeon's.
+//! The surgeon's page and its requests: actions, comments, answers. This file sees only the surgeon's view.
 
 use std::sync::Arc;
 
@@ -30,7 +30,8 @@ struct Page {
     nonce: String,
     /// Whether the page may ask for the microphone.
     microphone: bool,
-    /// Which link let the tablet in: what the browser keeps of one is not shown under another.
+    /// A name for the link by which the tablet was let in. What the browser stores under one link is not shown under
+    /// another.
     link: String,
 }
 
@@ -51,7 +52,7 @@ async fn page(
     Nonce(nonce): Nonce,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
-    // A tablet that is not let in any more still hands over what it holds.
+    // A tablet that is no longer let in still sends what it holds.
     if let Err(error) = surgeon {
         let message = error.to_string();
         let html = OverPage { nonce, message }.render().map_err(|_| Error::Internal)?;
@@ -71,7 +72,7 @@ async fn page(
 
 type View = Json<Option<Arc<SurgeonView>>>;
 
-/// The session under way; null when there is none.
+/// The session under way; null if there is none.
 #[utoipa::path(get, path = "/api/surgeon/session", tag = "surgeon",
     responses((status = 200, body = Option<SurgeonView>)))]
 async fn session(_: Surgeon, State(app): State<AppState>) -> View {
@@ -88,7 +89,7 @@ pub(super) struct Act {
     pub(super) action: Action,
 }
 
-/// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
+/// Moves the session on; repeating an action changes nothing. Answers with the session as it is then.
 #[utoipa::path(post, path = "/api/surgeon/actions", tag = "surgeon", request_body = Act, responses(
     (status = 200, body = Option<SurgeonView>),
     (status = 403, description = "Another role does this", body = ErrorBody),
@@ -99,7 +100,7 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
     Ok(Json(app.surgeon_view.borrow().clone()))
 }
 
-/// Keeps a comment: once this has answered, it is on disk. The same key again is the same comment.
+/// Stores a comment: once this has answered, it is on disk. A comment sent again with the same key is stored once.
 #[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "No such session", body = ErrorBody),
@@ -115,8 +116,8 @@ async fn comment(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Keeps an answer: once this has answered, it is on disk. Of several to a question the one given last counts; one that
-/// comes too long after the session's end is kept, but never counts.
+/// Stores an answer: once this has answered, it is on disk. If a question has several, the one given last counts. One
+/// that arrives too long after the session's end is stored, but never counts.
 #[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "No such session or question", body = ErrorBody),
@@ -132,7 +133,7 @@ async fn answer(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Hears how much of a session a surgeon's device still holds, so that nobody unblinds it over that unasked.
+/// Notes how much of a session a surgeon's device still holds, so that nobody unblinds it without being warned.
 #[utoipa::path(post, path = "/api/surgeon/holding", tag = "surgeon", request_body = Holding, responses(
     (status = 204, description = "Noted"),
     (status = 404, description = "No such session", body = ErrorBody),

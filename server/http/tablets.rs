@@ -1,14 +1,15 @@
-//! Which tablets may see the session on the screens as the surgeon.
+//! Decides which tablets may see the session on the screens as the surgeon.
 
 use super::App;
 use super::credentials::Pass;
 use super::error::Error;
 
-/// Whether a tablet with `pass` may see the session on the screens. The link to a session lasts until the operator has
-/// closed it, so that the tablet can say that it has ended; nobody new is let in by then.
+/// Checks whether a tablet with `pass` may see the session on the screens. A link to a session works until the operator
+/// takes the session off the screens, so that the tablet can show that it has ended. The link lets in no new browser
+/// once the session has ended.
 ///
 /// # Errors
-/// When the session that the pass is for is over, or the one on the screens has a link of its own.
+/// If the session of the pass is no longer on the screens, or the session on the screens has its own link.
 pub(super) fn admit(app: &App, pass: Pass) -> Result<(), Error> {
     match (pass, app.study_session()) {
         (Pass::Shared, None) => Ok(()),
@@ -18,7 +19,7 @@ pub(super) fn admit(app: &App, pass: Pass) -> Result<(), Error> {
     }
 }
 
-/// Waits until a tablet with `pass` may see the screens no more: why.
+/// Waits until a tablet with `pass` is no longer admitted; returns the reason.
 pub(super) async fn no_longer_admitted(app: &App, pass: Pass) -> Error {
     let mut views = app.operator_view.clone();
     loop {

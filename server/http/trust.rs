@@ -1,5 +1,5 @@
-//! How a tablet or laptop learns to trust the server's local authority, and whether it does. Open to everyone, and also
-//! served unencrypted: a device that does not trust the server yet must be able to read it. All of it is public.
+//! Helps a tablet or laptop to trust the server's local authority, and checks whether it does. Open to everyone, and
+//! also served unencrypted: a device that does not trust the server yet must be able to read it. All of it is public.
 
 use askama::Template;
 use axum::extract::State;
@@ -19,21 +19,22 @@ use crate::tls::PublicAuthority;
 #[template(path = "trust.html")]
 struct Page<'a> {
     nonce: String,
-    /// Where the encrypted pages begin.
+    /// Scheme and host of the encrypted pages.
     encrypted: String,
-    /// What devices call the authority.
+    /// The authority's name, as devices show it.
     name: &'a str,
     fingerprint: &'a str,
 }
 
-/// An Apple configuration profile that holds the authority.
+/// An Apple configuration profile that contains the authority.
 #[derive(Template)]
 #[template(path = "trust.mobileconfig.xml")]
 struct Profile<'a> {
     name: &'a str,
     /// The certificate, DER in base 64.
     certificate: String,
-    /// The profile's own identifier, and its content's: the same each time, so that a device has the authority once.
+    /// Identifiers of the profile and (`content_id`) of its content. They are the same each time, so that a device
+    /// installs the authority only once.
     own_id: Uuid,
     content_id: Uuid,
 }
@@ -49,7 +50,7 @@ fn authority(app: &App) -> Result<&PublicAuthority, Error> {
     })
 }
 
-/// The page that leads through trusting the server on this device.
+/// The page that explains how to trust the server on this device.
 #[utoipa::path(get, path = "/trust", tag = "trust", responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "The server has no local authority", body = ErrorBody)))]
@@ -94,11 +95,11 @@ async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error
     Ok((headers, body.render().map_err(|_| Error::Internal)?))
 }
 
-/// Asked for over TLS by the page that was opened without: a device that gets an answer trusts the server.
+/// Requested over TLS by the trust page, which was loaded unencrypted: a device that gets the answer trusts the server.
 #[utoipa::path(get, path = "/trust/check", tag = "trust", responses(
     (status = 204, description = "The answer has arrived; it says nothing else")))]
 async fn check() -> impl IntoResponse {
-    // The page has another origin as long as it is not encrypted.
+    // While the page is not encrypted, it has another origin.
     (StatusCode::NO_CONTENT, [(ACCESS_CONTROL_ALLOW_ORIGIN, "*")])
 }
 
@@ -108,7 +109,7 @@ fn identifier(digest: &[u8]) -> Uuid {
     uuid::Builder::from_custom_bytes(bytes).into_uuid()
 }
 
-/// What stands between the first and the last line of `pem`: DER in base 64.
+/// The lines of `pem` between its first and last: DER in base 64.
 fn base64_of(pem: &str) -> String {
     pem.lines().filter(|line| !line.starts_with("-----")).collect()
 }

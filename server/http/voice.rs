@@ -1,4 +1,5 @@
-//! Voice over HTTP: the surgeon's page sends pieces of a recording while it is spoken, the researcher's page plays it.
+//! Voice over HTTP: the surgeon's page sends a recording in pieces while the surgeon speaks; the researcher's page
+//! plays it.
 
 use axum::body::Bytes;
 use axum::extract::{Path, Query, State};
@@ -20,19 +21,19 @@ use crate::trial::voice::{Ending, NewPiece};
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct PieceQuery {
-    /// Session that the comment was said in.
+    /// Session in which the comment was spoken.
     session: SessionId,
-    /// How far the recording had come at the piece's end, milliseconds.
+    /// Length of the recording up to the end of this piece, milliseconds.
     #[param(minimum = 0, maximum = 3_600_000)]
     through_ms: i64,
-    /// Why the recording ended, on its last piece.
+    /// Why the recording ended; only with its last piece.
     #[serde(default)]
     #[param(inline)]
     ended: Option<Ending>,
 }
 
-/// Keeps a piece of a recording: once this has answered, it is on disk. The comment (of kind voice) comes first; its
-/// pieces may then come late, again, and in any order.
+/// Stores a piece of a recording: once this has answered, it is on disk. The comment (of kind voice) must come first;
+/// its pieces may then come late, repeatedly, and in any order.
 #[utoipa::path(post, path = "/api/surgeon/voice/{comment}/{piece}", tag = "surgeon",
     params(
         ("comment" = IdempotencyKey, Path, description = "The comment's key"),
@@ -61,7 +62,7 @@ async fn keep_piece(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// What was said aloud in a voice comment, as far as it has arrived. A request for a range of bytes gets that range.
+/// The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets that range.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/voice/{comment}", tag = "researcher",
     params(("session" = SessionId, Path), ("comment" = IdempotencyKey, Path, description = "The comment's key")),
     responses(

@@ -19,9 +19,9 @@ pub struct Band {
 /// Counts of a reference exposure: no light (dark), or a white target under the light in use (white).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reference {
-    /// One count a band, in the order of [`MosaicFrame`].
+    /// One count per band, in the order of [`MosaicFrame`].
     PerBand([f32; BANDS]),
-    /// One count a pixel: the mean of several exposures.
+    /// One count per pixel: the mean of several exposures.
     PerPixel(MosaicFrame),
 }
 
@@ -36,7 +36,7 @@ pub struct Calibration {
     pub version: String,
     /// Date of the last change, if known.
     pub date: Option<String>,
-    /// Significant bits of a sample, 1..=16.
+    /// Significant bits of a sample, 8..=16.
     pub bit_depth: u8,
     /// The bands' responses.
     pub bands: [Band; BANDS],
@@ -69,8 +69,8 @@ const DEFAULT_BANDS: [(f64, f64); BANDS] = [
 ];
 
 impl Default for Calibration {
-    /// The bands of one calibrated unit, 10 bit. Every unit ships its own calibration; until it is
-    /// given there is no dark offset, white is full scale in every band, and nothing is corrected.
+    /// The bands of one calibrated unit, 10 bit. Every unit ships with its own calibration. Until it is given, there is
+    /// no dark offset, white is full scale in every band, and nothing is corrected.
     fn default() -> Self {
         Self {
             name: "CMV2K-SSM4X4-VIS 460-600 nm".to_owned(),

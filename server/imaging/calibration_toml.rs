@@ -50,17 +50,18 @@ impl Calibration {
     /// ```
     ///
     /// # Errors
-    /// For text that is not TOML, an unknown key, or an invalid value; names the line and the key.
+    /// If the text is not TOML, a key is unknown, or a value is invalid. The error names the line and the key.
     pub fn from_toml(text: &str) -> Result<Self, CalibrationError> {
         let no_pictures =
-            "a count, or a list of 16; a picture's name stands only in a calibration that is read from a file";
+            "a count, or a list of 16; the name of a picture is only allowed in a calibration that is read from a file";
         Self::from_toml_with(text, |_| Err(format!("must be {no_pictures}")))
     }
 
-    /// The same; `picture` reads the reference picture of a name, or says what is wrong with it.
+    /// Like [`Calibration::from_toml`]. `picture` reads the reference picture of a given name, or says what is wrong
+    /// with it.
     ///
     /// # Errors
-    /// As [`Calibration::from_toml`], and when a picture cannot be read or does not fit.
+    /// As [`Calibration::from_toml`], and if a picture cannot be read or does not fit.
     pub fn from_toml_with(
         text: &str,
         picture: impl Fn(&str) -> Result<MosaicFrame, String>,
@@ -124,7 +125,7 @@ impl<'a> Keys<'a> {
         CalibrationError::Key { line: line_of(self.text, at), key: key.to_owned(), problem }
     }
 
-    /// Takes `key` out, read as a `T` that passes `check`.
+    /// Removes `key` and reads its value as a `T` that passes `check`. `None` if the key is absent.
     fn take<T: DeserializeOwned>(
         &mut self,
         key: &str,
@@ -209,7 +210,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// The reference picture that `key` names, if it is text.
+    /// The reference picture that `key` names, if its value is text.
     fn picture(
         &mut self,
         key: &str,
@@ -231,7 +232,7 @@ impl<'a> Keys<'a> {
         Ok(Some(Reference::PerPixel(frame)))
     }
 
-    /// One count for all bands, or a list of 16.
+    /// Counts of `key`: one for all bands, or a list of 16. `None` if the key is absent.
     fn counts(
         &mut self,
         key: &str,

@@ -8,13 +8,13 @@ use super::frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
 use super::luma::luma;
 use super::reconstruct::Reconstructor;
 
-/// Width and height in samples of the full sensor (IMEC CMV2K), which a raw mosaic has.
+/// Width and height of the full sensor (IMEC CMV2K) in samples. Raw mosaics have this size.
 pub const SENSOR_SIZE: (usize, usize) = (2048, 1088);
 
-/// Pixels a side of the largest picture that is read.
+/// Longest side of a picture that is read, in pixels.
 const LARGEST_SIDE: u32 = 16_384;
 
-/// Bytes that decoding one picture may take.
+/// Most memory that decoding one picture may take, in bytes.
 const LARGEST_MEMORY: u64 = 512 << 20;
 
 /// A decoded picture.
@@ -43,7 +43,7 @@ impl Picture {
     }
 }
 
-/// Why bytes are not a picture. Reads on after "FILE: ".
+/// Why bytes are not a picture. The message is meant to follow "FILE: ".
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
     /// There are no bytes.
@@ -61,13 +61,13 @@ pub enum DecodeError {
     /// An unsupported kind of pixel.
     #[error("cannot read pixels of this kind ({0}); convert it to 8 or 16 bit gray or RGB")]
     OtherPixels(String),
-    /// More pixels or memory than is sensible.
+    /// The picture exceeds the limits on pixels or memory.
     #[error("too large: the limit is {LARGEST_SIDE} pixels per side and {} MiB", LARGEST_MEMORY >> 20)]
     TooLarge,
     /// A mosaic was asked for, but the picture is colour or 8 bit.
     #[error("a mosaic is a 16-bit gray picture, not {0}")]
     NotAMosaic(&'static str),
-    /// A mosaic of an odd size.
+    /// A mosaic whose sides are not multiples of 4.
     #[error(transparent)]
     MosaicSize(#[from] FrameError),
     /// A raw mosaic of another length than the sensor's.
@@ -86,11 +86,11 @@ pub enum DecodeError {
 
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bit, gray or RGB; alpha is left out.
 ///
-/// A 16-bit gray picture of the sensor's full size is a mosaic. With `mosaic`, any 16-bit gray
-/// picture is one, and its sides must be multiples of 4.
+/// A 16-bit gray picture of the sensor's full size is a mosaic. With `mosaic`, every 16-bit gray picture is read as
+/// one, and its sides must be multiples of 4.
 ///
 /// # Errors
-/// When the bytes are not such a picture, or not all of one.
+/// If the bytes are not such a picture, or are cut short.
 pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
     let picture = decode_any(bytes)?;
     let width = picture.width() as usize;
@@ -139,7 +139,7 @@ pub fn is_mosaic(picture: &DynamicImage) -> bool {
 /// Reads a raw mosaic: 2048x1088 samples, row by row, each two bytes with the low one first.
 ///
 /// # Errors
-/// When it is not exactly that long.
+/// If `bytes` has another length.
 pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     let (width, height) = SENSOR_SIZE;
     let expected = 2 * width * height;
@@ -151,12 +151,11 @@ pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     Ok(MosaicFrame::new(width, height, samples)?)
 }
 
-/// Reads a PNG, JPEG or TIFF picture with any pixels except floating-point ones: nothing says which
-/// value of those is white, and the `image` crate, which takes 1 for it, would make most of them
-/// white.
+/// Reads a PNG, JPEG or TIFF picture with any pixels except floating-point ones. Nothing says which value of those is
+/// white. The `image` crate assumes 1, so most such pictures would become white.
 ///
 /// # Errors
-/// When the bytes are not such a picture, not all of one, or one too large.
+/// If the bytes are not such a picture or are cut short, or if the picture is too large.
 pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     if bytes.is_empty() {
         return Err(DecodeError::Empty);
@@ -192,14 +191,14 @@ pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     }
 }
 
-/// Whether an end marker follows the last scan: the decoder silently fills up pictures that are cut
-/// short.
+/// Whether an end marker follows the last scan. Checked here because the decoder silently fills up pictures that are
+/// cut short.
 fn jpeg_ends(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xFF, marker]);
     last(0xD9) > last(0xDA)
 }
 
-/// 0..=65535 to 0..=255.
+/// Scales 0..=65535 to 0..=255.
 fn from_16_bit(value: u16) -> f32 {
     f32::from(value) / 257.0
 }
@@ -289,7 +288,7 @@ mod tests {
         assert!(message.starts_with("cannot read gif pictures"), "{message}");
 
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::new(4, 4));
-        // Either reader refuses them: an 8-bit picture made of them would be white.
+        // Both functions refuse them: an 8-bit picture made of them would be white.
         let floats = encoded(&floats, ImageFormat::Tiff);
         assert!(matches!(decode(&floats, false), Err(DecodeError::OtherPixels(_))));
         assert!(matches!(decode_any(&floats), Err(DecodeError::OtherPixels(_))));

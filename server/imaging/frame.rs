@@ -12,7 +12,7 @@ pub struct MosaicFrame {
     samples: Vec<u16>,
 }
 
-/// A picture whose size and data do not fit.
+/// A picture whose data do not match its size.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// Width or height is not a positive multiple of 4.
@@ -30,9 +30,9 @@ pub enum FrameError {
         width: usize,
         /// Height in pixels.
         height: usize,
-        /// Values a picture of this size has.
+        /// Number of values in a picture of this size.
         expected: usize,
-        /// Values given.
+        /// Number of values given.
         found: usize,
     },
 }
@@ -41,7 +41,7 @@ impl MosaicFrame {
     /// A frame of `samples`, row by row.
     ///
     /// # Errors
-    /// When a side is not a positive multiple of 4, or the number of samples does not fit.
+    /// If a side is not a positive multiple of 4, or the number of samples does not fit.
     pub fn new(width: usize, height: usize, samples: Vec<u16>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 || !width.is_multiple_of(CELL) || !height.is_multiple_of(CELL) {
             return Err(FrameError::BadSize { width, height });
@@ -103,7 +103,7 @@ impl RgbImage {
     /// A picture of `data`.
     ///
     /// # Errors
-    /// When the number of bytes does not fit the size.
+    /// If the number of bytes does not fit the size.
     pub fn new(width: usize, height: usize, data: Vec<u8>) -> Result<Self, FrameError> {
         check_length(width, height, 3, data.len())?;
         Ok(Self { width, height, data })
@@ -125,7 +125,7 @@ impl GrayImage {
     /// A picture of `data`.
     ///
     /// # Errors
-    /// When the number of values does not fit the size.
+    /// If the number of values does not fit the size.
     pub fn new(width: usize, height: usize, data: Vec<f32>) -> Result<Self, FrameError> {
         check_length(width, height, 1, data.len())?;
         Ok(Self { width, height, data })

@@ -9,13 +9,13 @@ pub const PATCH_SIDE: usize = 32;
 /// for a mosaic), x and y from the top left.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ContentArea {
-    /// Centre, rightwards.
+    /// Centre, pixels from the left.
     pub x: f64,
-    /// Centre, downwards.
+    /// Centre, pixels from the top.
     pub y: f64,
-    /// Radius.
+    /// Radius, pixels.
     pub radius: f64,
-    /// Sum of the inlying edge points' scores over 32.
+    /// Sum of the inlying edge points' scores, divided by 32, the most candidates there can be. 0..=1.
     pub confidence: f64,
 }
 
@@ -52,7 +52,7 @@ impl PatchArea {
     /// `height` picture; at the picture's centre where there is no content area.
     ///
     /// # Errors
-    /// When the picture is smaller than the patch.
+    /// If the picture is smaller than the patch.
     pub fn central(width: usize, height: usize, content: Option<&ContentArea>) -> Result<Self, TooSmall> {
         if width < PATCH_SIDE || height < PATCH_SIDE {
             return Err(TooSmall { width, height });
@@ -67,7 +67,7 @@ impl PatchArea {
     }
 }
 
-/// First pixel of a patch around `centre` that keeps inside `0..length`.
+/// First pixel of a patch around `centre` that stays inside `0..length`.
 fn start(centre: f64, length: usize) -> usize {
     // A float-to-integer cast saturates: a negative place becomes 0.
     let first = (centre - PATCH_SIDE as f64 / 2.0).round() as usize;

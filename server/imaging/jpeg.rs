@@ -17,7 +17,7 @@ pub struct JpegEncoder {
 /// A picture could not be encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum JpegError {
-    /// The picture has no pixels, or not as many as its size says.
+    /// The picture has no pixels, or its data do not match its size.
     #[error("cannot encode a {width}x{height} picture of {bytes} bytes as JPEG")]
     BadPicture {
         /// Width in pixels.
@@ -39,7 +39,7 @@ impl JpegEncoder {
     /// An encoder at `quality`, 1..=100.
     ///
     /// # Errors
-    /// When libjpeg-turbo refuses the quality or has no memory.
+    /// If libjpeg-turbo refuses the quality or has no memory.
     pub fn new(quality: u8) -> Result<Self, JpegError> {
         let mut compressor = Compressor::new()?;
         compressor.set_quality(i32::from(quality))?;
@@ -50,7 +50,7 @@ impl JpegEncoder {
     /// Encodes `rgb`.
     ///
     /// # Errors
-    /// When the picture is empty or inconsistent, or libjpeg-turbo refuses it (a side over 65 500
+    /// If the picture is empty or inconsistent, or libjpeg-turbo refuses it (a side over 65 500
     /// pixels).
     pub fn encode(&mut self, rgb: &RgbImage) -> Result<Bytes, JpegError> {
         let &RgbImage { width, height, ref data } = rgb;
@@ -69,7 +69,7 @@ impl JpegEncoder {
     /// Encodes `ycc`, whose colours need no conversion.
     ///
     /// # Errors
-    /// When the picture is empty, or libjpeg-turbo refuses it (a side over 65 500 pixels).
+    /// If the picture is empty, or libjpeg-turbo refuses it (a side over 65 500 pixels).
     pub fn encode_ycc(&mut self, ycc: &YccImage) -> Result<Bytes, JpegError> {
         let width = ycc.width();
         let height = ycc.height();
@@ -117,7 +117,7 @@ mod tests {
         let jpeg = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY).unwrap().encode_ycc(&ycc).unwrap();
         let decoded = image::load_from_memory_with_format(&jpeg, image::ImageFormat::Jpeg).unwrap().to_rgb8();
         assert_eq!(decoded.dimensions(), (64, 48));
-        // JFIF 1.02's equations make 238, 14, 14 of it.
+        // By JFIF 1.02's equations each pixel is 238, 14, 14.
         for pixel in decoded.pixels() {
             assert!(pixel.0.iter().zip([238, 14, 14]).all(|(one, other)| one.abs_diff(other) <= 6), "{pixel:?}");
         }

@@ -1,12 +1,11 @@
-//! Gray pictures made smaller: each new pixel is the mean of what it covers.
+//! Makes gray pictures smaller: each new pixel is the mean of the area that it covers.
 
 use std::ops::Range;
 
 use super::frame::GrayImage;
 
-/// `picture` at `width` x `height` pixels, each the mean of the area that it covers. A side is at
-/// least 1 and at most the picture's own. Where it divides the picture's side these are means of
-/// whole blocks.
+/// `picture` reduced to `width` x `height` pixels, each the mean of the area that it covers. Sides are clamped to
+/// between 1 and the picture's own. If they divide the picture's sides, each pixel is the mean of a whole block.
 ///
 /// The `image` crate cannot do this for gray levels: it clamps floating-point samples to 0..=1.
 #[must_use]
@@ -14,8 +13,8 @@ pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
     means(picture, &covered(picture.width, width), &covered(picture.height, height))
 }
 
-/// `picture` with the mean of each whole block of `scale` x `scale` pixels as one pixel. What is left
-/// over at the right and below is cut off. A picture smaller than a block stays as it is.
+/// `picture` with the mean of each whole block of `scale` x `scale` pixels as one pixel. Pixels left over at the right
+/// and below are cut off. A picture smaller than a block stays as it is.
 #[must_use]
 pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     let scale = scale.max(1);
@@ -28,11 +27,11 @@ pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     means(picture, &covered(width * scale, width), &covered(height * scale, height))
 }
 
-/// Fills `out`, `columns` values a row, with the means of blocks of `SCALE` x `SCALE` pixels of
-/// `levels`, which has `width` pixels a row and begins with the first block.
+/// Fills `out` (`columns` values per row) with the means of blocks of `SCALE` x `SCALE` pixels of `levels` (`width`
+/// pixels per row, beginning with the first block).
 ///
-/// It does for part of a picture, and into given memory, what [`in_blocks`] does for a whole one. It is
-/// apart because each frame's view is made with it, and because its sums round in another order.
+/// Like [`in_blocks`], but for part of a picture, and into memory of the caller. The two are separate because this one
+/// makes each frame's view, and because its sums round in another order.
 pub fn fill_block_means<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
     const { assert!(SCALE > 0, "a block has pixels") };
     let mut sums = vec![0.0f32; columns * SCALE];
@@ -50,7 +49,7 @@ pub fn fill_block_means<const SCALE: usize>(levels: &[f32], width: usize, column
     }
 }
 
-/// The picture whose pixels are the means of what `columns` and `lines` cover of `picture`.
+/// The picture whose pixels are the means of the parts of `picture` that `columns` and `lines` cover.
 fn means(picture: &GrayImage, columns: &[Cover], lines: &[Cover]) -> GrayImage {
     let mut data = Vec::with_capacity(columns.len() * lines.len());
     let mut sum = vec![0.0; picture.width];
@@ -76,7 +75,7 @@ struct Cover {
 }
 
 impl Cover {
-    /// Each pixel with its share in the mean.
+    /// Each covered pixel with its share in the mean.
     fn pixels(&self) -> impl Iterator<Item = (usize, f32)> + '_ {
         let length = self.to - self.from;
         self.pixels.clone().map(move |pixel| {
@@ -112,7 +111,7 @@ mod tests {
         let picture = gray(4, 2, &[10.0, 20.0, 200.0, 240.0, 30.0, 40.0, 250.0, 250.0]);
         assert_eq!(reduced(&picture, 2, 1), gray(2, 1, &[25.0, 235.0]));
         assert_eq!(reduced(&picture, 4, 2), picture);
-        // Never larger.
+        // A picture is never enlarged.
         assert_eq!(reduced(&picture, 9, 9), picture);
     }
 

@@ -10,12 +10,11 @@ use super::geometry::ContentArea;
 const DEFECTS: f64 = 0.001;
 /// Largest mean of a dark exposure, as a share of full scale; a hundredth is usual.
 const DARK_MEAN: f64 = 0.1;
-/// Least level of the brightest band of a white target, as a share of full scale: below it noise
-/// rules.
+/// Least level of the brightest band of a white target, as a share of full scale: below it noise dominates.
 const WHITE_LEVEL: f64 = 0.3;
-/// A picture this dark sees nothing at all.
+/// Level of the brightest band, as a share of full scale, below which a picture counts as black.
 const NOTHING: f64 = 0.05;
-/// Least that every band must see of the white target above dark, as a share of full scale.
+/// Least level above dark that every band must have on the white target, as a share of full scale.
 const BAND_LEVEL: f64 = 0.02;
 /// Share of a band's sorted counts at which its level is read: high, so that a shadow over part of
 /// the picture does not lower it.
@@ -25,7 +24,7 @@ const LIT: f64 = 0.9;
 const EVENNESS: f64 = 0.4;
 /// Largest change of the mean between frames: of the light, for white; of full scale, for dark.
 const UNSTEADINESS: f64 = 0.02;
-/// Part of the content area's radius that is judged: its rim is soft.
+/// Part of the content area's radius that is checked: the rim is soft.
 const INSIDE: f64 = 0.9;
 
 /// A running sum of frames, to be averaged.
@@ -51,7 +50,7 @@ impl Average {
     /// Adds a frame.
     ///
     /// # Errors
-    /// When it is of another size than the first.
+    /// If its size differs from that of the first frame.
     pub fn add(&mut self, frame: &MosaicFrame) -> Result<(), BadReference> {
         let found = (frame.width(), frame.height());
         if self.means.is_empty() {
@@ -74,7 +73,7 @@ impl Average {
     /// The mean as a dark reference.
     ///
     /// # Errors
-    /// When the frames are unfit for one; says why and what to do.
+    /// If the frames are unfit for one. The error says why, and what to do.
     pub fn dark(&self) -> Result<MosaicFrame, BadReference> {
         let mean = self.mean()?;
         let full = f64::from(self.full_scale);
@@ -94,10 +93,10 @@ impl Average {
         Ok(mean)
     }
 
-    /// The mean as a white reference beside `dark`. Judges only the content area, where there is one.
+    /// The mean as a white reference that goes with `dark`. Checks only the content area, if there is one.
     ///
     /// # Errors
-    /// When the frames are unfit for one; says why and what to do.
+    /// If the frames are unfit for one. The error says why, and what to do.
     pub fn white(&self, dark: &MosaicFrame) -> Result<MosaicFrame, BadReference> {
         let mean = self.mean()?;
         check_size(self.size, "the dark reference", (dark.width(), dark.height()))?;
@@ -152,7 +151,7 @@ fn check_size(found: (usize, usize), expected: &'static str, size: (usize, usize
     if found == size { Ok(()) } else { Err(BadReference::Size { found, expected, size }) }
 }
 
-/// `bands`, each sorted, must be bright enough.
+/// Checks that all `bands` (each with its counts sorted) are bright enough.
 fn check_levels(bands: &[Vec<f64>; BANDS], full: f64) -> Result<(), BadReference> {
     let levels = bands.each_ref().map(|band| at(band, LIT) / full);
     let brightest = levels.iter().copied().fold(0.0, f64::max);
@@ -175,7 +174,7 @@ fn check_even(bands: &[Vec<f64>; BANDS]) -> Result<(), BadReference> {
     if evenness < EVENNESS { Err(BadReference::Uneven(evenness.max(0.0))) } else { Ok(()) }
 }
 
-/// The value below which `part` of the sorted `values` lie; 0 of none.
+/// The value below which `part` (0..=1) of the sorted `values` lie; 0 if there are no values.
 fn at(values: &[f64], part: f64) -> f64 {
     values.get((part * values.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0)
 }
@@ -184,7 +183,7 @@ fn share(part: usize, of: usize) -> f64 {
     part as f64 / of.max(1) as f64
 }
 
-/// The light of a white target above dark, and the area in which it is judged.
+/// The light of a white target above dark, and the area in which it is checked.
 struct Light<'a> {
     white: &'a MosaicFrame,
     dark: &'a MosaicFrame,
@@ -208,7 +207,7 @@ impl<'a> Light<'a> {
         (CELL * y + band / CELL) * self.white.width() + CELL * x + band % CELL
     }
 
-    /// Mean over the bands, the brightest at 220.
+    /// Mean over the bands, scaled so that the brightest cell is 220.
     fn gray(&self) -> GrayImage {
         let (width, height) = (self.white.band_width(), self.white.band_height());
         let cell = |index: usize| {
@@ -221,7 +220,7 @@ impl<'a> Light<'a> {
         GrayImage { width, height, data: cells.iter().map(|cell| (220.0 * cell / most) as f32).collect() }
     }
 
-    /// Counts above dark of a band where it is judged, sorted.
+    /// Counts above dark of a band in the checked area, sorted.
     fn band(&self, band: usize) -> Vec<f64> {
         let inside = |x: usize, y: usize| {
             self.content.is_none_or(|area| (x as f64 - area.x).hypot(y as f64 - area.y) < INSIDE * area.radius)
@@ -259,7 +258,7 @@ mod tests {
         average(frames).white(&frame(|_, _| 10))
     }
 
-    /// A lit circle on black, of radius 240 samples.
+    /// Whether the sample lies in a lit circle of radius 240 samples.
     fn circle(x: usize, y: usize) -> bool {
         (x as f64 - 256.0).hypot(y as f64 - 136.0) < 240.0
     }

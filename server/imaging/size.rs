@@ -8,12 +8,12 @@ use super::frame::{CELL, MosaicFrame};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
-    /// One pixel a mosaic cell.
+    /// One pixel per mosaic cell.
     #[default]
     Cell,
-    /// Two by two pixels a mosaic cell.
+    /// Two by two pixels per mosaic cell.
     Half,
-    /// One pixel a sample.
+    /// One pixel per sample.
     Full,
 }
 
@@ -31,7 +31,7 @@ impl Size {
         }
     }
 
-    /// Its name, as on the command line.
+    /// The name, as on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl Size {
         }
     }
 
-    /// The next smaller size; the smallest itself.
+    /// The next smaller size; the smallest one stays.
     #[must_use]
     pub const fn smaller(self) -> Self {
         match self {
@@ -50,7 +50,7 @@ impl Size {
         }
     }
 
-    /// The next larger size; the largest itself.
+    /// The next larger size; the largest one stays.
     #[must_use]
     pub const fn larger(self) -> Self {
         match self {

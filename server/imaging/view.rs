@@ -29,14 +29,13 @@ impl Scale {
 
 /// The patch of a frame, and wider ones around it.
 ///
-/// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part
-/// of the view at a coarser scale. It has the patch's centre, or lies as near to it as the picture
-/// allows. Gray levels are not rounded.
+/// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part of the view at a
+/// coarser scale. Its centre is that of the patch, or as near to it as the picture allows. Gray levels are not rounded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// The patch at the picture's own scale: all that the paper's policies see.
     pub patch: Patch,
-    /// The patches at the scales [`WIDER`]; `None` where the picture is smaller than what such a patch covers.
+    /// The patches at the scales [`WIDER`]; `None` if the picture is smaller than the area that such a patch covers.
     pub wider: [Option<Patch>; WIDER.len()],
 }
 
@@ -52,9 +51,9 @@ pub struct Square {
 }
 
 impl Square {
-    /// The square that the patch at `scale` covers. Its centre is that of the 32x32 patch at
-    /// `corner`, moved as little as needed to lie inside a picture of `width` x `height` pixels.
-    /// `None` where the picture is smaller than the square.
+    /// The square that the patch at `scale` covers. Its centre is that of the 32x32 patch at `corner`, moved as little
+    /// as needed to lie inside a picture of `width` x `height` pixels. `None` if the picture is smaller than the
+    /// square.
     #[must_use]
     pub fn around(corner: (usize, usize), scale: Scale, (width, height): (usize, usize)) -> Option<Self> {
         let side = PATCH_SIDE * scale.pixels();
@@ -70,9 +69,9 @@ impl Square {
 }
 
 impl View {
-    /// The view around `patch`, which lies at `corner` of a picture of `size` (width and height).
-    /// `gray` makes the gray levels of a square of the picture, row after row; it is called once, with
-    /// the largest square that is needed, or not at all.
+    /// The view around `patch`, whose upper left corner is `corner` in a picture of `size` (width and height). `gray`
+    /// makes the gray levels of a square of the picture, row after row; it is called once, with the largest square that
+    /// is needed, or not at all.
     pub fn around(
         patch: Patch,
         corner: (usize, usize),
@@ -81,7 +80,7 @@ impl View {
     ) -> Self {
         let squares = WIDER.map(|scale| Square::around(corner, scale, size));
 
-        // A square of a coarser scale holds those of all finer ones.
+        // A square of a coarser scale contains those of all finer ones.
         let Some(largest) = squares.iter().flatten().next_back().copied() else { return Self::from(patch) };
         let levels = gray(largest);
 
@@ -102,8 +101,8 @@ impl From<Patch> for View {
     }
 }
 
-/// The patch at `scale`: its values are the means of blocks of `levels`, which has `width` pixels a row
-/// and begins with the patch's first block.
+/// The patch at `scale`: its values are the means of blocks of `levels`, which has `width` pixels per row and begins
+/// with the patch's first block.
 #[must_use]
 pub fn block_means(levels: &[f32], width: usize, scale: Scale) -> Patch {
     let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
@@ -153,7 +152,7 @@ mod tests {
         assert_eq!(Square::around((3, 200), Scale::Four, (300, 240)), Some(Square { x: 0, y: 112, side: 128 }));
         let seen = view((3, 200), (300, 240));
         assert!((seen.wider[1].unwrap().0[0] - mean(0, 112, 4)).abs() < 1e-3);
-        // That of the middle scale need not move down, but it must move to the right.
+        // The square of the middle scale is moved too: to the right, and up by 8 pixels.
         assert_eq!(Square::around((3, 200), Scale::Two, (300, 240)), Some(Square { x: 0, y: 176, side: 64 }));
         assert!((seen.wider[0].unwrap().0[33] - mean(2, 178, 2)).abs() < 1e-3);
     }

@@ -1,5 +1,4 @@
-//! Pictures as JPEG stores them: luma at every pixel, chroma at every second one of every second
-//! row.
+//! Pictures as JPEG stores them: luma for every pixel, chroma once for two by two pixels.
 
 /// A picture in luma and chroma as JFIF defines it (full range, ITU-R BT.601's weights), with 4:2:0 chroma:
 /// a chroma value covers two by two pixels. Width and height are even.
@@ -7,16 +6,16 @@
 pub struct YccImage {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// All of luma, then all of blue's and all of red's chroma, row after row.
+    /// All luma, then all chroma of blue, then all chroma of red; row after row.
     pub(super) data: Vec<u8>,
 }
 
-/// Luma of red, green and blue.
+/// Weights of red, green and blue in luma.
 pub(super) const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
-/// Chroma is the difference of blue, and of red, from luma, times these.
+/// Factors of chroma: it is the difference of blue, or of red, from luma, times these.
 pub(super) const CHROMA: [f32; 2] = [0.5 / (1.0 - LUMA[2]), 0.5 / (1.0 - LUMA[0])];
 
-/// Parts of the conversion's whole numbers.
+/// Scale of the conversion's whole numbers.
 const PARTS: f32 = 16_384.0;
 
 impl YccImage {

@@ -1,4 +1,4 @@
-//! A lens's measured dynamics, kept in a file.
+//! The measured dynamics of a lens, stored in a file.
 
 use std::time::Duration;
 
@@ -10,9 +10,9 @@ use super::LensDynamics;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredDynamics {
-    /// Driver's name.
+    /// Name of the lens's driver.
     pub driver: String,
-    /// Serial number of the lens; a file of another lens is refused.
+    /// Serial number of the lens. The file is rejected for any other lens.
     pub serial: String,
     /// Date of the measurement, UTC.
     pub date: String,
@@ -20,18 +20,19 @@ pub struct MeasuredDynamics {
     pub delay_ms: f64,
     /// Milliseconds from the first movement to within 5 % of the step.
     pub settling_ms: f64,
-    /// Distance between the focal powers at which the way up and the way down look the same, of 0..=1.
+    /// Hysteresis, 0..=1: distance between the focal powers, on the way up and on the way down, at which the picture
+    /// looks the same.
     pub hysteresis: f64,
 }
 
 impl MeasuredDynamics {
-    /// Longest delay or settling time that is plausible: ten seconds.
+    /// Longest plausible delay or settling time: ten seconds.
     const LONGEST_MS: f64 = 10_000.0;
 
-    /// Reads the file's `text`.
+    /// Parses the file's `text`.
     ///
     /// # Errors
-    /// When the text is not such a file; says in words what is wrong.
+    /// If the text is not such a file. The error says what is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let read: Self = toml::from_str(text).map_err(|error| error.message().to_owned())?;
         let believed = |value: f64| (0.0..=Self::LONGEST_MS).contains(&value);
@@ -41,15 +42,15 @@ impl MeasuredDynamics {
         Ok(read)
     }
 
-    /// The file's text.
+    /// The text of the file, as TOML.
     ///
     /// # Errors
-    /// When it cannot be written as TOML.
+    /// If it cannot be written as TOML.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }
 
-    /// The dynamics in the control loop's form.
+    /// The dynamics as the control loop uses them.
     #[must_use]
     pub fn dynamics(&self) -> LensDynamics {
         let millis = |value: f64| Duration::from_secs_f64(value.clamp(0.0, Self::LONGEST_MS) / 1000.0);

@@ -1,10 +1,8 @@
-//! The Optotune driver on an emulated unit in the same process: everything of a bench's lens except the
-//! glass.
+//! The Optotune driver on an emulated unit in the same process: everything of a bench's lens except the glass.
 //!
 //! The simulated camera looks through the emulated glass itself. With a unit in another process
-//! (`parfocal lens emulate`) it must look through the driver's model of the glass instead. So a
-//! measurement sees what a real one would: the way through thread, wire and firmware, and dynamics
-//! that the driver does not know.
+//! (`parfocal lens emulate`) it would have to use the driver's model of the glass instead. So a measurement includes
+//! what a real one would: the path through thread, wire and firmware, and dynamics that the driver does not know.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,15 +13,15 @@ use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Opt
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// Driver and unit. The driver is dropped first, and leaves the unit at rest.
+/// The driver and its emulated unit. The driver is dropped first, and leaves the unit at rest.
 pub struct EmulatedLens {
     lens: OptotuneLens,
     emulator: Emulator,
 }
 
 impl EmulatedLens {
-    /// The lens of a specification's `options`: `latency`, `delay` and `settling`, milliseconds,
-    /// `hysteresis` in dioptres, `temperature` in °C, and `fault`, which sets in once it is connected.
+    /// Opens the lens with a specification's `options`: `latency`, `delay` and `settling` in milliseconds, `hysteresis`
+    /// in dioptres, `temperature` in °C, and `fault`, which begins once the lens is connected.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let usual = Model::default();
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
@@ -51,7 +49,7 @@ impl EmulatedLens {
     }
 }
 
-/// Half-width, as a share of the range, of a hysteresis in dioptres.
+/// Converts a hysteresis in dioptres to its half-width as a share of the range.
 fn play(dioptres: f64) -> Result<f64, LensError> {
     Model::play_of(dioptres).ok_or_else(|| {
         let range = LENS_DIOPTRES.1 - LENS_DIOPTRES.0;
@@ -80,7 +78,7 @@ impl Lens for EmulatedLens {
         self.lens.dynamics()
     }
 
-    /// The emulated glass. The driver uses the whole of its range, so both scales are the same.
+    /// The emulated glass. The driver uses its whole range, so both have the same scale.
     fn optics(&self) -> Arc<dyn Optics> {
         self.emulator.glass()
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Normalised focal power, 0..=1 over the lens's usable range. Dioptres exist only inside lens drivers.
+/// Normalised focal power: 0..=1 over the lens's usable range. Only lens drivers use dioptres.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct FocalPower(f64);
@@ -23,12 +23,12 @@ impl FocalPower {
     /// `value` as a focal power.
     ///
     /// # Errors
-    /// When `value` is outside 0..=1 or NaN.
+    /// If `value` is outside 0..=1 or NaN.
     pub fn new(value: f64) -> Result<Self, OutOfRange> {
         if (0.0..=1.0).contains(&value) { Ok(Self(value)) } else { Err(OutOfRange(value)) }
     }
 
-    /// The focal power nearest to `value`; the middle where `value` is NaN.
+    /// The focal power nearest to `value`; the middle if `value` is NaN.
     #[must_use]
     pub const fn nearest(value: f64) -> Self {
         if value.is_nan() { Self::MIDDLE } else { Self(value.clamp(0.0, 1.0)) }

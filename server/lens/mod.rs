@@ -1,4 +1,4 @@
-//! Lenses: focal power, and the devices that set it. This room knows nothing of images.
+//! Lenses: focal power, and the devices that set it. This room does not use images.
 
 mod dynamics;
 mod emulated;
@@ -26,18 +26,18 @@ use crate::options::BadOptions;
 
 /// A focus-tunable lens.
 ///
-/// An implementation guarantees that [`Lens::set`], [`Lens::measured`] and [`Lens::health`] return
-/// within a millisecond whatever the device does: a driver that talks to a port does so on a thread
-/// of its own. A lens that failed keeps trying to recover by itself; the caller just keeps setting.
+/// An implementation guarantees that [`Lens::set`], [`Lens::measured`] and [`Lens::health`] return within a
+/// millisecond, whatever the device does. So a driver that talks to a port does so on its own thread. A lens that
+/// failed keeps trying to recover by itself; the caller just keeps calling [`Lens::set`].
 pub trait Lens: Send {
-    /// Asks the lens to go to `target`; returns without waiting for it to get there.
+    /// Asks the lens to go to `target`. Does not wait until it gets there.
     ///
     /// # Errors
-    /// When the lens is gone, did not follow the commands before, or takes them too slowly. It stays
-    /// where it was until it recovers; then it may go to the latest target.
+    /// If the lens is gone, did not follow earlier commands, or accepts them too slowly. It stays where it was until it
+    /// recovers. Then it may go to the latest target.
     fn set(&mut self, target: FocalPower) -> Result<(), LensError>;
 
-    /// The focal power last known to be real (read back, or modelled from the commands), if known.
+    /// The present focal power, read back or modelled from the commands; `None` if unknown.
     fn measured(&self) -> Option<FocalPower>;
 
     /// The lens's state, in words for the operator.
@@ -46,51 +46,50 @@ pub trait Lens: Send {
     /// Describes the device. May talk to it, and block for up to a second.
     ///
     /// # Errors
-    /// When the device does not answer.
+    /// If the device does not answer.
     fn info(&mut self) -> Result<LensInfo, LensError>;
 
-    /// Dead time and settling time, for attributing a frame to the focal power that it was exposed at.
+    /// Dead time and settling time, from which the focal power of a frame's exposure is computed.
     fn dynamics(&self) -> LensDynamics;
 
-    /// The glass that a simulated camera looks through: its true focal power over time. Real lenses,
-    /// whose glass cannot be known, return a model fed with the commands.
+    /// The optics for a simulated camera: the true focal power over time. The true focal power of a real lens is
+    /// unknown, so a real lens returns a model that follows the commands.
     fn optics(&self) -> Arc<dyn Optics>;
 
-    /// The focal power as the device itself reports it now. May talk to the device, and block for up to
-    /// a second.
+    /// The focal power that the device reports now. May talk to the device, and block for up to a second.
     ///
     /// # Errors
-    /// When the device does not answer.
+    /// If the device does not answer.
     fn read_back(&mut self) -> Result<FocalPower, LensError> {
         self.measured().ok_or_else(|| LensError::Gone(self.health().message.to_string()))
     }
 
-    /// The switch for its faults, if the lens is a simulated one.
+    /// The switch for simulated faults; `None` if the lens is not a simulated one.
     fn faults(&self) -> Option<SimulatedFaults> {
         None
     }
 }
 
-/// The glass itself, as the light sees it. Cheap, thread-safe, never blocks.
+/// The true focal power of a lens over time. Cheap, thread-safe, never blocks.
 pub trait Optics: Send + Sync {
     /// True focal power at `moment`.
     fn focal_power_at(&self, moment: Moment) -> FocalPower;
 }
 
-/// A lens's state, in words.
+/// A lens's state, for people.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LensHealth {
     /// Name for people, for example `simulated lens`.
     pub name: Arc<str>,
-    /// Whether no real glass moves; every page says so.
+    /// Whether there is no real lens. Every page then says so.
     pub simulated: bool,
-    /// Whether commands are being taken.
+    /// Whether the lens accepts commands.
     pub working: bool,
-    /// Whether the lens works, but not properly: the message says why, and the operator must be warned.
+    /// Whether the lens works, but not properly. The message says why, and the operator must be warned.
     pub caution: bool,
     /// One sentence: the state and, if it is bad, what to do.
     pub message: Arc<str>,
-    /// Errors on its line since it was opened: replies that were damaged, late or missing, and noise.
+    /// Errors on the serial line since the lens was opened: damaged, late or missing replies, and noise.
     pub line_errors: u64,
 }
 
@@ -103,26 +102,26 @@ pub struct LensInfo {
     pub firmware: String,
     /// Serial number.
     pub serial: String,
-    /// Least dioptres; focal power 0.
+    /// Dioptres at focal power 0.
     pub min_dioptre: f64,
-    /// Most dioptres; focal power 1.
+    /// Dioptres at focal power 1.
     pub max_dioptre: f64,
-    /// Temperature of the lens.
+    /// Temperature of the lens, if it has a sensor.
     pub temperature_celsius: Option<f64>,
     /// Control mode, for example `focal power`.
     pub mode: String,
     /// Status conditions in words; empty when all is well.
     pub status: Vec<String>,
-    /// Errors on its line since it was opened: replies that were damaged, late or missing, and noise.
+    /// Errors on the serial line since the lens was opened: damaged, late or missing replies, and noise.
     pub line_errors: u64,
 }
 
 /// How a lens responds to a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LensDynamics {
-    /// From command to first movement.
+    /// Time from the command to the first movement.
     pub delay: Duration,
-    /// From first movement to within 5 % of the step.
+    /// Time from the first movement until 5 % of the step remain.
     pub settling: Duration,
 }
 
@@ -135,16 +134,16 @@ impl From<BadOptions> for LensError {
 /// Why a lens did not follow a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LensError {
-    /// No device, or it went away.
+    /// There is no device, or it no longer answers.
     #[error("the lens does not answer: {0}")]
     Gone(String),
-    /// The device is there, but commands wait to be carried out.
+    /// The device is there, but does not carry out commands in time.
     #[error("the lens does not accept commands: {0}")]
     Stalled(String),
-    /// The device refused.
+    /// The device refused the command, or cannot be used.
     #[error("the lens refused: {0}")]
     Refused(String),
-    /// The specification given on the command line makes no sense.
+    /// The specification on the command line is invalid.
     #[error("{0}")]
     BadSpec(String),
 }

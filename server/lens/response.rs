@@ -1,4 +1,4 @@
-//! How the glass answers commands over time: dead time, play, first-order settling.
+//! How a lens responds to commands over time: dead time, play, first-order settling.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,26 +6,25 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::{FocalPower, LensDynamics, Optics};
 use crate::clock::Moment;
 
-/// Moves remembered: five seconds of commands at 50 a second, so that a camera may look back at a long
+/// Number of moves remembered: five seconds of commands at 50 per second, so that a camera can look back over a long
 /// exposure.
 const REMEMBERED: usize = 256;
 
-/// The glass of a lens as a function of time, fed with commands.
+/// The focal power of a lens as a function of time and of its commands.
 ///
-/// A command takes effect after the dead time. Then play of half-width `play` (in focal power) swallows
-/// the first `2 * play` of every reversal, which is the simplest loop with the two branches that a
-/// tunable lens shows. The glass approaches the rest as `1 - exp(-t / tau)` with `tau = settling /
-/// ln 20`, so that 5 % of a step remain after the settling time. The approach never overshoots: focal
-/// power stays within 0..=1.
+/// A command takes effect after the dead time. Then play of half-width `play` (in focal power) absorbs the first
+/// `2 * play` of every reversal. This is the simplest hysteresis loop with the two branches that a tunable lens shows.
+/// The lens approaches its destination as `1 - exp(-t / tau)` with `tau = settling / ln 20`, so that 5 % of a step
+/// remain after the settling time. It never overshoots: focal power stays within 0..=1.
 #[derive(Debug)]
 pub struct Response {
     dynamics: LensDynamics,
     play: f64,
-    /// Never empty; in order of `starts`. Locked for a few instructions only.
+    /// Never empty; in order of `starts`. Locked only for a few instructions.
     moves: Mutex<VecDeque<Move>>,
 }
 
-/// One command's effect: from `starts` on, the glass goes from `from` towards `to`.
+/// The effect of one command: from `starts` on, focal power goes from `from` towards `to`.
 #[derive(Debug, Clone, Copy)]
 struct Move {
     starts: Moment,
@@ -34,14 +33,14 @@ struct Move {
 }
 
 impl Response {
-    /// Glass at rest at `start`. `play` is the half-width of the hysteresis, 0 for none.
+    /// A lens at rest at `start`. `play` is the half-width of the hysteresis, 0 for none.
     #[must_use]
     pub fn new(dynamics: LensDynamics, play: f64, start: FocalPower) -> Self {
         let rest = Move { starts: Moment::from_nanos(0), from: start.get(), to: start.get() };
         Self { dynamics, play, moves: Mutex::new(VecDeque::from([rest])) }
     }
 
-    /// Sends the glass to `target` by a command given at `now`.
+    /// Gives the command to go to `target` at `now`.
     pub fn command(&self, now: Moment, target: FocalPower) {
         let mut moves = self.moves();
         let Some(&last) = moves.back() else { return };

@@ -1,5 +1,4 @@
-//! The simulated lens: behaves like a tunable lens, deterministically by the clock, and fails on
-//! request.
+//! The simulated lens: behaves like a tunable lens, deterministic for a given clock, and fails on request.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -13,8 +12,8 @@ use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Opt
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019); a command
-/// takes 2 ms over USB and through the driver.
+/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019). A command takes 2 ms through
+/// USB and driver.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
 /// Half-width of the hysteresis, as a share of the range: 0.02 of 5 dioptres.
@@ -27,9 +26,9 @@ const DIOPTRES: (f64, f64) = (5.0, 10.0);
 pub struct SimulatedLens {
     clock: Arc<dyn Clock>,
     dynamics: LensDynamics,
-    /// The glass as the light sees it.
+    /// The true focal power, with hysteresis.
     glass: Arc<Response>,
-    /// The glass as a driver can know it: a driver cannot sense hysteresis, so this model has none.
+    /// The focal power as a driver can know it. A driver cannot sense hysteresis, so this model has none.
     known: Response,
     faults: SimulatedFaults,
     name: Arc<str>,
@@ -42,9 +41,9 @@ pub enum SimulatedFault {
     /// No fault.
     #[default]
     None,
-    /// Commands are accepted, but get lost on the way.
+    /// Commands are accepted, but get lost.
     Drops,
-    /// Commands pile up before the driver: it accepts none.
+    /// Commands pile up: the driver accepts none.
     Stalls,
     /// The driver answers every command with an error.
     Refuses,
@@ -53,10 +52,10 @@ pub enum SimulatedFault {
 }
 
 impl SimulatedFault {
-    /// Every state, as stored in [`SimulatedFaults`].
+    /// All faults, in the order of their numbers in [`SimulatedFaults`].
     const ALL: [Self; 5] = [Self::None, Self::Drops, Self::Stalls, Self::Refuses, Self::Gone];
 
-    /// Name, as in the specification and in JSON.
+    /// Name in the specification and in JSON.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -85,7 +84,7 @@ impl FromStr for SimulatedFault {
 pub struct SimulatedFaults(Arc<AtomicU8>);
 
 impl SimulatedFaults {
-    /// Switches to `fault`, from the next call of the lens on.
+    /// Switches to `fault`, which applies from the next call of the lens on.
     pub fn set(&self, fault: SimulatedFault) {
         self.0.store(fault as u8, Ordering::Relaxed);
     }
@@ -104,7 +103,7 @@ impl SimulatedLens {
         Self::moving(DYNAMICS, clock)
     }
 
-    /// The same with dynamics of its own.
+    /// The same with other `dynamics`.
     #[must_use]
     pub fn moving(dynamics: LensDynamics, clock: Arc<dyn Clock>) -> Self {
         Self {
@@ -117,8 +116,8 @@ impl SimulatedLens {
         }
     }
 
-    /// The lens of a specification's `options`: `fault`, the fault it starts with; `delay` and
-    /// `settling`, milliseconds.
+    /// Opens the lens with a specification's `options`: `fault`, the initial fault; `delay` and `settling` in
+    /// milliseconds.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let fault = options.take::<SimulatedFault>("fault")?;
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));

@@ -10,23 +10,25 @@ use super::{Lens, LensError};
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// Opens the lens that `spec` names: `simulated` (options `fault`, see [`super::SimulatedFault`],
-/// `delay` and `settling`, milliseconds), `emulated` (options `latency`, `delay`, `settling`,
-/// `hysteresis`, `temperature`, `fault`: see [`super::emulator::Model`]), `optotune:auto` or
-/// `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low` and `high`, the temperature
-/// limits in °C).
+/// Opens the lens that `spec` names:
+///
+/// - `simulated`, with the options `fault` (see [`super::SimulatedFault`]), `delay` and `settling` (milliseconds);
+/// - `emulated`, with the options `latency`, `delay`, `settling`, `hysteresis`, `temperature` and `fault` (see
+///   [`super::emulator::Model`]);
+/// - `optotune:auto` or `optotune:/dev/...`, with the options `min` and `max`, the dioptres to use, and `low` and
+///   `high`, the temperature limits in °C.
 ///
 /// # Errors
-/// When the specification is invalid, or its device cannot be used; says what to do.
+/// If the specification is invalid, or its device cannot be used. The error says what to do.
 pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
     opened(spec, false, clock)
 }
 
-/// The same for moving a lens by hand: the lens keeps its state when it is opened, and its focal power
-/// when it is dropped.
+/// Like [`open`], for moving a lens by hand: the lens keeps its state when it is opened, and its focal power when it is
+/// dropped.
 ///
 /// # Errors
-/// As of [`open`].
+/// If [`open`] would fail.
 pub fn open_to_stay(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
     opened(spec, true, clock)
 }

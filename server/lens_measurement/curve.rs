@@ -45,7 +45,7 @@ impl Flank {
         (power(self.points.first()), power(self.points.last()))
     }
 
-    /// The focal power at which a patch of `sharpness` was seen; extrapolated straight beyond the ends.
+    /// The focal power at which a patch of `sharpness` was seen; extrapolated linearly beyond the ends.
     pub fn focal_power(&self, sharpness: f64) -> f64 {
         let rising = self.points.last() > self.points.first() && self.points[1].1 > self.points[0].1;
         let beyond = |of: f64| if rising { of >= sharpness } else { of <= sharpness };

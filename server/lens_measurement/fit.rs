@@ -13,13 +13,13 @@ pub struct Sample {
     pub share: f64,
 }
 
-/// Points a side of each round's grid.
+/// Cells along each axis of each round's grid.
 const GRID: u32 = 40;
-/// Rounds; each searches four cells either way of the best point of the one before.
+/// Number of rounds. Each searches four cells on either side of the best point of the previous one.
 const ROUNDS: u32 = 4;
 
-/// The step response that explains samples best: nothing for `delay`, and then `1 - exp(-t / tau)` with
-/// `tau = settling / ln 20`, as in [`crate::lens::Response`].
+/// The step response that explains samples best: 0 for `delay`, then `1 - exp(-t / tau)` with `tau = settling / ln 20`,
+/// as in [`crate::lens::Response`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Seconds from the command to the first movement.
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_known_response_is_found_again() {
-        // 1 - 20^(-(t - 7 ms) / 25 ms), seen every 3 ms, now and then 2 % off.
+        // 1 - 20^(-(t - 7 ms) / 25 ms), seen every 3 ms, alternately 2 % too high and too low.
         let seen = |step: u32| {
             let at = 0.003 * f64::from(step);
             let share = if at < 0.007 { 0.0 } else { 1.0 - 20_f64.powf(-(at - 0.007) / 0.025) };

@@ -8,10 +8,9 @@ use super::{MeasurementError, View};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Lens};
 
-/// Scatter above which the steps are useless.
+/// Scatter (share of the step) above which the steps are useless.
 const SCATTER: f64 = 0.2;
-/// Part of the time watched by whose end the lens must have settled; the rest shows where it came to
-/// rest.
+/// Share of the watched time within which the lens must settle. The rest shows where it came to rest.
 const SETTLED_BY: f64 = 0.66;
 /// Frames whose mean is the sharpness at rest.
 const FRAMES_AT_REST: usize = 3;
@@ -50,12 +49,11 @@ pub struct Measurement {
     pub samples: [Vec<Sample>; 2],
 }
 
-/// Measures `lens` with `view`. `pause` waits. Commands fall at a different time between frames at every
-/// repeat, so that the frames of all steps together show the response more finely than the camera's
-/// rate.
+/// Measures `lens` with `view`. `pause` waits for the given time. Each repeat sends its command at a different time
+/// between two frames. So the frames of all steps together show the response more finely than the camera's rate allows.
 ///
 /// # Errors
-/// When lens or camera fail, or the picture does not show enough; says what to do.
+/// If lens or camera fail, or the picture does not show enough. The error says what to do.
 pub fn measure(
     lens: &mut dyn Lens,
     view: &mut View,
@@ -103,7 +101,7 @@ impl Stand<'_> {
         let last = powers.last().copied().unwrap_or(1.0);
         let powers: Vec<f64> = powers.into_iter().map(|stop| stop / last).collect();
 
-        // From below, so that hysteresis acts the same way on all of the way up.
+        // Starts from below, so that hysteresis acts the same way during the whole way up.
         self.at_rest(0.0)?;
         let up = powers.iter().map(|&power| self.at_rest(power)).collect::<Result<Vec<_>, _>>()?;
         let down = powers.iter().rev().map(|&power| self.at_rest(power)).collect::<Result<Vec<_>, _>>()?;
@@ -130,7 +128,7 @@ impl Stand<'_> {
     ) -> Result<(), MeasurementError> {
         let start = flank.focal_power(self.at_rest(from)?);
 
-        // The command falls a chosen part of a frame's time behind a frame.
+        // Sends the command `phase` of a frame's time after a frame.
         let (earlier, _) = self.view.next()?;
         let (later, _) = self.view.next()?;
         pause(later.since(earlier).mul_f64(phase));

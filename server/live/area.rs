@@ -1,18 +1,17 @@
-//! Decides when a content area found in a picture is worth reporting to the loop. The patch should not
-//! tremble with the detection, nor jump because in one picture the circle was missed or misplaced.
+//! Decides when a content area found in a picture is worth reporting to the loop. The patch should neither tremble
+//! with the detection, nor jump because the circle was missed or misplaced in one picture.
 
 use crate::imaging::ContentArea;
 
-/// Pixels that centre or radius must have moved by. The detection's own error is about 6 px at
+/// Pixels by which centre or radius must have moved. The detection's own error is about 6 px at
 /// 1080x1920, so about a quarter of that at the size of one band.
 const MOVED: f64 = 2.0;
 
-/// Pixels beyond which a circle counts only once the next one agrees: up to one detection in ten may be
-/// wrong by more than 15 px at 1080x1920 (the method's authors allow for it), about 4 at the size of one
-/// band.
+/// A circle that differs by more than this many pixels counts only once the next one agrees: up to one detection in ten
+/// may be wrong by more than 15 px at 1080x1920 (the method's authors allow for it), about 4 at the size of one band.
 const JUMP: f64 = 4.0;
 
-/// Detections in a row without a circle after which there is none.
+/// After this many detections in a row without a circle, there is no content area.
 const MISSES: u32 = 10;
 
 /// The area last reported to the loop, and what has been seen since.

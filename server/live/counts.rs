@@ -9,23 +9,24 @@ use prometheus_client::metrics::histogram::Histogram;
 use crate::control::StepRecord;
 use crate::imaging::Size;
 
-/// Upper ends of the latency histogram's buckets, seconds. They lie around the limits, 1 ms for the median
-/// and 3 ms for 99 in 100.
+/// Upper ends of the latency histogram's buckets, seconds. They lie around the limits: 1 ms for the median and 3 ms for
+/// the 99th percentile.
 const LATENCY_BUCKETS: [f64; 10] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2, 5e-2];
 
 /// Upper ends of the buckets for a policy's step, seconds: a hill-climber takes some microseconds, a network more.
 const STEP_BUCKETS: [f64; 10] = [1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 2e-2];
 
-/// Upper ends of the buckets for making a picture, seconds: from a cell picture's millisecond to several frames' time.
+/// Upper ends of the buckets for making a picture, seconds: from a cell picture's millisecond to several frame
+/// intervals.
 const MAKING_BUCKETS: [f64; 10] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.1, 0.2];
 
-/// Times of making pictures, by the name of their size.
+/// Histograms of the time to make a picture, labelled with the name of its size.
 pub type MakingTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 
 /// Counts of the imaging threads' work so far.
 ///
-/// Times are kept of frames outside settings of a session alone. They tell a network from a hill-climber, directly or
-/// by how busy it keeps the machine, and whoever compares them before and after a setting could tell which it was.
+/// Times are kept only for frames outside a session's settings. They differ between a network and a hill-climber,
+/// directly or through the load on the machine. So a comparison of them before and after a setting could unblind it.
 #[derive(Debug)]
 pub struct Counts {
     sizes: [SizeCounts; Size::ALL.len()],
@@ -80,7 +81,7 @@ impl Counts {
         self.of(size).jpeg_bytes.load(Ordering::Relaxed)
     }
 
-    /// Keeps the times of the loop's `step`, outside settings.
+    /// Records the times of the loop's `step`, unless it belongs to a setting.
     pub(super) fn note_step(&self, step: &StepRecord) {
         if step.segment.is_some() {
             return;
@@ -92,7 +93,7 @@ impl Counts {
         }
     }
 
-    /// Keeps the time that the picture of `step`'s frame `took` at `size`, outside settings.
+    /// Records the time that the picture of `step`'s frame `took` at `size`, unless it belongs to a setting.
     pub(super) fn note_picture(&self, size: Size, step: &StepRecord, took: Duration) {
         if step.segment.is_none() {
             self.of(size).making.observe(took.as_secs_f64());

@@ -1,4 +1,4 @@
-//! Following the viewers who lead: a recording of the view keeps the pictures at the size that they get.
+//! Following the leading viewers: a recording of the view keeps the pictures at the size that they get.
 
 use std::sync::Arc;
 
@@ -8,7 +8,8 @@ use super::lead::{Leaders, leading};
 use super::{EncodedFrame, LiveHandle, Watcher};
 
 impl LiveHandle {
-    /// Sees every frame once, at the size that the leading viewers get; at the smallest while none leads.
+    /// A source of frames, each at most once, at the size that the leading viewers get, or at the smallest if none
+    /// leads.
     #[must_use]
     pub fn follow(&self) -> Follower {
         let leaders = self.leaders.subscribe();
@@ -17,15 +18,15 @@ impl LiveHandle {
     }
 }
 
-/// Sees every frame once, at the size that the leading viewers get.
+/// Gets frames, each at most once, at the size that the leading viewers get.
 #[derive(Debug)]
 pub struct Follower {
     live: LiveHandle,
     leaders: watch::Receiver<Leaders>,
     watcher: Watcher,
-    /// A larger size, until its first frame is there.
+    /// The viewers of a larger size, until its first frame arrives.
     coming: Option<Watcher>,
-    /// Number of the last frame seen.
+    /// Number of the last frame returned.
     last: u64,
 }
 
@@ -48,7 +49,7 @@ impl Follower {
                 Ok(()) = self.leaders.changed() => continue,
             };
 
-            // A larger picture takes longer: its first may be of a frame that was seen before.
+            // A larger picture takes longer, so the first one may be of a frame that was already returned.
             if frame.picture.number > self.last {
                 self.last = frame.picture.number;
                 return Some(frame);
@@ -56,8 +57,8 @@ impl Follower {
         }
     }
 
-    /// Joins the viewers of the size that leads now. Until the first frame of a larger one is there, those of the size
-    /// before go on, as they do for the viewers themselves.
+    /// Joins the viewers of the size that leads now. Frames of the previous size continue until the first frame of a
+    /// larger one arrives, as they do for the viewers themselves.
     fn join(&mut self) {
         let size = leading(&self.leaders.borrow_and_update()).min(self.live.largest());
         if self.coming.as_ref().unwrap_or(&self.watcher).size() == size {
@@ -71,7 +72,7 @@ impl Follower {
     }
 }
 
-/// The next frame of a size that is coming, if one is.
+/// The next frame of the size `coming`; waits forever if there is none.
 async fn next_of(coming: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
     match coming {
         Some(coming) => coming.next().await,

@@ -1,4 +1,4 @@
-//! The thread that makes the pictures of one larger size, while someone looks at them. It takes the latest
+//! The thread that makes the pictures of one larger size, while it has viewers. It takes the latest
 //! frame whenever it is done with one, so neither the smallest size nor the loop waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,12 +15,12 @@ use crate::imaging::{Developer, Size};
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Exposures of two pictures at [`Size::Full`] lie at least so far apart: 25 a second. At a camera's own rate
-/// they would keep most of a core busy, and how many of them come about would depend on what else the machine
-/// does, such as asking a policy.
+/// Least time between the exposures of two pictures at [`Size::Full`], for 25 a second. At a camera's own rate they
+/// would keep most of a core busy. Their number would then depend on what else the machine does, such as running a
+/// policy.
 const FULL_INTERVAL: Duration = Duration::from_millis(38);
 
-/// A larger size's thread; ends when dropped.
+/// The thread of one larger size; ends when dropped.
 pub(super) struct Larger {
     slot: Arc<LatestSlot<ControlledFrame>>,
     outlet: Outlet,
@@ -28,10 +28,10 @@ pub(super) struct Larger {
 }
 
 impl Larger {
-    /// Starts the thread for `size`, whose pictures leave by `outlet`.
+    /// Starts the thread for `size`, which publishes its pictures through `outlet`.
     ///
     /// # Errors
-    /// When the system cannot make a thread or an encoder.
+    /// If the system cannot create a thread or an encoder.
     pub(super) fn start(
         developer: Developer,
         size: Size,
@@ -47,7 +47,7 @@ impl Larger {
         Ok(Self { slot, outlet, thread: Some(thread) })
     }
 
-    /// Hands `frame` over if someone looks; never waits.
+    /// Hands `frame` over if this size has viewers; never waits.
     pub(super) fn offer(&self, frame: &ControlledFrame) {
         if self.outlet.is_watched() {
             self.slot.put(frame.clone());
@@ -67,7 +67,7 @@ struct Worker {
     outlet: Outlet,
     clock: Arc<dyn Clock>,
     studio: Studio,
-    /// Exposure of the last frame made.
+    /// When the last frame that became a picture was exposed.
     last: Option<Moment>,
 }
 
@@ -83,7 +83,7 @@ impl Worker {
 
             // One bad picture must not end the live view.
             if catch_unwind(AssertUnwindSafe(|| self.make(frame))).is_err() {
-                tracing::error!("a larger picture could not be made; going on with the next");
+                tracing::error!("a larger picture could not be made; continuing with the next");
             }
         }
     }

@@ -1,13 +1,13 @@
-//! Viewers who lead: those whose pictures a recording of the view keeps.
+//! Leading viewers: a recording of the view keeps pictures of the size that they get.
 
 use tokio::sync::watch;
 
 use crate::imaging::Size;
 
-/// How many viewers lead, by the size of their pictures.
+/// Number of leading viewers, by the size of their pictures.
 pub(super) type Leaders = [u32; Size::ALL.len()];
 
-/// A viewer's lead; ends when dropped.
+/// Counts one viewer as leading, until dropped.
 #[derive(Debug)]
 pub(super) struct Lead {
     size: Size,
@@ -28,7 +28,7 @@ impl Drop for Lead {
     }
 }
 
-/// The largest size that any leading viewer gets; the smallest while none leads, because every frame is made at it.
+/// The largest size that any leading viewer gets; the smallest if none leads.
 pub(super) fn leading(leaders: &Leaders) -> Size {
     let largest = Size::ALL.into_iter().rev().find(|size| leaders[*size as usize] > 0);
     largest.unwrap_or(Size::Cell)

@@ -1,5 +1,5 @@
-//! Live: the imaging threads. They prepare each frame once for all viewers of a size; a slow viewer misses
-//! frames and holds up nobody.
+//! Live: the imaging threads. They prepare each frame once for all viewers of a size. A slow viewer misses frames but
+//! delays nobody.
 
 mod area;
 mod counts;
@@ -31,20 +31,20 @@ type Latest = watch::Receiver<Option<Arc<EncodedFrame>>>;
 /// The viewers' source of frames. Clone freely.
 #[derive(Debug, Clone)]
 pub struct LiveHandle {
-    /// By [`Size`], up to the largest that the camera's pictures have.
+    /// Indexed by [`Size`], up to the largest size of the camera's pictures.
     frames: Arc<[Latest]>,
     counts: Arc<Counts>,
     leaders: watch::Sender<Leaders>,
 }
 
 impl LiveHandle {
-    /// Joins the viewers of `size`, or of the largest size there is. A size without viewers is not made.
+    /// Joins the viewers of `size`, or of the largest size if that is smaller. A size without viewers is not made.
     #[must_use]
     pub fn watch(&self, size: Size) -> Watcher {
         self.join(size, false)
     }
 
-    /// Joins the viewers of `size` as one who leads: whoever follows gets pictures of this size too.
+    /// Joins the viewers of `size` as a leading one: a [`Follower`] gets the largest size that any leading viewer has.
     #[must_use]
     pub fn lead(&self, size: Size) -> Watcher {
         self.join(size, true)
@@ -75,13 +75,13 @@ impl LiveHandle {
     }
 }
 
-/// One viewer's place; leaves when dropped.
+/// One viewer among those of a size; leaves when dropped.
 #[derive(Debug)]
 pub struct Watcher {
     size: Size,
     frames: Latest,
     counts: Arc<Counts>,
-    /// Set where others follow.
+    /// Set for a leading viewer.
     _lead: Option<Lead>,
 }
 

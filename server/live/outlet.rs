@@ -1,4 +1,4 @@
-//! Where the pictures of one size leave for their viewers.
+//! Publishes the pictures of one size to their viewers.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -19,17 +19,17 @@ pub(super) struct Outlet {
 }
 
 impl Outlet {
-    /// The outlet of `size`, which counts in `counts`.
+    /// The outlet for `size`, which counts its pictures in `counts`.
     pub(super) const fn new(size: Size, sender: watch::Sender<Option<Arc<EncodedFrame>>>, counts: Arc<Counts>) -> Self {
         Self { size, sender, counts }
     }
 
-    /// Whether someone looks at this size.
+    /// Whether this size has viewers.
     pub(super) fn is_watched(&self) -> bool {
         self.counts.of(self.size).viewers.load(Ordering::Relaxed) > 0
     }
 
-    /// Keeps the time that the picture of `step`'s frame `took`.
+    /// Records the time that the picture of `step`'s frame `took`.
     pub(super) fn note_time(&self, step: &StepRecord, took: Duration) {
         self.counts.note_picture(self.size, step, took);
     }

@@ -1,5 +1,5 @@
-//! A frame as it leaves the imaging thread: the picture, which anyone may see, apart from the data that
-//! only the operator may see.
+//! A frame as it leaves the imaging thread: the picture, which anyone may see, separate from the data that only the
+//! operator and the researcher may see.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::lens::FocalPower;
 /// A picture and its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Frame's number.
+    /// Number of the frame.
     pub number: u64,
     /// End of the exposure.
     pub exposed_at: Moment,
@@ -21,8 +21,7 @@ pub struct Picture {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Pixels along each side of a mosaic cell; 1 for a colour picture, of which each pixel counts as a
-    /// cell.
+    /// Pixels along each side of a mosaic cell; 1 for a colour picture, whose pixels count as cells.
     pub per_cell: usize,
     /// The colour picture as JPEG.
     pub jpeg: Bytes,
@@ -34,12 +33,12 @@ pub struct Picture {
     pub content_area: Option<ContentArea>,
 }
 
-/// The loop's work on the frame. Never for surgeons.
+/// What the loop did with the frame. Never shown to surgeons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Insight {
-    /// Focal power asked for after this frame.
+    /// Focal power that the lens was asked for after this frame.
     pub asked: FocalPower,
-    /// Focal power that the frame was exposed at, as far as the lens knows.
+    /// Focal power at which the frame was exposed; `None` if the lens does not know it.
     pub measured: Option<FocalPower>,
     /// The policy's focus metric.
     pub metric: Option<f64>,

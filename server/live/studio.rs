@@ -1,4 +1,4 @@
-//! Makes frames' pictures at one size, reusing its memory for each.
+//! Makes pictures of frames at one size, reusing the same memory.
 
 use super::{EncodedFrame, Insight, Picture};
 use crate::camera::FrameImage;
@@ -18,7 +18,7 @@ impl Studio {
     /// A studio for pictures of `size`.
     ///
     /// # Errors
-    /// When there is no memory for an encoder.
+    /// If there is no memory for an encoder.
     pub(super) fn new(developer: Developer, size: Size) -> Result<Self, JpegError> {
         let encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY)?;
         Ok(Self { size, developer, encoder, picture: Developed::default(), gray: GrayImage::default() })
@@ -29,17 +29,17 @@ impl Studio {
         self.size
     }
 
-    /// Makes colour and gray from a mosaic; leaves a colour picture as it is.
+    /// Develops a mosaic into a colour and a gray picture; does nothing with a colour picture.
     pub(super) fn develop(&mut self, image: &FrameImage) {
         if let FrameImage::Mosaic(mosaic) = image {
             self.developer.develop_for_jpeg(mosaic, self.size, &mut self.picture, &mut self.gray);
         }
     }
 
-    /// What viewers get of `controlled`, whose picture must be the one developed last.
+    /// Encodes `controlled` for viewers. Its picture must be the one developed last.
     ///
     /// # Errors
-    /// When the picture cannot be encoded.
+    /// If the picture cannot be encoded.
     pub(super) fn encode(&mut self, controlled: ControlledFrame) -> Result<EncodedFrame, JpegError> {
         let ControlledFrame { frame, patch, content_area, record, belief } = controlled;
 
@@ -72,7 +72,7 @@ impl Studio {
         })
     }
 
-    /// Gray picture of `image`, which must be the one developed last: one value a cell.
+    /// Gray picture of `image`, one value per cell. `image` must be the one developed last.
     pub(super) fn gray(&mut self, image: &FrameImage) -> &GrayImage {
         if let FrameImage::Rgb(rgb) = image {
             rgb_to_gray(rgb, &mut self.gray);

@@ -17,8 +17,7 @@ use crate::clock::Clock;
 use crate::control::{Command, ControlHandle, ControlledFrame};
 use crate::imaging::{Developer, Size, content_area};
 
-/// Interval of the search for the content area, frames: it moves as slowly as a hand lets an eyepiece
-/// slip.
+/// Frames from one search for the content area to the next. The area moves slowly, as the eyepiece slips in a hand.
 pub const DETECT_EVERY: u64 = 10;
 
 /// Longest wait for a frame before checking whether more will come.
@@ -27,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Starts the thread, and one for each larger size up to `largest`; they end when the loop closes its slot.
 ///
 /// # Errors
-/// When the system cannot make a thread or an encoder.
+/// If the system cannot create a thread or an encoder.
 pub fn start(
     control: ControlHandle,
     developer: &Developer,
@@ -74,7 +73,7 @@ struct Worker {
     studio: Studio,
     larger: Vec<Larger>,
     areas: AreaWatch,
-    /// The frame in which the content area was last looked for.
+    /// Number of the frame in which the content area was last looked for.
     looked: Option<u64>,
 }
 
@@ -86,7 +85,7 @@ impl Worker {
 
             // One bad picture must not end the live view.
             if catch_unwind(AssertUnwindSafe(|| self.turn(&frame))).is_err() {
-                tracing::error!("a picture could not be made; going on with the next");
+                tracing::error!("a picture could not be made; continuing with the next");
             }
         }
     }
@@ -95,8 +94,8 @@ impl Worker {
         self.counts.note_step(&frame.record);
         let watched = self.outlet.is_watched();
 
-        // By distance: where frames come faster than they are shown, those of a round number may never be
-        // seen here.
+        // We count from the last search: if frames come faster than this thread takes them, every multiple of ten could
+        // be among those that it misses.
         let number = frame.frame.number;
         let detect = self.looked.is_none_or(|looked| number.abs_diff(looked) >= DETECT_EVERY);
 

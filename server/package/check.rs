@@ -1,4 +1,4 @@
-//! Verification of a package: its checksums, each export in it, and whether its tables are those of the exports.
+//! Verifies a package: its checksums, each export in it, and that its tables are those of the exports.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,14 +10,14 @@ use crate::store::Head;
 use crate::store::export::verify::{Check, Verdict};
 use crate::store::export::{ExportFiles, SUMS};
 
-/// Whether `path` is meant to be a package.
+/// Whether `path` looks like a package: it has a folder with sessions.
 #[must_use]
 pub fn is_package(path: &Path) -> bool {
     path.join(SESSIONS).is_dir()
 }
 
-/// Checks the package in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether
-/// the history up to it is still the same at the site where it was noted.
+/// Checks the package in `folder` and returns every check, in order. With `expected`, a head known from elsewhere, it
+/// also checks that the history up to it is unchanged at the site where the head was noted.
 #[must_use]
 pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     let verdict = |outcome: Result<Verdict, String>| outcome.unwrap_or_else(Verdict::Failed);
@@ -40,8 +40,8 @@ pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     [checksums, sessions].into_iter().chain(head).chain([Check { name: "tables", verdict: tables }]).collect()
 }
 
-/// Looks for the row of the chain that `expected` stands for. Sites have chains of their own, and each export has its
-/// site's up to itself.
+/// Looks for the row of the chain that `expected` names. Each site has its own chain, and each export contains its
+/// site's chain up to the export.
 fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
     for source in sources {
         let export = ExportFiles::of(&source.folder);
@@ -91,7 +91,7 @@ fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
     Ok(Verdict::Passed("joining the exports again makes the same tables".to_owned()))
 }
 
-/// Names the first file in which two lists of checksums differ.
+/// Fails with the name of the first file in which two lists of checksums differ.
 fn compare(listed: &str, found: &str) -> Result<(), String> {
     let by_file = |sums: &str| -> BTreeMap<String, String> {
         sums.lines().filter_map(|line| line.split_once("  ")).map(|(sum, file)| (file.into(), sum.into())).collect()

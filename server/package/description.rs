@@ -8,14 +8,14 @@ use super::source::{LeftOut, Source};
 use super::table::JoinedTable;
 use crate::store::export::{Column, FORMAT, TEXTS_IN_CSV};
 
-/// What a package says of itself first.
-const ABOUT: &str = "A study, joined from the exports of its sessions by parfocal. Those lie in sessions/, whole: \
-    parfocal verify checks each of them, and that the tables here are theirs. Wall times are UTC; monotonic times are \
-    nanoseconds, comparable within a run of a site. Numbers such as run are counted at each site. telemetry and policy_steps are \
-    joined as Parquet alone; sessions/ has them as CSV. load.R loads the tables into R, spss/ has them for SPSS, \
+/// Start of a package's description.
+const ABOUT: &str = "A study, joined from the exports of its sessions by parfocal. The complete exports \
+    are in sessions/. parfocal verify checks each of them, and that the tables here match them. Wall times are UTC; \
+    monotonic times are nanoseconds, comparable within a run of a site. Numbers such as run are counted at each site. \
+    telemetry and policy_steps are joined only as Parquet; sessions/ has them as CSV. load.R loads the tables into R, spss/ has them for SPSS, \
     redcap/ has a data dictionary and an import file for REDCap.";
 
-/// What a package is called in its description.
+/// Kind of the package, as in its description.
 pub const KIND: &str = "study";
 
 /// `datapackage.json` of a package with `tables`, joined from `sources`.

@@ -1,8 +1,8 @@
-//! Why no package was made.
+//! Errors of making a package.
 
 use std::path::PathBuf;
 
-/// Why no package was made.
+/// The reason why no package was made.
 #[derive(Debug, thiserror::Error)]
 pub enum PackageError {
     /// A folder is neither an export of a session nor a package of a study.
@@ -15,7 +15,7 @@ pub enum PackageError {
         folder: PathBuf,
         /// The check that failed.
         check: String,
-        /// What it found.
+        /// The problem that it found.
         problem: String,
     },
     /// An export was written by another version.
@@ -27,12 +27,12 @@ pub enum PackageError {
     OtherFormat {
         /// The export.
         folder: PathBuf,
-        /// Its format.
+        /// Format of the export.
         found: u64,
         /// The format of this version.
         expected: u64,
     },
-    /// A session belongs to no study.
+    /// A session is outside any study.
     #[error("{} is of a session outside any study", .0.display())]
     OutsideAnyStudy(PathBuf),
     /// Two exports do not belong together.
@@ -42,41 +42,41 @@ pub enum PackageError {
         one: PathBuf,
         /// An export that does not fit it.
         other: PathBuf,
-        /// Why not.
+        /// The reason.
         reason: String,
     },
     /// There is nothing to join.
     #[error("{} has no session to join", .0.display())]
     Empty(PathBuf),
-    /// The folder to write holds something.
+    /// The output folder is not empty.
     #[error("{} exists and is not empty; choose a new folder", .0.display())]
     Exists(PathBuf),
     /// A file could not be read.
     #[error("cannot read {}: {reason}", .path.display())]
     Unreadable {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         reason: String,
     },
     /// A file could not be written.
     #[error("cannot write {}: {reason}", .path.display())]
     Unwritable {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         reason: String,
     },
 }
 
 impl PackageError {
-    /// For reading `path`.
+    /// Makes an error about reading `path`.
     pub(super) fn unreadable<E: std::fmt::Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
         let path = path.into();
         move |error| Self::Unreadable { path, reason: error.to_string() }
     }
 
-    /// For writing `path`.
+    /// Makes an error about writing `path`.
     pub(super) fn unwritable<E: std::fmt::Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
         let path = path.into();
         move |error| Self::Unwritable { path, reason: error.to_string() }

@@ -1,4 +1,4 @@
-//! Rows of all exports, one after another.
+//! The rows of all exports, one after another.
 
 use std::collections::HashSet;
 
@@ -6,12 +6,12 @@ use super::error::PackageError;
 use super::source::Source;
 use super::table::{JoinedTable, Origin};
 
-/// Whether any of `sources` has the table. Blinded exports lack those that tell the policies.
+/// Whether any of `sources` has the table. Blinded exports lack the tables that reveal the policies.
 pub fn is_there(table: &JoinedTable, sources: &[Source]) -> bool {
     sources.iter().any(|source| source.folder.join(table.table.file()).exists())
 }
 
-/// Calls `take` with the cells of each row of `table`, as they stand in the exports' CSV files.
+/// Calls `take` with the cells of each row of `table`, as they are in the exports' CSV files.
 pub fn rows(
     table: &JoinedTable,
     sources: &[Source],

@@ -1,4 +1,4 @@
-//! What programs for statistics show of a column.
+//! Labels that programs for statistics show for a column.
 
 use crate::store::export::Column;
 

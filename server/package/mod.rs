@@ -1,8 +1,8 @@
-//! A study's package: the exports of its sessions, whole and verified, and beside them their tables joined, as CSV and
-//! Parquet, with what R, SPSS and REDCap need to read them.
+//! A study's package: the exports of its sessions, complete and verified, and their joined tables, as CSV and Parquet,
+//! with what R, SPSS and REDCap need to read them.
 //!
-//! The joined tables say nothing that the exports do not say. So whoever distrusts them verifies the exports and joins
-//! them again, which `check` does.
+//! The joined tables contain nothing that the exports do not contain. So anyone who distrusts them can verify the
+//! exports and join them again, as `check` does.
 
 mod check;
 mod description;

@@ -1,4 +1,4 @@
-//! A joined table as a Parquet file: texts in UTF-8, times in microseconds UTC, nothing where the CSV has nothing.
+//! A joined table as a Parquet file: texts in UTF-8, times in microseconds UTC, null for an empty cell of the CSV.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use super::error::PackageError;
 use super::table::JoinedTable;
 use crate::store::export::{Column, Type};
 
-/// Rows that are gathered before they are written together.
+/// Number of rows in a row group.
 const GROUP: usize = 16_384;
 
 /// A Parquet file being written.
@@ -24,19 +24,19 @@ pub struct ParquetFile {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
     columns: Vec<Gathered>,
-    /// Rows gathered.
+    /// Number of rows gathered for the next row group.
     rows: usize,
 }
 
-/// The cells of a column that were gathered for the next row group.
+/// The cells of a column, gathered for the next row group.
 struct Gathered {
     column: Column,
     values: Values,
-    /// For each row 1, or 0 where the cell is empty.
+    /// Definition level of each row: 1, or 0 if the cell is empty.
     levels: Vec<i16>,
 }
 
-/// Cells that are not empty, as Parquet has them.
+/// Cells that are not empty, in Parquet's types.
 enum Values {
     Texts(Vec<ByteArray>),
     /// Whole numbers, and times in microseconds.
@@ -62,7 +62,7 @@ impl ParquetFile {
         Ok(Self { path: path.to_owned(), writer, columns, rows: 0 })
     }
 
-    /// Adds a row: its cells as the CSV files have them.
+    /// Adds a row of cells as they are in the CSV files.
     pub fn row(&mut self, cells: &[&str]) -> Result<(), PackageError> {
         for (gathered, cell) in self.columns.iter_mut().zip(cells) {
             gathered.take(cell).map_err(PackageError::unwritable(&self.path))?;
@@ -75,7 +75,7 @@ impl ParquetFile {
         Ok(())
     }
 
-    /// Ends the file, and waits until the disk has it.
+    /// Finishes the file, and waits until it is on disk.
     pub fn end(mut self) -> Result<(), PackageError> {
         if self.rows > 0 {
             self.pass_on()?;
@@ -128,7 +128,7 @@ impl Gathered {
         match &mut self.values {
             Values::Texts(values) => {
                 let text = self.column.read(cell);
-                // The same text often stands in one row after another: it is kept once.
+                // Consecutive rows often have the same text; keep it only once.
                 let again = values.last().filter(|last| last.data() == text.as_bytes()).cloned();
                 values.push(again.unwrap_or_else(|| ByteArray::from(text)));
             }
@@ -143,7 +143,7 @@ impl Gathered {
         Ok(())
     }
 
-    /// Writes what was gathered, and begins anew.
+    /// Writes the gathered cells, and starts over.
     fn write(&mut self, writer: &mut SerializedColumnWriter<'_>) -> Result<(), ParquetError> {
         let levels = Some(self.levels.as_slice());
         match &mut self.values {
@@ -157,7 +157,7 @@ impl Gathered {
     }
 }
 
-/// Writes the values of a column of a row group, and forgets them.
+/// Writes the values of a column of a row group, and clears them.
 fn write<D: DataType>(
     writer: &mut SerializedColumnWriter<'_>,
     values: &mut Vec<D::T>,
@@ -168,7 +168,7 @@ fn write<D: DataType>(
     Ok(())
 }
 
-/// A column of the schema. Each may be empty: that is how the tables tell what is not known.
+/// A column of the schema. All columns are optional, because the tables leave unknown cells empty.
 fn field(column: &Column) -> Result<Schema, ParquetError> {
     let (physical, logical) = match column.kind {
         Type::String => (Physical::BYTE_ARRAY, Some(LogicalType::String)),

@@ -6,7 +6,7 @@ use super::labels::label;
 use super::table::JoinedTable;
 use crate::store::export::Type;
 
-/// What the script begins with: how cells of each type are read.
+/// Start of the script: how cells of each type are read.
 const BEGIN: &str = r#"# Loads the tables of this package into the list `study`, one data frame a table:
 #
 #   source("load.R", chdir = TRUE)
@@ -49,7 +49,7 @@ parfocal_table <- function(name, types, labels) {
 study <- list()
 "#;
 
-/// Columns with few different texts.
+/// Columns with few distinct texts, which become factors.
 const FACTORS: [&str; 11] =
     ["site", "participant", "protocol", "policy", "kind", "status", "question", "measure", "by", "role", "stage"];
 
@@ -84,7 +84,7 @@ fn kind(name: &str, kind: Type) -> &'static str {
     }
 }
 
-/// `text` as a string of R.
+/// `text` as an R string.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

@@ -1,5 +1,5 @@
-//! What REDCap needs: a data dictionary (Project Setup, Data Dictionary) and a file for its data import. A record is a
-//! session; what a session has several of is a repeating instrument.
+//! Files for REDCap: a data dictionary (Project Setup, Data Dictionary) and a file for its data import. A record is a
+//! session. Tables with several rows per session are repeating instruments.
 
 use std::collections::BTreeMap;
 
@@ -37,16 +37,16 @@ const DICTIONARY: [&str; 18] = [
     "Field Annotation",
 ];
 
-/// The table with one row a session, which is not a repeating instrument.
+/// The table with one row per session, which is not a repeating instrument.
 const ONCE: &str = "sessions";
 
-/// The tables that become instruments: what was done and said. What proves it stays in the package.
+/// The tables that become instruments: actions, comments and answers. Tables that prove integrity stay in the package.
 const INSTRUMENTS: [&str; 7] = [ONCE, "segments", "comments", "answers", "scores", "corrections", "allocation"];
 
-/// Texts of these columns can be long.
+/// Columns whose texts can be long.
 const NOTES: [&str; 6] = ["text", "value", "given_value", "question_text", "reason", "new_value"];
 
-/// The tables of `tables` that become instruments, that of sessions first.
+/// The members of `tables` that become instruments, the table of sessions first.
 pub fn instruments(tables: &[JoinedTable]) -> Vec<&JoinedTable> {
     INSTRUMENTS.iter().filter_map(|name| tables.iter().find(|table| table.table.name == *name)).collect()
 }
@@ -115,17 +115,17 @@ pub fn import(instruments: &[&JoinedTable], sources: &[Source]) -> Result<Vec<u8
     csv.into_inner().map_err(PackageError::unwritable("redcap/import.csv"))
 }
 
-/// The columns that become fields: the session is the record itself.
+/// The columns that become fields, without the session, which is the record itself.
 fn fields(table: &JoinedTable) -> impl Iterator<Item = &Column> {
     table.columns().filter(|column| column.name != "session")
 }
 
-/// REDCap's variables are unique in a whole project, in lower case.
+/// The name of a column's variable. REDCap needs names that are unique in the whole project, in lower case.
 fn variable(table: &JoinedTable, column: &Column) -> String {
     format!("{}_{}", table.table.name, column.name)
 }
 
-/// Type of a field, and how REDCap checks it.
+/// Type of a field, and REDCap's validation of it.
 fn field(column: &Column) -> (&'static str, &'static str) {
     match column.kind {
         Type::String if NOTES.contains(&column.name) => ("notes", ""),
@@ -137,7 +137,7 @@ fn field(column: &Column) -> (&'static str, &'static str) {
     }
 }
 
-/// A cell as REDCap imports it. Times lose what is below a second, which REDCap does not keep.
+/// A cell as REDCap imports it. Times lose their fractions of a second, which REDCap does not keep.
 fn value(column: &Column, cell: &str) -> String {
     match (column.kind, cell) {
         (_, "") => String::new(),

@@ -1,4 +1,4 @@
-//! An export of a session as it goes into a package: verified, and known by study, site and chain.
+//! A session's export as part of a package: verified, and identified by study, site and chain.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -10,34 +10,34 @@ use super::error::PackageError;
 use crate::store::export::verify::{Verdict, is_export, verify_files};
 use crate::store::export::{ExportFiles, FORMAT};
 
-/// Folder of a package in which the exports lie.
+/// Folder of a package that contains the exports.
 pub const SESSIONS: &str = "sessions";
 
-/// A session of a study that a package does not have.
+/// A session of a study that is not in a package.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct LeftOut {
     /// The session.
     pub session: String,
-    /// Why it is not there.
+    /// Why it is not in the package.
     pub reason: String,
 }
 
 /// A verified export of a session of a study.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Where it lies.
+    /// Folder of the export.
     pub folder: PathBuf,
     /// The session.
     pub session: String,
-    /// Its study's name.
+    /// Name of the session's study.
     pub study: String,
-    /// Its site.
+    /// Name of the session's site.
     pub site: String,
     /// SHA-256 of the study's definition.
     definition_sha256: String,
-    /// Whether policies are left out.
+    /// Whether the policies are left out.
     pub blinded: bool,
-    /// Number and hash of the chain's head when it was exported.
+    /// Number and hash of the chain's head at the time of the export.
     head: (u64, String),
 }
 
@@ -45,7 +45,7 @@ impl Source {
     /// Verifies the export in `folder`.
     ///
     /// # Errors
-    /// When it does not verify, another version wrote it, or its session belongs to no study.
+    /// If it does not verify, another version wrote it, or its session is outside any study.
     pub fn open(folder: &Path) -> Result<Self, PackageError> {
         if !is_export(folder) {
             return Err(PackageError::NotAnExport(folder.to_owned()));
@@ -97,7 +97,7 @@ impl Source {
         format!("{SESSIONS}/{}", self.session)
     }
 
-    /// The same export where it lies now.
+    /// The same export after its folder was moved or copied to `folder`.
     pub(super) fn at(&self, folder: PathBuf) -> Self {
         Self { folder, ..self.clone() }
     }
@@ -107,10 +107,10 @@ impl Source {
     }
 }
 
-/// The folders of the exports that `path` holds: itself if it is one, or those of a package.
+/// The folders of the exports in `path`: `path` itself if it is an export, or those of a package.
 ///
 /// # Errors
-/// When it is neither, or cannot be read.
+/// If it is neither, or cannot be read.
 pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
     let sessions = path.join(SESSIONS);
     if !sessions.is_dir() {
@@ -129,10 +129,10 @@ pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
     Ok(folders)
 }
 
-/// The sessions that the package `path` says it leaves out; none where it is the export of a session.
+/// The sessions that the package `path` lists as left out; none if `path` is the export of a session.
 ///
 /// # Errors
-/// When its description cannot be read, or a file in it was changed since it was written.
+/// If its description cannot be read, or a file in it was changed since it was written.
 pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
     if !path.join(SESSIONS).is_dir() {
         return Ok(Vec::new());
@@ -142,8 +142,8 @@ pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
     serde_json::from_value(package["parfocal"]["left_out"].clone()).map_err(|error| unreadable(error.to_string()))
 }
 
-/// Checks that `sources` belong together: one study by one definition, all blinded or none, no session twice, and one
-/// chain for each site.
+/// Checks that `sources` belong together: one study with one definition, all blinded or none, no session twice, and one
+/// chain per site.
 pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
     let Some(first) = sources.first() else { return Ok(()) };
     let mut seen: BTreeMap<&str, &Source> = BTreeMap::new();
@@ -156,7 +156,9 @@ pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
             return Err(first.apart(source, "the definition of their study differs"));
         }
         if source.blinded != first.blinded {
-            return Err(first.apart(source, "one tells the policies, the other does not; export both in the same way"));
+            return Err(
+                first.apart(source, "one contains the policies, the other does not; export both in the same way")
+            );
         }
         if let Some(twin) = seen.insert(&source.session, source) {
             return Err(twin.apart(source, format!("both have session {}; give each site once", source.session)));
@@ -171,8 +173,8 @@ pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
     Ok(())
 }
 
-/// Checks that the heads of all `sources`, which are of one site, stand in the longest chain among them: otherwise
-/// somebody rewrote a record between two exports, or two databases call themselves the same site.
+/// Checks that the heads of all `sources`, which are of one site, are in the longest chain among them. If one is not, a
+/// record was rewritten between two exports, or two databases have the same site name.
 fn one_chain(sources: &[&Source]) -> Result<(), PackageError> {
     let Some(longest) = sources.iter().max_by_key(|source| source.head.0) else { return Ok(()) };
     let export = ExportFiles::of(&longest.folder);

@@ -1,8 +1,8 @@
 //! A joined table as an SPSS system file (`.sav`): uncompressed, in UTF-8, little-endian, with the meaning of each
 //! column as its label.
 //!
-//! The layout is that of "System File Format" in the PSPP developers' guide, which its authors found out; SPSS has
-//! published none.
+//! The layout follows "System File Format" in the PSPP developers' guide, whose authors reverse-engineered it; SPSS has
+//! not published one.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -17,25 +17,25 @@ use super::source::Source;
 use super::table::JoinedTable;
 use crate::store::export::{Column, Type};
 
-/// Bytes of an element of a case: a number, or eight characters.
+/// Bytes per element of a case; an element is a number or eight characters.
 const ELEMENT: usize = 8;
 
 /// A string wider than this is stored as several variables, called segments, of this width.
 const SEGMENT: usize = 255;
 
-/// How much each segment but the last adds to the width of the whole, by the format's rule.
+/// Bytes that each segment except the last adds to the width of the string, by the format's rule.
 const SEGMENT_COUNTS: usize = 252;
 
-/// The widest string there is.
+/// The widest possible string, in bytes.
 const WIDEST: usize = 32_767;
 
-/// Bytes that a label may have.
+/// Longest label, in bytes.
 const LABEL: usize = 255;
 
 /// Seconds from the beginning of the Gregorian calendar, 14 October 1582, to 1970.
 const GREGORIAN: f64 = 12_219_379_200.0;
 
-/// What stands for an empty cell of a number: the most negative one.
+/// The value of an empty number cell: the lowest finite number.
 const MISSING: f64 = -f64::MAX;
 
 /// A variable: a column of the table with its width.
@@ -103,12 +103,12 @@ impl Variable {
         widths
     }
 
-    /// Its short name, by which the dictionary's parts refer to it.
+    /// The short name by which the parts of the dictionary refer to the variable.
     fn short_name(&self) -> String {
         format!("V{}", self.first)
     }
 
-    /// Format for printing: kind, width and decimals.
+    /// Format for printing: type, width and decimals in one number.
     fn format(&self, segment: usize) -> i32 {
         let (kind, width, decimals) = match self.column.kind {
             Type::String => (1, segment, 0),
@@ -120,7 +120,7 @@ impl Variable {
         (kind << 16) | ((width as i32) << 8) | decimals
     }
 
-    /// Adds `cell` of the CSV files to a case.
+    /// Adds `cell`, as it is in the CSV files, to a case.
     fn value(&self, cell: &str, case: &mut Vec<u8>) {
         if self.width > 0 {
             return self.text(self.column.read(cell), case);
@@ -133,7 +133,7 @@ impl Variable {
         case.extend(number.unwrap_or(MISSING).to_le_bytes());
     }
 
-    /// Adds `text`, segment by segment: each but the last holds 255 bytes, and each fills whole elements.
+    /// Adds `text`, segment by segment. Each segment except the last holds 255 bytes, and each fills whole elements.
     fn text(&self, text: &str, case: &mut Vec<u8>) {
         let mut rest = cut(text, self.width).as_bytes();
         for width in self.segments() {
@@ -158,10 +158,10 @@ fn dictionary(table: &JoinedTable, variables: &[Variable], cases: usize) -> Vec<
     }
     boolean_labels(&mut out, variables);
 
-    // Of no version; any machine; IEEE 754; uncompressed; little-endian; UTF-8.
+    // Version 1.0.0; any machine; IEEE 754; the compression code, always 1; little-endian; UTF-8.
     let machine = [1_i32, 0, 0, -1, 1, 1, 2, 65_001];
     extension(&mut out, 3, 4, &machine.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>());
-    // What is missing, the highest value, and the lowest, which is next to what is missing.
+    // The missing value, the highest value, and the lowest, which is next to the missing value.
     let lowest = f64::from_bits(MISSING.to_bits() - 1);
     extension(&mut out, 4, 8, &[MISSING, f64::MAX, lowest].map(f64::to_le_bytes).concat());
 
@@ -183,7 +183,7 @@ fn dictionary(table: &JoinedTable, variables: &[Variable], cases: usize) -> Vec<
     out
 }
 
-/// The file's header. Its date is fixed: the same exports make the same file.
+/// The file's header. Its date is fixed, so that the same exports always make the same file.
 fn header(out: &mut Vec<u8>, table: &JoinedTable, case_size: usize, cases: usize) {
     out.extend(b"$FL2");
     padded(out, concat!("@(#) SPSS DATA FILE - parfocal ", env!("CARGO_PKG_VERSION")), 60);
@@ -200,7 +200,7 @@ fn header(out: &mut Vec<u8>, table: &JoinedTable, case_size: usize, cases: usize
     padded(out, "", 3);
 }
 
-/// The records of a variable: one for each segment, with a placeholder for each element after its first.
+/// The records of a variable: one per segment, with a placeholder for each element after its first.
 fn variable_records(out: &mut Vec<u8>, variable: &Variable) {
     for (number, width) in variable.segments().into_iter().enumerate() {
         let label = label(&variable.column);
@@ -229,7 +229,7 @@ fn variable_records(out: &mut Vec<u8>, variable: &Variable) {
     }
 }
 
-/// Labels of 0 and 1 for what is true or false.
+/// Value labels for Booleans: 0 is "no", 1 is "yes".
 fn boolean_labels(out: &mut Vec<u8>, variables: &[Variable]) {
     let mut index = 1;
     let mut booleans = Vec::new();
@@ -257,12 +257,12 @@ fn boolean_labels(out: &mut Vec<u8>, variables: &[Variable]) {
     }
 }
 
-/// Elements that a segment of `width` bytes fills; a number, of width 0, fills one.
+/// Number of elements that a segment of `width` bytes fills; a number, of width 0, fills one.
 const fn elements_of(width: usize) -> usize {
     if width == 0 { 1 } else { width.div_ceil(ELEMENT) }
 }
 
-/// A record of a kind that readers may skip: `data` in pieces of `size` bytes.
+/// A record that readers may skip if they do not know it: `data` in pieces of `size` bytes.
 fn extension(out: &mut Vec<u8>, subtype: usize, size: usize, data: &[u8]) {
     integer(out, 7);
     integer(out, subtype);
@@ -275,7 +275,7 @@ fn integer(out: &mut Vec<u8>, value: usize) {
     out.extend((value as i32).to_le_bytes());
 }
 
-/// `text`, with spaces up to `bytes` bytes.
+/// `text`, padded with spaces to `bytes` bytes.
 fn padded(out: &mut Vec<u8>, text: &str, bytes: usize) {
     let end = out.len() + bytes;
     out.extend(text.as_bytes());

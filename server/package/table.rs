@@ -1,8 +1,8 @@
-//! A joined table: a table of the exports, with the columns that tell sessions and sites apart.
+//! A joined table: a table of the exports, with columns for session and site.
 
 use crate::store::export::{Column, FORMAT, TABLES, Table, Type};
 
-/// What tells a database's own records apart from another's.
+/// Column that tells the records of different databases apart.
 const SITE: Column = Column {
     name: "site",
     kind: Type::String,
@@ -14,16 +14,16 @@ const SITE: Column = Column {
 const SESSION: Column =
     Column { name: "session", kind: Type::String, unit: "", description: "Session's random id", since: FORMAT };
 
-/// Tables whose rows may belong to several sessions of a site: joined, each row stands once.
+/// Tables whose rows may belong to several sessions of a site; each row is joined once.
 const SHARED: [&str; 5] = ["runs", "devices", "studies", "study_events", "weights"];
 
-/// Tables with a row for each frame: joined as Parquet alone. The exports have them as CSV.
+/// Tables with a row for each frame, joined only as Parquet. The exports have them as CSV.
 const LONG: [&str; 2] = ["telemetry", "policy_steps"];
 
-/// Tables that prove one export and mean nothing joined.
+/// Tables that prove a single export and have no meaning when joined.
 const PROOFS: [&str; 3] = ["chain", "chain_salts", "voice_pieces"];
 
-/// Where a cell of a joined table comes from.
+/// Source of a cell of a joined table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// The export's site.
@@ -37,13 +37,13 @@ pub enum Origin {
 /// A table of all sessions.
 #[derive(Debug, Clone)]
 pub struct JoinedTable {
-    /// The table of an export.
+    /// The table as in an export.
     pub table: Table,
-    /// Its columns, in order, and where their cells come from.
+    /// The columns, in order, and the source of their cells.
     pub columns: Vec<(Column, Origin)>,
-    /// Columns that together name a row.
+    /// Names of the columns that together identify a row.
     pub key: Vec<&'static str>,
-    /// Whether a row may stand in several exports of a site.
+    /// Whether a row may be in several exports of a site.
     pub shared: bool,
     /// Whether there is a row for each frame.
     pub long: bool,
@@ -70,12 +70,12 @@ impl JoinedTable {
         Self { table, columns, key, shared, long: LONG.contains(&table.name) }
     }
 
-    /// Its columns without where they come from.
+    /// The columns without the source of their cells.
     pub fn columns(&self) -> impl Iterator<Item = &Column> {
         self.columns.iter().map(|(column, _)| column)
     }
 
-    /// Whether it belongs to sessions one by one.
+    /// Whether each row belongs to one session.
     pub const fn of_sessions(&self) -> bool {
         !self.shared
     }

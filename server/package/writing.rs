@@ -1,4 +1,4 @@
-//! A package being written: beside its place and under another name until it is whole.
+//! Writes a package: next to its final place and under another name until it is complete.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,37 +18,37 @@ use super::{description, join, r, redcap, spss};
 use crate::files::{files_below, sync_folder_of, write_through};
 use crate::store::export::SUMS;
 
-/// What was written.
+/// Summary of the written package.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Summary {
-    /// The folder.
+    /// Folder of the package.
     pub folder: PathBuf,
-    /// The study.
+    /// Name of the study.
     pub study: String,
-    /// Its sites in the package.
+    /// Names of the sites in the package.
     pub sites: Vec<String>,
-    /// Sessions in the package.
+    /// Number of sessions in the package.
     pub sessions: usize,
-    /// Sessions of the study that are not.
+    /// Sessions of the study that are not in the package.
     pub left_out: Vec<LeftOut>,
-    /// Whether policies are in it.
+    /// Whether it contains the policies.
     pub unblinded: bool,
 }
 
-/// What becomes of the exports that go into a package.
+/// What happens to the exports that go into a package.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sessions {
     /// They stay where they are, and the package has copies.
     Copied,
-    /// They are moved into the package, on whose disk they lie. A package that fails has taken them along.
+    /// They are moved into the package, which must be on the same disk. If writing the package fails, they are lost.
     Moved,
 }
 
-/// Writes the package of `sources` to the folder `out`, which must be new or empty and appears whole or not at all.
-/// `told` hears the number of steps done, and of all, as it goes on.
+/// Writes the package of `sources` to the folder `out`, which must be new or empty and appears complete or not at all.
+/// Calls `told` with the number of steps done and the number of all steps.
 ///
 /// # Errors
-/// When there is no source, two of them do not belong together, or a file cannot be read or written.
+/// If there is no source, two of them do not belong together, or a file cannot be read or written.
 pub fn write(
     sources: &[Source],
     sessions: Sessions,
@@ -56,7 +56,7 @@ pub fn write(
     out: &Path,
     told: &mut (dyn FnMut(usize, usize) + Send),
 ) -> Result<Summary, PackageError> {
-    // In the order in which `check` finds them again: of their folders' names.
+    // In the order in which `check` finds them again: by the names of their folders.
     let mut sources = sources.to_vec();
     sources.sort_by(|one, other| one.session.cmp(&other.session));
     let sources = sources.as_slice();
@@ -72,7 +72,7 @@ pub fn write(
 
     fill(sources, sessions, left_out, temporary.path(), told)?;
 
-    // A folder that is there and empty gives way.
+    // An existing empty folder is replaced.
     let _ = fs::remove_dir(out);
     fs::rename(temporary.keep(), out).map_err(PackageError::unwritable(out))?;
     sync_folder_of(out);
@@ -123,11 +123,11 @@ fn fill(
     Ok(())
 }
 
-/// Hears the number of steps done, and of all.
+/// Called with the number of steps done and the number of all steps.
 type Told<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
 
-/// The steps of joining, counted from several threads: each export that is copied, each table, of a long table each
-/// export, and the checksums.
+/// Counts the steps of joining from several threads: one for each copied export, one for each table (one per export for
+/// a long table), and one for the checksums.
 struct Steps<'a> {
     all: usize,
     done: Mutex<(usize, Told<'a>)>,
@@ -150,8 +150,7 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// Joins all tables. The long ones, which take most of the time, are joined beside the others, each on a thread of its
-/// own.
+/// Joins all tables. The long ones take most of the time; each is joined on a thread of its own beside the others.
 fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
     let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
     thread::scope(|scope| {
@@ -170,7 +169,7 @@ fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps:
     })
 }
 
-/// Puts an export into the package `folder`, and gives it as it lies there.
+/// Puts an export into the package `folder`. Returns the export at its new place.
 fn take(source: &Source, sessions: Sessions, folder: &Path) -> Result<Source, PackageError> {
     let place = folder.join(source.place());
     match sessions {
@@ -198,7 +197,7 @@ fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
     Ok(())
 }
 
-/// Writes a table that has a row for each frame: as Parquet alone.
+/// Writes a table that has a row for each frame, only as Parquet.
 fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
     let mut parquet = ParquetFile::create(&folder.join(format!("{}.parquet", table.table.name)), table)?;
     for source in sources {
@@ -208,7 +207,7 @@ fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Ste
     parquet.end()
 }
 
-/// Writes any other table: as Parquet, as CSV and for SPSS.
+/// Writes any other table as Parquet, as CSV and for SPSS.
 fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
     let name = table.table.name;
     let mut parquet = ParquetFile::create(&folder.join(format!("{name}.parquet")), table)?;
@@ -229,7 +228,7 @@ fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<
     spss::write(&spss.join(format!("{name}.sav")), table, sources)
 }
 
-/// Writes what R and REDCap read.
+/// Writes the files for R and REDCap.
 fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(), PackageError> {
     let short: Vec<JoinedTable> = tables.iter().filter(|table| !table.long).cloned().collect();
     write_file(folder, "load.R", r::script(&short).as_bytes())?;
@@ -246,7 +245,7 @@ fn write_file(folder: &Path, name: &str, content: &[u8]) -> Result<(), PackageEr
     write_through(&path, content).map_err(PackageError::unwritable(path))
 }
 
-/// The checksums of all files below `folder`, in the form of `sha256sum`, but for that of this list itself.
+/// The checksums of all files below `folder`, in the form of `sha256sum`, except that of the list itself.
 pub fn sums(folder: &Path) -> Result<String, PackageError> {
     let mut files = files_below(folder).map_err(PackageError::unreadable(folder))?;
     files.retain(|file| file != Path::new(SUMS));
@@ -262,7 +261,7 @@ pub fn sums(folder: &Path) -> Result<String, PackageError> {
     Ok(lines.concat())
 }
 
-/// Takes what is written into a digest.
+/// A writer that hashes what is written.
 struct Digester(Sha256);
 
 impl Write for Digester {

@@ -1,20 +1,20 @@
-//! Why a recording is not played.
+//! Why a recording cannot be played.
 
 use crate::conductor::ConductError;
 
-/// Why a recording is not played.
+/// Why a recording cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum PlaybackError {
-    /// The session cannot be played by the one who asked.
+    /// The session's recordings may not be played, or the session could not be loaded.
     #[error(transparent)]
     Session(#[from] ConductError),
     /// There is no such recording or frame.
     #[error("{0}")]
     NotFound(String),
-    /// It is there, but cannot be read.
+    /// The recording exists, but cannot be read.
     #[error("{0}")]
     Unreadable(String),
-    /// The server ends.
+    /// The server is shutting down.
     #[error("the server is ending")]
     Ending,
 }

@@ -1,5 +1,5 @@
-//! Playback: a session's recordings as times and pictures for the researcher's page, and any recording past a policy.
-//! The page gets nothing else of a recording: its focal power comes with the timeline, by the timeline's rules.
+//! Playback: plays a session's recordings as times and pictures for the researcher's page, and runs a policy over any
+//! recording. The page gets nothing else from a recording. The focal power comes with the timeline, under its rules.
 
 mod error;
 mod player;

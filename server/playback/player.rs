@@ -1,4 +1,4 @@
-//! Finds a session's recordings, and hands out their pictures.
+//! Finds a session's recordings, and provides their pictures.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -18,55 +18,55 @@ use crate::recording::{AnyRecording, FOLDER, Found, Kind, RecordingError, belong
 use crate::trial::protocol::Record;
 use crate::trial::role::Role;
 
-/// The recordings of a session, as far as they can be played.
+/// The recordings of a session that can be played.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SessionRecordings {
-    /// Those that can be played, in the order in which they were made.
+    /// Recordings that can be played, in the order in which they were made.
     pub recordings: Vec<RecordingCourse>,
-    /// What is wrong with others, or missing from these, in sentences.
+    /// Problems with other recordings, and parts missing from these, in sentences.
     pub problems: Vec<String>,
 }
 
-/// When the frames of a recording were exposed.
+/// A recording, with the times at which its frames were exposed.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RecordingCourse {
-    /// Its name.
+    /// Name of the recording.
     pub name: String,
-    /// What it is made of.
+    /// Whether it consists of mosaics or of the view's pictures.
     pub kind: Kind,
-    /// Its first frame, in seconds of the session's timeline; negative before the session's start.
+    /// Time of the first frame, in seconds of the session's timeline; negative before the session's start.
     pub from: f64,
-    /// Each frame, in whole milliseconds since the first. A frame is named by its place here, from 0.
+    /// Time of each frame, in whole milliseconds since the first. A frame's index in this list, from 0, identifies it.
     pub times_ms: Vec<i64>,
 }
 
-/// Plays the recordings of sessions that were unblinded. Clone freely.
+/// Plays the recordings of unblinded sessions. Cheap to clone.
 #[derive(Clone)]
 pub struct Player(Arc<Shared>);
 
 struct Shared {
     conductor: Conductor,
-    /// The folder of the recordings.
+    /// Folder that holds the recordings.
     folder: PathBuf,
     projector: Projector,
-    /// Unblinded sessions that the researcher may have played. Unblinding is never undone, so nobody need ask again.
+    /// Unblinded sessions, which the researcher may play. Unblinding is never undone, so it is checked only once.
     playable: Mutex<BTreeSet<SessionId>>,
 }
 
 impl Player {
-    /// A player of the recordings in `folder`.
+    /// Makes a player of the recordings in `folder`.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system cannot start another thread.
     pub fn new(conductor: Conductor, folder: PathBuf) -> std::io::Result<Self> {
         let projector = Projector::start()?;
         Ok(Self(Arc::new(Shared { conductor, folder, projector, playable: Mutex::default() })))
     }
 
-    /// The recordings of `session`, and when their frames were exposed.
+    /// The recordings of `session`, with the times of their frames.
     ///
     /// # Errors
-    /// When `by` may not play them (yet), there is no such session, or the database failed.
+    /// If `by` may not play them (yet), there is no such session, or the database failed.
     pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, PlaybackError> {
         let played = self.0.conductor.to_play(by, session).await?;
         let folder = self.0.folder.clone();
@@ -75,15 +75,15 @@ impl Player {
         let found = found.await.map_err(|_| PlaybackError::Ending)?;
         Ok(found.unwrap_or_else(|error| SessionRecordings {
             recordings: Vec::new(),
-            problems: vec![format!("The recordings cannot be looked for: {error}.")],
+            problems: vec![format!("The recordings could not be listed: {error}.")],
         }))
     }
 
-    /// Frame `number` of recording `name` of `session` as JPEG: of the view as it was recorded; of mosaics developed at
-    /// `size`.
+    /// Frame `number` of recording `name` of `session` as a JPEG. A recording of the view gives the picture as it was
+    /// recorded. A recording of mosaics is developed at `size`.
     ///
     /// # Errors
-    /// When `by` may not play it (yet), there is no such recording or frame, or it is damaged.
+    /// If `by` may not play it (yet), there is no such recording or frame, or it is damaged.
     pub async fn picture(
         &self,
         by: Role,
@@ -106,7 +106,7 @@ impl Player {
     async fn check(&self, by: Role, session: SessionId) -> Result<(), PlaybackError> {
         let known = by == Role::Researcher && self.playable().contains(&session);
         if known {
-            // A withdrawal may have come since, even while the recording is playing.
+            // The participant may have withdrawn since, even while the recording is playing.
             self.0.conductor.check_reading(session).await?;
         } else {
             self.0.conductor.to_play(by, session).await?;
@@ -120,7 +120,7 @@ impl Player {
     }
 }
 
-/// What is told of the recordings that were found.
+/// Describes the recordings that were found, and their problems.
 fn told(found: Vec<Found>, played: &Played) -> SessionRecordings {
     let mut told = SessionRecordings { recordings: Vec::new(), problems: Vec::new() };
     if found.is_empty() && played.asked != Record::None {
@@ -151,7 +151,7 @@ fn tell(name: &str, recording: &AnyRecording, played: &Played, told: &mut Sessio
         return;
     };
 
-    // By the monotonic clock where the recording knows it: then nobody who set the clock has moved the pictures.
+    // Uses the monotonic clock if the recording has it. Then setting the wall clock has not shifted the pictures.
     let from = match recording.clock() {
         Some((run, monotonic_ns)) => played.seconds_at(run, monotonic_ns.saturating_add(first)),
         None => played.seconds_of(recording.started()) + nanoseconds(first),
@@ -164,12 +164,12 @@ fn tell(name: &str, recording: &AnyRecording, played: &Played, told: &mut Sessio
     });
 }
 
-/// Nanoseconds in seconds.
+/// Converts nanoseconds to seconds.
 fn nanoseconds(count: i64) -> f64 {
     count as f64 / 1e9
 }
 
-/// An error as a sentence of its own.
+/// An error as a sentence, with a capital letter and a full stop.
 fn sentence(error: &RecordingError) -> String {
     let text = error.to_string();
     let mut letters = text.chars();

@@ -1,5 +1,5 @@
-//! Makes the pictures of recordings, one after another, on a thread of low priority. A session that is under way goes
-//! first: whoever plays an earlier one waits, and nobody else does.
+//! Makes the pictures of recordings, one after another, on a thread of low priority. A session under way has
+//! precedence: only the people who play an earlier session have to wait.
 
 use std::path::{Path, PathBuf};
 
@@ -12,25 +12,25 @@ use crate::imaging::{Developer, GrayImage, JpegEncoder, RgbImage, Size};
 use crate::priority;
 use crate::recording::{AnyRecording, Recording, RecordingError};
 
-/// Pictures that may wait to be made: what a few pages ask for ahead.
+/// Maximum number of pictures that wait to be made: enough for the requests that a few pages make ahead.
 const WAITING: usize = 64;
-/// Recordings that are kept open.
+/// Maximum number of recordings that are kept open.
 const OPEN: usize = 4;
 
 /// A frame of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Slide {
-    /// The recording's folder.
+    /// Folder of the recording.
     pub folder: PathBuf,
-    /// The frame, from 0.
+    /// Index of the frame, from 0.
     pub number: usize,
-    /// The size at which a mosaic is developed.
+    /// Size at which a mosaic is developed.
     pub size: Size,
 }
 
 type Made = Result<Bytes, PlaybackError>;
 
-/// The thread that makes pictures; ends when dropped.
+/// A handle of the thread that makes pictures. The thread ends when the handle is dropped.
 pub(super) struct Projector {
     slides: mpsc::Sender<(Slide, oneshot::Sender<Made>)>,
 }
@@ -39,14 +39,14 @@ impl Projector {
     /// Starts the thread.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system cannot start another thread.
     pub fn start() -> std::io::Result<Self> {
         let (slides, waiting) = mpsc::channel(WAITING);
         std::thread::Builder::new().name("playback".into()).spawn(move || run(waiting))?;
         Ok(Self { slides })
     }
 
-    /// The picture of `slide`, as JPEG. If the future is dropped, the picture is not made.
+    /// The picture of `slide` as a JPEG. If the future is dropped before the picture's turn, it is not made.
     pub async fn picture(&self, slide: Slide) -> Made {
         let (reply, made) = oneshot::channel();
         self.slides.send((slide, reply)).await.map_err(|_| PlaybackError::Ending)?;
@@ -59,7 +59,7 @@ fn run(mut waiting: mpsc::Receiver<(Slide, oneshot::Sender<Made>)>) {
     let mut open: Vec<Open> = Vec::new();
 
     while let Some((slide, reply)) = waiting.blocking_recv() {
-        // Nobody waits for it any more: the page has gone elsewhere in the recording.
+        // Nobody waits for this picture any more: the page has jumped elsewhere in the recording.
         if reply.is_closed() {
             continue;
         }
@@ -67,10 +67,10 @@ fn run(mut waiting: mpsc::Receiver<(Slide, oneshot::Sender<Made>)>) {
     }
 }
 
-/// A recording kept open, and what makes its pictures.
+/// An open recording, and the tools that make its pictures.
 struct Open {
     recording: AnyRecording,
-    /// None of a recording of the view.
+    /// None for a recording of the view.
     studio: Option<Studio>,
 }
 
@@ -83,12 +83,12 @@ fn make(open: &mut Vec<Open>, slide: &Slide) -> Made {
 
     let mut made = found.picture(slide);
     if matches!(made, Err(PlaybackError::NotFound(_))) {
-        // It may have become longer since it was opened.
+        // The recording may have grown since it was opened.
         found = Open::new(&slide.folder)?;
         made = found.picture(slide);
     }
 
-    // The one used last stands first; the one used longest ago is closed.
+    // The most recently used recording comes first. The least recently used one is closed.
     open.insert(0, found);
     open.truncate(OPEN);
     made
@@ -117,7 +117,7 @@ impl Open {
     }
 }
 
-/// Develops mosaics with the calibration that they were recorded with.
+/// Develops mosaics with the calibration that was stored in their recording.
 struct Studio {
     developer: Developer,
     encoder: JpegEncoder,

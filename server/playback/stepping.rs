@@ -1,5 +1,5 @@
-//! A policy stepped over a recording: what it sees in each frame, and what it would have asked of the lens. The lens
-//! does not follow: every frame shows what the lens did then.
+//! Steps a policy over a recording: what it sees in each frame, and which focal power it would have requested. The lens
+//! does not follow the policy: every frame shows what the lens did during the recording.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::lens::FocalPower;
 use crate::live::{AreaWatch, DETECT_EVERY};
 use crate::recording::{FrameRow, Recording, RecordingError};
 
-/// Why a policy was not stepped over all of a recording.
+/// Why a policy could not be stepped over the whole recording.
 #[derive(Debug, thiserror::Error)]
 pub enum SteppingError {
     /// A frame cannot be read.
@@ -22,43 +22,43 @@ pub enum SteppingError {
     /// A frame has no patch.
     #[error("frame {frame} holds nothing to focus on: {reason}")]
     NoPatch {
-        /// The frame, from 0.
+        /// Index of the frame, from 0.
         frame: usize,
-        /// Why.
+        /// Why no patch was found.
         reason: Arc<str>,
     },
-    /// The policy returned what is no focal power.
-    #[error("at frame {frame} the policy asked for {target}, which is no focal power from 0 to 1")]
+    /// The policy returned an invalid focal power.
+    #[error("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1")]
     InvalidTarget {
-        /// The frame, from 0.
+        /// Index of the frame, from 0.
         frame: usize,
-        /// What it asked for.
+        /// Value that the policy returned.
         target: f64,
     },
 }
 
-/// A policy's step on a frame. Focal power is normalised to 0..=1.
+/// A policy's step on one frame. Focal powers are normalised to 0..=1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
-    /// The frame, from 0.
+    /// Index of the frame, from 0.
     pub frame: usize,
-    /// The camera's number of the frame.
+    /// Number that the camera gave the frame.
     pub frame_number: u64,
-    /// End of the exposure, nanoseconds since the recording's start.
+    /// End of the exposure, in nanoseconds since the recording's start.
     pub time_ns: i64,
     /// Left column of the patch, in mosaic cells.
     pub patch_x: usize,
     /// Top row of the patch, in mosaic cells.
     pub patch_y: usize,
-    /// Focal power that the policy was told the frame was exposed at.
+    /// Focal power at the exposure, as given to the policy.
     pub focal_power: f64,
-    /// The policy's focus metric, if it has one.
+    /// Focus metric of the policy; none if it has none.
     pub metric: Option<f64>,
-    /// Focal power that the policy asks for after the frame.
+    /// Focal power that the policy requests after the frame.
     pub target: f64,
-    /// Focal power that was asked for when the recording was made.
+    /// Focal power that was requested after the frame when the recording was made.
     pub recorded_asked: f64,
-    /// Best focal power, where a simulation knew it.
+    /// Best focal power, if the recording is simulated; otherwise none.
     pub recorded_optimal: Option<f64>,
 }
 
@@ -76,7 +76,7 @@ pub struct Stepping<'a> {
 }
 
 impl<'a> Stepping<'a> {
-    /// `policy` before the first frame of `recording`, which was made with `calibration`.
+    /// Prepares `policy` for the first frame of `recording`, which was made with `calibration`.
     #[must_use]
     pub fn new(recording: &'a Recording, calibration: &Calibration, policy: Box<dyn Policy>) -> Self {
         let reconstructor = Reconstructor::new(calibration);
@@ -96,7 +96,7 @@ impl<'a> Stepping<'a> {
     fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, SteppingError> {
         let mosaic = self.recording.frame(frame)?;
 
-        // As often as the server looks for it; the first frame shows it already.
+        // Looks for the content area as often as the server does, beginning with the first frame.
         if (frame as u64).is_multiple_of(DETECT_EVERY) {
             self.reconstructor.reconstruct(&mosaic, &mut self.rgb, &mut self.gray);
             if let Some(news) = self.areas.see(content_area::detect(&self.gray)) {
@@ -128,8 +128,8 @@ impl<'a> Stepping<'a> {
         })
     }
 
-    /// Focal power at the middle of the frame's exposure; where the lens did not say, what it was asked for after the
-    /// frame before.
+    /// Focal power at the middle of the frame's exposure. If the lens did not report it, the focal power that was
+    /// requested after the previous frame.
     fn exposed_at(&self, frame: usize, row: FrameRow) -> FocalPower {
         let before = frame.checked_sub(1).map_or(row.asked, |before| self.recording.rows()[before].asked);
         let known = FocalPower::new(row.measured).or_else(|_| FocalPower::new(before));

@@ -1,5 +1,5 @@
-//! What is recorded while the server runs: mosaics when the operator asks for it, and what a protocol asks for, from a
-//! session's start to its end. A trial never waits for a recording, and goes on without one.
+//! Recordings made while the server runs: mosaics when the operator asks for them, and what a protocol asks for, from a
+//! session's start to its end. A trial never waits for a recording, and continues without one.
 
 mod parts;
 mod running;
@@ -24,11 +24,11 @@ use crate::recording::{Ended, Intake, compressed_size, room};
 use crate::trial::protocol::Record;
 use running::Running;
 
-/// How often to look whether a recording ended by itself.
+/// Interval at which we check whether a recording has ended by itself.
 const TICK: Duration = Duration::from_secs(1);
-/// How often a frame is compressed while nothing is recorded, to tell how long the disk would last.
+/// Interval at which a frame is compressed while nothing is recorded, to estimate how long the disk would last.
 const MEASURE: Duration = Duration::from_secs(10);
-/// How long that frame is waited for.
+/// Longest wait for that frame.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Records at most one thing at a time. Clone freely.
@@ -45,15 +45,16 @@ struct Shared {
 #[derive(Default)]
 struct State {
     active: Option<Active>,
-    /// The session whose recording was started last, so that one that ended early stays ended.
+    /// The session for which a recording was last started or attempted. A recording that ended early is not started
+    /// again.
     followed: Option<SessionId>,
-    /// What the operator is to know of the last recording.
+    /// Message to the operator about the last recording.
     notice: Option<Notice>,
-    /// Bytes of a frame, as measured last.
+    /// Compressed size of a frame in bytes, as measured last.
     frame_bytes: Option<u64>,
 }
 
-/// What became of a recording.
+/// How a recording ended, or why it did not start, for the operator.
 struct Notice {
     text: String,
     /// Whether something went wrong.
@@ -69,7 +70,7 @@ struct Active {
 }
 
 impl Recordings {
-    /// Nothing is recorded yet. Something has to await [`Recordings::run`] for protocols to be followed.
+    /// A recorder that records nothing yet. It follows protocols only while [`Recordings::run`] is awaited.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
         Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
@@ -99,7 +100,7 @@ impl Recordings {
     /// Begins to record mosaics.
     ///
     /// # Errors
-    /// When one is under way, the camera has no mosaics, or the disk has no room.
+    /// If a recording is already under way, the camera has no mosaics, or the disk has no room.
     pub async fn start(&self) -> Result<(), StartError> {
         let _pen = self.0.pen.lock().await;
         if self.0.state().active.is_some() {
@@ -114,7 +115,7 @@ impl Recordings {
         self.end().await;
     }
 
-    /// How things stand.
+    /// The state of recording, for the operator's page.
     #[must_use]
     pub fn status(&self) -> RecordingStatus {
         let parts = &self.0.parts;
@@ -153,7 +154,7 @@ impl Recordings {
         told
     }
 
-    /// Starts what the session under way is to have recorded, and ends it with the session.
+    /// Starts the recording that the session under way asks for, and ends it with the session.
     async fn follow(&self) {
         let wanted = self.0.parts.conductor.to_record();
         let followed = self.0.state().followed;
@@ -188,14 +189,14 @@ impl Recordings {
         }
     }
 
-    /// Begins to record; whoever calls holds the pen, and nothing is being recorded.
+    /// Begins to record. The caller must hold the pen, and no recording may be under way.
     async fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
         let shared = Arc::clone(&self.0);
         let stopped = |_| StartError::Failed("the server is ending".to_owned());
         spawn_blocking(move || shared.begin(what, session)).await.map_err(stopped)?
     }
 
-    /// Ends the recording under way, if one is; whoever calls holds the pen.
+    /// Ends the recording under way, if there is one. The caller must hold the pen.
     async fn end(&self) {
         let Some(active) = self.0.state().active.take() else { return };
         self.0.parts.tap.disconnect();
@@ -220,7 +221,7 @@ impl Recordings {
         self.0.state().notice = Some(Notice { text, warns });
     }
 
-    /// Compresses a frame, to know how many bytes one takes.
+    /// Compresses one frame to measure its size in bytes.
     async fn measure(&self) {
         if self.0.parts.size.is_none() {
             return;
@@ -228,7 +229,7 @@ impl Recordings {
 
         let (intake, frames) = Intake::new(1);
         {
-            // Under the pen, so that no recording starts between the look and the connection.
+            // Hold the pen, so that no recording starts between the check and the connection.
             let _pen = self.0.pen.lock().await;
             if self.0.state().active.is_none() {
                 self.0.parts.tap.connect(intake);
@@ -257,7 +258,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins to record; the session asked for it, if one is given.
+    /// Begins to record. `session` is the session whose protocol asked for it, if one did.
     fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
         let began = self.parts.clock.now();
         let Some(running) = starting::start(&self.parts, what, session, began)? else { return Ok(()) };
@@ -266,7 +267,7 @@ impl Shared {
         let mut state = self.state();
         state.notice = None;
         if let Running::Mosaic(recorder) = &running {
-            // While the state is held, so that a measurement does not take the tap away.
+            // Connect while the state is locked, so that a measurement does not disconnect the tap.
             self.parts.tap.connect(recorder.intake());
         }
         state.active = Some(Active { what: running, by_protocol: session.is_some(), began });

@@ -1,4 +1,4 @@
-//! What recordings are made of.
+//! The parts of the server that the recorder works with.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,26 +12,26 @@ use crate::control::{ControlStatus, Tap};
 use crate::imaging::Calibration;
 use crate::live::LiveHandle;
 
-/// What the recorder works with.
+/// The parts of the server that the recorder works with.
 pub struct Parts {
-    /// Both clocks.
+    /// Monotonic and wall clock.
     pub clock: Arc<dyn Clock>,
-    /// This start of the server.
+    /// Number of this run of the server.
     pub run: i64,
     /// Where frames leave the control loop.
     pub tap: Tap,
-    /// The loop's state.
+    /// Status of the control loop.
     pub status: watch::Receiver<Arc<ControlStatus>>,
-    /// The camera's settings, where it has any.
+    /// The camera's settings, if it has any.
     pub controls: Option<Controls>,
-    /// Pictures.
+    /// Source of the pictures that viewers get.
     pub live: LiveHandle,
-    /// The sessions.
+    /// Source of the sessions and of what their protocols ask to record.
     pub conductor: Conductor,
     /// Folder of the recordings.
     pub folder: PathBuf,
     /// The sensor's calibration.
     pub calibration: Calibration,
-    /// Width and height of the camera's mosaics, samples; none of a camera that delivers colour pictures.
+    /// Width and height of the camera's mosaics, samples; `None` for a camera that delivers colour pictures.
     pub size: Option<(usize, usize)>,
 }

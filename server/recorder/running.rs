@@ -6,7 +6,7 @@ use super::view::ViewRecorder;
 use crate::recording::{Progress, Recorder};
 use crate::trial::protocol::Record;
 
-/// What is being recorded.
+/// A recording under way, by what it records.
 pub enum Running {
     /// Mosaics.
     Mosaic(Recorder),
@@ -15,7 +15,7 @@ pub enum Running {
 }
 
 impl Running {
-    /// How far it has come.
+    /// Frames and bytes recorded so far, and how the recording ended if it has.
     pub fn progress(&self) -> Progress {
         match self {
             Self::Mosaic(recorder) => recorder.progress(),
@@ -23,7 +23,7 @@ impl Running {
         }
     }
 
-    /// Its folder.
+    /// Folder of the recording.
     pub fn folder(&self) -> &Path {
         match self {
             Self::Mosaic(recorder) => recorder.folder(),
@@ -31,7 +31,7 @@ impl Running {
         }
     }
 
-    /// Which of the two it is.
+    /// What is being recorded.
     pub const fn kind(&self) -> Record {
         match self {
             Self::Mosaic(_) => Record::Mosaic,
@@ -39,7 +39,7 @@ impl Running {
         }
     }
 
-    /// Stops, and says how it ended.
+    /// Stops the recording and returns its final progress.
     pub fn stop(self) -> Progress {
         match self {
             Self::Mosaic(recorder) => recorder.stop(),

@@ -1,4 +1,4 @@
-//! How a recording begins: its folder, and what it says of itself.
+//! Starts a recording: chooses its folder and writes its header.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub enum StartError {
     /// The camera has no mosaics.
     #[error("The camera delivers colour pictures. Only mosaics of a hyperspectral sensor can be recorded.")]
     NoMosaics,
-    /// One is under way.
+    /// A recording is already under way.
     #[error("A recording is under way already. Stop it first.")]
     UnderWay,
     /// The disk has no room.
@@ -33,7 +33,7 @@ pub enum StartError {
         .0.reserve as f64 / 1e9
     )]
     NoRoom(Room),
-    /// It cannot be written.
+    /// The recording cannot be written, for the reason given.
     #[error("The recording could not be started: {0}.")]
     Failed(String),
 }
@@ -44,10 +44,10 @@ impl From<RecordingError> for StartError {
     }
 }
 
-/// Begins to record; none where nothing is to be recorded.
+/// Begins to record; `None` if `what` is [`Record::None`].
 ///
 /// # Errors
-/// When the camera has no mosaics, the disk has no room, or it cannot be written.
+/// If the camera has no mosaics, the disk has no room, or the recording cannot be written.
 pub fn start(
     parts: &Parts,
     what: Record,
@@ -68,7 +68,7 @@ pub fn start(
     }
 }
 
-/// A name that no recording has: the session's, or the time.
+/// A folder that no recording has yet, named after the session or, without one, after the time.
 fn new_folder(parts: &Parts, session: Option<SessionId>) -> PathBuf {
     let name = session
         .map_or_else(|| parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(), |session| session.to_string());

@@ -1,14 +1,14 @@
-//! What the operator is told of recordings.
+//! The state of recording, as the operator sees it.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::trial::protocol::Record;
 
-/// How recording stands. Sizes depend on the picture alone, which the operator sees anyway.
+/// State of recording. Sizes depend only on the picture, which the operator sees anyway.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct RecordingStatus {
-    /// Why the operator cannot record, where it is so.
+    /// Why the operator cannot record; none if recording is possible.
     pub unavailable: Option<String>,
     /// What is being recorded, if anything.
     pub recording: Option<Record>,
@@ -24,16 +24,16 @@ pub struct RecordingStatus {
     pub lost: u64,
     /// Bytes recorded.
     pub bytes: u64,
-    /// Bytes a second, as measured; while nothing is recorded, what mosaics would take.
+    /// Bytes a second, as measured; while nothing is recorded, what recording mosaics would take.
     pub bytes_per_second: Option<f64>,
     /// Bytes free on the disk.
     pub free_bytes: Option<u64>,
-    /// Bytes of these that recordings leave free.
+    /// Of these, the bytes that recordings leave free.
     pub reserve_bytes: Option<u64>,
     /// Seconds after which a recording would stop by itself.
     pub seconds_left: Option<f64>,
-    /// What became of the last recording.
+    /// How the last recording ended, or why it did not start.
     pub notice: Option<String>,
-    /// Whether that is a warning: frames were lost, or a recording did not begin or ended by itself.
+    /// Whether `notice` is a warning: frames were lost, or a recording did not begin or ended by itself.
     pub notice_warns: bool,
 }

@@ -1,4 +1,4 @@
-//! Keeps the pictures that the surgeon's page gets, on a thread of its own: a slow disk misses pictures, as a slow
+//! Records the pictures that the surgeon's page gets, on a separate thread. A slow disk misses pictures, as a slow
 //! viewer does.
 
 use std::path::{Path, PathBuf};
@@ -22,10 +22,10 @@ pub struct ViewRecorder {
 }
 
 impl ViewRecorder {
-    /// Records what `follower` sees into `writer`. Times count from `start`.
+    /// Records the frames of `follower` into `writer`. Times count from `start`.
     ///
     /// # Errors
-    /// When the system has no thread left.
+    /// If the system cannot create a thread.
     pub fn start(writer: ViewWriter, follower: Follower, start: Moment) -> Result<Self, RecordingError> {
         let folder = writer.folder().to_owned();
         let progress = Arc::new(Mutex::new(Progress::default()));
@@ -42,17 +42,17 @@ impl ViewRecorder {
         Ok(Self { folder, progress, stop, thread: Some(thread) })
     }
 
-    /// Its folder.
+    /// Folder of the recording.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// How far it has come.
+    /// Frames and bytes recorded so far, and how the recording ended if it has.
     pub fn progress(&self) -> Progress {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Stops, and says how it ended.
+    /// Stops the recording and returns its final progress.
     pub fn stop(mut self) -> Progress {
         self.end();
         self.progress()

@@ -1,4 +1,4 @@
-//! Chunks of Zarr arrays, to bytes and back.
+//! Encodes chunks of Zarr arrays as bytes, and decodes them.
 
 use std::num::NonZeroU64;
 
@@ -10,8 +10,8 @@ use zarrs::metadata::v3::MetadataV3;
 
 use super::error::RecordingError;
 
-/// Codecs of a frame. LZ4 after sorting bits by their significance takes a third of the time of Zstandard and leaves
-/// a tenth more; the checksum names the frame that is damaged.
+/// Codecs of a frame. LZ4 after sorting bits by their significance takes a third of the time of Zstandard, and its
+/// output is a tenth larger. The checksum shows which frame is damaged.
 pub fn frame_codecs() -> Value {
     json!([
         {"name": "bytes", "configuration": {"endian": "little"}},
@@ -23,7 +23,7 @@ pub fn frame_codecs() -> Value {
     ])
 }
 
-/// Codecs of a shard's index, and of values that take up little room.
+/// Codecs of a shard's index, and of small arrays.
 pub fn plain_codecs() -> Value {
     json!([{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}])
 }
@@ -38,10 +38,10 @@ pub struct Coder {
 }
 
 impl Coder {
-    /// For chunks of `shape` (lengths of its dimensions, in elements), stored by `codecs`.
+    /// A coder for chunks of `shape` (lengths of its dimensions, in elements), stored by `codecs`.
     ///
     /// # Errors
-    /// When there is no such codec.
+    /// If a codec is unknown, or a dimension has no elements.
     pub fn new(data_type: DataType, fill: FillValue, shape: &[usize], codecs: Value) -> Result<Self, RecordingError> {
         let failed = |problem: String| RecordingError::Codec(problem);
         let metadata: Vec<MetadataV3> = serde_json::from_value(codecs).map_err(|error| failed(error.to_string()))?;
@@ -53,7 +53,7 @@ impl Coder {
         Ok(Self { chain, data_type, fill, shape, options })
     }
 
-    /// Coder of frames of `width` x `height` samples.
+    /// A coder for frames of `width` x `height` samples.
     ///
     /// # Errors
     /// As [`Coder::new`].
@@ -65,7 +65,7 @@ impl Coder {
     /// The stored form of a whole chunk.
     ///
     /// # Errors
-    /// When there are not as many elements as the chunk has.
+    /// If the number of elements is not that of a chunk.
     pub fn encode<T: Element>(&self, elements: &[T]) -> Result<Vec<u8>, RecordingError> {
         let bytes = T::to_array_bytes(&self.data_type, elements).map_err(|error| failed(&error))?;
         let encoded = self.chain.encode(bytes, &self.shape, &self.data_type, &self.fill, &self.options);
@@ -75,7 +75,7 @@ impl Coder {
     /// The elements of a stored chunk.
     ///
     /// # Errors
-    /// When it is damaged.
+    /// If it is damaged.
     pub fn decode<T: ElementOwned>(&self, stored: Vec<u8>) -> Result<Vec<T>, RecordingError> {
         let bytes = self.chain.decode(stored.into(), &self.shape, &self.data_type, &self.fill, &self.options);
         let bytes = bytes.map_err(|error| failed(&error))?;

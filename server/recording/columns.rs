@@ -1,4 +1,4 @@
-//! What stands beside each frame: one array a value, in files of [`COLUMN_CHUNK`] frames.
+//! The values beside each frame: one array per value, in files of [`COLUMN_CHUNK`] frames.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -11,7 +11,7 @@ use super::codec::{Coder, plain_codecs};
 use super::error::{Damage, RecordingError};
 use super::layout::{COLUMN_CHUNK, Column};
 
-/// What is known of a frame beside its mosaic.
+/// What is known about a frame besides its mosaic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameRow {
     /// End of the exposure, nanoseconds since the recording's start.
@@ -20,11 +20,11 @@ pub struct FrameRow {
     pub number: u64,
     /// Length of the exposure, milliseconds.
     pub exposure: f64,
-    /// Focal power asked for after the frame.
+    /// Focal power asked of the lens after the frame.
     pub asked: f64,
     /// Focal power at the middle of the exposure; NaN while unknown.
     pub measured: f64,
-    /// Best focal power, where a simulation knows it; else NaN.
+    /// Best focal power; NaN unless a simulation knows it.
     pub optimal: f64,
 }
 
@@ -36,10 +36,10 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// For files of [`COLUMN_CHUNK`] values.
+    /// A coder for files of [`COLUMN_CHUNK`] values.
     ///
     /// # Errors
-    /// When the codecs do not work.
+    /// If the codecs do not work.
     pub fn new() -> Result<Self, RecordingError> {
         let shape = [COLUMN_CHUNK];
         Ok(Self {
@@ -49,10 +49,10 @@ impl Columns {
         })
     }
 
-    /// The file of `column` with the values of `rows`, of which at most [`COLUMN_CHUNK`] fit.
+    /// The file of `column` with the values of `rows`. At most [`COLUMN_CHUNK`] rows fit; more are left out.
     ///
     /// # Errors
-    /// When there are more.
+    /// If the codec fails.
     pub fn encode(&self, column: Column, rows: &[FrameRow]) -> Result<Vec<u8>, RecordingError> {
         match column {
             Column::Time => padded(&self.time, rows.iter().map(|row| row.time), 0),
@@ -67,7 +67,7 @@ impl Columns {
     /// The rows of the first `frames` frames in `folder`.
     ///
     /// # Errors
-    /// When a file cannot be read, or is missing or damaged.
+    /// If a file cannot be read, or is missing or damaged.
     pub fn read(&self, folder: &Path, frames: usize) -> Result<Vec<FrameRow>, RecordingError> {
         let time: Vec<i64> = column(&self.time, folder, Column::Time, frames)?;
         let number: Vec<u64> = column(&self.number, folder, Column::Number, frames)?;

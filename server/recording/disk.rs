@@ -4,10 +4,10 @@ use std::path::Path;
 
 /// The reserve of a large disk, bytes.
 const RESERVE: u64 = 1 << 30;
-/// The reserve of a small disk: one part in so many.
+/// The reserve of a small disk is one part in this many of its size.
 const PART: u64 = 20;
 
-/// A disk's room, bytes.
+/// The space on a disk, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
     /// What this program may still write.
@@ -27,7 +27,7 @@ impl Room {
 /// The room on the disk that holds `path`, or its nearest folder above that exists.
 ///
 /// # Errors
-/// When the system does not tell.
+/// If the system does not report it.
 pub fn room(path: &Path) -> std::io::Result<Room> {
     let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
     let told = rustix::fs::statvfs(there)?;

@@ -8,13 +8,13 @@ use super::header::{FORMAT, VERSION};
 /// Why a recording cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The folder is there already.
+    /// The folder already exists.
     #[error("{} exists; choose a new folder for the recording", .0.display())]
     Exists(PathBuf),
     /// There is no recording there.
     #[error("{} is not a recording: it has no zarr.json of the format {FORMAT}", .0.display())]
     NoRecording(PathBuf),
-    /// It holds the view, where mosaics are needed.
+    /// It is a recording of the view, but mosaics are needed.
     #[error(
         "{} holds pictures of the view and no mosaics; `parfocal recording info` reads it, \
          and `ffmpeg -f mjpeg -i {}/view.mjpeg` makes a video of it",
@@ -22,7 +22,7 @@ pub enum RecordingError {
         .0.display()
     )]
     View(PathBuf),
-    /// It was made by another version of the format.
+    /// It has another version of the format.
     #[error(
         "{} is a recording of format version {found}, but this parfocal reads version {VERSION}; \
          use the parfocal that made it",
@@ -31,7 +31,7 @@ pub enum RecordingError {
     OtherVersion {
         /// The recording's folder.
         path: PathBuf,
-        /// Its version.
+        /// Its version of the format.
         found: u64,
     },
     /// The description is invalid.
@@ -47,7 +47,7 @@ pub enum RecordingError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         error: io::Error,
     },
     /// A file is damaged.
@@ -55,7 +55,7 @@ pub enum RecordingError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with it.
         damage: Damage,
     },
     /// There is no such frame.
@@ -63,9 +63,9 @@ pub enum RecordingError {
     NoFrame {
         /// The recording's folder.
         path: PathBuf,
-        /// Its frames.
+        /// Number of its frames.
         frames: usize,
-        /// The frame asked for.
+        /// The frame that was asked for, from 0.
         asked: usize,
     },
     /// The disk is full.
@@ -73,7 +73,7 @@ pub enum RecordingError {
     Full {
         /// The recording's folder.
         path: PathBuf,
-        /// Frames that are stored.
+        /// Number of frames that are stored.
         kept: usize,
     },
     /// A file cannot be written.
@@ -81,9 +81,9 @@ pub enum RecordingError {
     Unwritable {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         error: io::Error,
-        /// Frames that are stored.
+        /// Number of frames that are stored.
         kept: usize,
     },
     /// A frame has another size than the recording.
@@ -91,16 +91,16 @@ pub enum RecordingError {
     OtherSize {
         /// Width and height of the recording's mosaics, samples.
         of: (usize, usize),
-        /// Those of the frame.
+        /// Width and height of the new frame, samples.
         found: (usize, usize),
     },
-    /// The codecs do not work: an error of the program.
+    /// A codec failed, which is an error of the program.
     #[error("the recording's codec failed: {0}")]
     Codec(String),
 }
 
 impl RecordingError {
-    /// `error` in writing `path`, after `kept` frames were stored.
+    /// The error for `path` that could not be written, after `kept` frames were stored.
     #[must_use]
     pub fn unwritable(path: &Path, kept: usize, error: io::Error) -> Self {
         let path = path.to_owned();
@@ -110,22 +110,22 @@ impl RecordingError {
         }
     }
 
-    /// `error` in reading `path`.
+    /// Turns a system's error into the one for `path` that could not be read.
     pub fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |error| Self::Unreadable { path, error }
     }
 
-    /// The description in `path` is invalid.
+    /// The error for an invalid description in `path`.
     pub fn nonsense(path: &Path, reason: impl std::fmt::Display) -> Self {
         Self::Nonsense { path: path.to_owned(), reason: reason.to_string() }
     }
 }
 
-/// What is wrong with a file of a recording, and which frames that concerns. Frames count from 0.
+/// What is wrong with a file of a recording, and which frames are affected. Frames count from 0.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Damage {
-    /// The file of a shard is gone.
+    /// The file of a shard is missing.
     #[error("the file is missing, so frames {first} to {last} are lost")]
     NoShard {
         /// First frame of the shard.
@@ -150,7 +150,7 @@ pub enum Damage {
     /// A picture of the view is cut off, or is not a JPEG picture.
     #[error("picture {0} is cut off, or is not a JPEG picture")]
     Picture(usize),
-    /// Values that stand beside the frames do not match their checksum.
+    /// Values beside the frames are missing or do not match their checksum; holds the column's name.
     #[error("the values of `{0}` are missing or do not match their checksum")]
     Column(&'static str),
 }

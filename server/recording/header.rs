@@ -1,4 +1,4 @@
-//! What a recording says of itself: the attributes of its Zarr group.
+//! A recording's description of itself: the attributes of its Zarr group.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct Header {
     pub version: u64,
     /// The program that made it, and its version.
     pub software: String,
-    /// Time of the wall's clock (UTC) from which `time` counts.
+    /// Wall-clock time (UTC) from which `time` counts.
     pub started: Timestamp,
     /// Name of the camera, for people.
     pub camera: String,
@@ -31,12 +31,12 @@ pub struct Header {
     pub simulated: bool,
     /// Name and version of the sensor's calibration, which lies in the folder `calibration`.
     pub calibration: String,
-    /// The camera's settings when the recording began, by name, where it has any: `exposure` in microseconds, `gain`,
-    /// `frame-rate` a second.
+    /// The camera's settings when the recording began, by name, if it has any: `exposure` in microseconds, `gain`,
+    /// `frame-rate` in frames per second.
     pub camera_settings: BTreeMap<String, f64>,
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
-    /// The start of the server that recorded it, as exports count them; none of a recording made without a server.
+    /// Number of the server's start that recorded it, as in exports; `None` if it was made without a server.
     #[serde(default)]
     pub run: Option<i64>,
     /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
@@ -44,7 +44,7 @@ pub struct Header {
     pub monotonic_ns: Option<i64>,
     /// Frames that the camera delivered but the recorder was too slow for.
     pub frames_lost: u64,
-    /// How it ended; none while it is under way, and where it was cut short.
+    /// How it ended; `None` while it is under way, or if it was cut short.
     pub ended: Option<Ended>,
 }
 
@@ -52,11 +52,11 @@ pub struct Header {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "why", content = "problem", rename_all = "kebab-case")]
 pub enum Ended {
-    /// As it was meant to.
+    /// It was stopped, as intended.
     Stopped,
     /// The disk's reserve was reached.
     DiskNearlyFull,
-    /// Something failed, in words.
+    /// Something failed; holds the problem in words.
     Failed(String),
 }
 

@@ -16,7 +16,7 @@ pub const MOSAIC: &str = "mosaic";
 /// The file that describes an array or group.
 pub const DESCRIPTION: &str = "zarr.json";
 
-/// A value that stands beside each frame.
+/// A value that is stored beside each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
     /// End of the exposure, nanoseconds since the recording's start.
@@ -25,7 +25,7 @@ pub enum Column {
     Number,
     /// Length of the exposure, milliseconds.
     Exposure,
-    /// Focal power asked for after the frame.
+    /// Focal power asked of the lens after the frame.
     Asked,
     /// Focal power at the middle of the exposure.
     Measured,
@@ -34,7 +34,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// All of them.
+    /// All columns.
     pub const ALL: [Self; 6] = [Self::Time, Self::Number, Self::Exposure, Self::Asked, Self::Measured, Self::Optimal];
 
     /// The array's name.
@@ -64,7 +64,7 @@ impl Column {
                 "units": format!("nanoseconds since {}", header.started.strftime("%Y-%m-%dT%H:%M:%S.%f")),
                 "calendar": "proleptic_gregorian",
             }),
-            Self::Number => json!({"long_name": "the camera's number of the frame; a gap is a frame that is not here"}),
+            Self::Number => json!({"long_name": "the camera's number of the frame; a gap is a missing frame"}),
             Self::Exposure => json!({"long_name": "exposure time", "units": "ms"}),
             Self::Asked => json!({"long_name": "focal power asked of the lens after the frame", "units": "1"}),
             Self::Measured => {
@@ -77,7 +77,7 @@ impl Column {
     }
 }
 
-/// An array's `zarr.json`.
+/// What an array's `zarr.json` says.
 struct Array<'a> {
     shape: &'a [usize],
     chunk: &'a [usize],
@@ -137,25 +137,25 @@ pub fn growing(header: &Header, (width, height): (usize, usize), frames: usize) 
     arrays
 }
 
-/// An array of one value a band, in the order of wavelengths.
+/// An array of one value per band, in the order of wavelengths.
 pub struct BandArray {
-    /// Its name.
+    /// Name of the array.
     pub name: &'static str,
-    /// Its values.
+    /// One value per band.
     pub values: BandValues,
     attributes: Value,
 }
 
-/// One value a band.
+/// The values of a [`BandArray`], one per band.
 pub enum BandValues {
-    /// Lengths.
+    /// Wavelengths or widths in nm.
     Nanometres(Vec<f64>),
-    /// Places in a mosaic cell.
+    /// Rows or columns in a mosaic cell, from 0.
     Places(Vec<i64>),
 }
 
 impl BandArray {
-    /// Its `zarr.json`.
+    /// The array's `zarr.json`.
     pub fn description(&self) -> Value {
         let data_type = match self.values {
             BandValues::Nanometres(_) => "float64",
@@ -173,7 +173,7 @@ impl BandArray {
     }
 }
 
-/// The bands of `calibration` in order of wavelength: band numbers as in its mosaic cell.
+/// The numbers of `calibration`'s bands (as in its mosaic cell), in the order of wavelengths.
 #[must_use]
 pub fn by_wavelength(calibration: &Calibration) -> Vec<usize> {
     let mut order: Vec<usize> = (0..calibration.bands.len()).collect();
@@ -181,7 +181,7 @@ pub fn by_wavelength(calibration: &Calibration) -> Vec<usize> {
     order
 }
 
-/// What is told of the bands.
+/// The arrays that describe the bands: wavelength, width, and row and column in the cell.
 pub fn band_arrays(calibration: &Calibration) -> Vec<BandArray> {
     let order = by_wavelength(calibration);
     let lengths =
@@ -203,15 +203,15 @@ pub fn band_arrays(calibration: &Calibration) -> Vec<BandArray> {
     ]
 }
 
-/// The group's `zarr.json`, which holds the descriptions of all arrays too: replaced as one file, it makes all of them
+/// The group's `zarr.json`. It also holds the descriptions of all arrays, so replacing this one file makes all of them
 /// longer at once.
 ///
 /// # Errors
-/// When the header cannot be put into JSON, which is an error of the program.
+/// If the header cannot be put into JSON, which would be an error of the program.
 pub fn group(header: &Header, arrays: &Map<String, Value>) -> Result<Value, RecordingError> {
     let mut attributes = serde_json::to_value(header).map_err(|error| RecordingError::Codec(error.to_string()))?;
 
-    // Where xarray looks for the names of coordinates.
+    // Here xarray looks for the names of coordinates.
     let beside = Column::ALL.map(Column::name).into_iter().chain(["fwhm", "cell_row", "cell_column"]);
     attributes["coordinates"] = beside.collect::<Vec<_>>().join(" ").into();
 

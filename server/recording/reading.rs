@@ -16,12 +16,12 @@ use super::shard::Index;
 use super::view;
 use crate::imaging::{CELL, MosaicFrame};
 
-/// Largest side of a mosaic that is believed, samples.
+/// Longest side of a mosaic that a description may give, samples.
 const LARGEST_SIDE: u64 = 1 << 14;
-/// Most frames that are believed: 46 days at 25 a second.
+/// Most frames that a description may give: 46 days at 25 a second.
 const MOST_FRAMES: u64 = 100_000_000;
 
-/// A recording's description and what stands beside its frames; the frames stay on disk.
+/// A recording's description and the values beside its frames. The frames stay on disk.
 pub struct Recording {
     folder: PathBuf,
     header: Header,
@@ -35,7 +35,7 @@ impl Recording {
     /// Opens the recording in `folder`, whether it was ended or cut short.
     ///
     /// # Errors
-    /// When there is none, it is of another version, or its description is invalid or damaged.
+    /// If there is none, it has another version, or its description is invalid or damaged.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let path = folder.join(DESCRIPTION);
         let text = fs::read(&path).map_err(|error| match error.kind() {
@@ -88,13 +88,13 @@ impl Recording {
         self.size
     }
 
-    /// What stands beside each frame.
+    /// The values beside each frame: time, number, exposure and focal powers.
     #[must_use]
     pub fn rows(&self) -> &[FrameRow] {
         &self.rows
     }
 
-    /// Frames that the camera numbered between the first and the last, but that are not here.
+    /// Number of frames that are missing between the first and the last, by the camera's numbers.
     #[must_use]
     pub fn missing(&self) -> u64 {
         let numbered = match (self.rows.first(), self.rows.last()) {
@@ -104,7 +104,7 @@ impl Recording {
         numbered.saturating_sub(self.rows.len() as u64)
     }
 
-    /// Frames a second from the first to the last; none of fewer than two.
+    /// Frames per second from the first to the last; `None` for fewer than two frames.
     #[must_use]
     pub fn rate(&self) -> Option<f64> {
         let seconds = self.seconds();
@@ -120,7 +120,7 @@ impl Recording {
         }
     }
 
-    /// Bytes of its frames on disk; what cannot be read counts as nothing.
+    /// Bytes of its frames on disk. Files that cannot be read count as 0.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let shards = 0..self.rows.len().div_ceil(SHARD_FRAMES);
@@ -130,7 +130,7 @@ impl Recording {
     /// The mosaic of frame `number`, from 0.
     ///
     /// # Errors
-    /// When there is no such frame, or its file cannot be read or is damaged.
+    /// If there is no such frame, or its file cannot be read or is damaged.
     pub fn frame(&self, number: usize) -> Result<MosaicFrame, RecordingError> {
         if number >= self.rows.len() {
             let frames = self.rows.len();
@@ -160,7 +160,8 @@ impl Recording {
         MosaicFrame::new(self.size.0, self.size.1, samples).map_err(|_| damaged(Damage::Frame(number)))
     }
 
-    /// Reads every frame; what is wrong with each that cannot be read. Damage of a whole file is told once.
+    /// Reads every frame, and returns what is wrong with those that cannot be read. Damage of a whole file is reported
+    /// once.
     #[must_use]
     pub fn check(&self) -> Vec<String> {
         let problem = |number| self.frame(number).err().map(|error: RecordingError| error.to_string());
@@ -174,17 +175,19 @@ impl Recording {
     }
 }
 
-/// Frames, width and height of the mosaics that a group's description tells of.
+/// Number, width and height of the mosaics in a group's description.
 fn extent(described: &Value) -> Result<(usize, (usize, usize)), String> {
     let arrays = &described["consolidated_metadata"]["metadata"];
     let mosaic = &arrays[MOSAIC];
     let shape: Vec<u64> =
         serde_json::from_value(mosaic["shape"].clone()).map_err(|_| "it has no mosaics".to_owned())?;
-    let &[frames, height, width] = shape.as_slice() else { return Err("its mosaics have no three dimensions".into()) };
+    let &[frames, height, width] = shape.as_slice() else {
+        return Err("its mosaics do not have three dimensions".into());
+    };
 
     let side = |length: u64| (1..=LARGEST_SIDE).contains(&length) && length.is_multiple_of(CELL as u64);
     if !side(width) || !side(height) || frames > MOST_FRAMES {
-        return Err(format!("{frames} mosaics of {width}x{height} samples are not possible"));
+        return Err(format!("it claims {frames} mosaics of {width}x{height} samples, which is not possible"));
     }
 
     let chunk = serde_json::json!([SHARD_FRAMES, height, width]);

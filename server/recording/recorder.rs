@@ -1,4 +1,4 @@
-//! Records while frames come: one thread compresses, another writes. Whoever offers a frame never waits.
+//! Records while frames come: one thread compresses, another writes. Offering a frame never waits.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -19,27 +19,27 @@ use crate::imaging::MosaicFrame;
 use crate::lens::FocalPower;
 use crate::priority;
 
-/// Frames that may wait to be compressed: a third of a second at 25 a second. The camera uses their memory again.
+/// Frames that may wait to be compressed: a third of a second at 25 a second. The camera reuses their memory.
 const WAITING: usize = 8;
 /// Compressed frames that may wait for the disk: more than a second at 25 a second.
 const COMPRESSED: usize = 32;
-/// How often a thread without frames looks whether to end.
+/// How often a thread without frames checks whether to end.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// A frame to record, and what is known of it.
+/// A frame to record, and what is known about it.
 #[derive(Debug, Clone)]
 pub struct Shot {
-    /// The camera's number of it.
+    /// The camera's number of the frame.
     pub number: u64,
     /// End of its exposure.
     pub exposed_at: Moment,
     /// Length of its exposure.
     pub exposure: Duration,
-    /// Focal power asked for after it.
+    /// Focal power asked of the lens after the frame.
     pub asked: FocalPower,
     /// Focal power at the middle of its exposure, if known.
     pub measured: Option<FocalPower>,
-    /// Best focal power, where a simulation knows it.
+    /// Best focal power; `None` unless a simulation knows it.
     pub optimal: Option<FocalPower>,
     /// Its samples.
     pub mosaic: Arc<MosaicFrame>,
@@ -67,7 +67,7 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// An intake that holds up to `capacity` frames, and where they come out.
+    /// An intake that holds up to `capacity` frames, and the receiver that gets them.
     #[must_use]
     pub fn new(capacity: usize) -> (Arc<Self>, Receiver<Shot>) {
         let (frames, taken) = sync_channel(capacity);
@@ -105,10 +105,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Records into `writer` what is offered to [`Recorder::intake`]. Times count from `start`.
+    /// Starts to record into `writer` the frames that are offered to [`Recorder::intake`]. Times count from `start`.
     ///
     /// # Errors
-    /// When the codecs do not work, or the system has no thread left.
+    /// If the codecs do not work, or the system has no thread left.
     pub fn start(writer: Writer, start: Moment) -> Result<Self, RecordingError> {
         let folder = writer.folder().to_owned();
         let no_thread = |error: io::Error| RecordingError::unwritable(&folder, 0, error);
@@ -154,7 +154,7 @@ impl Recorder {
         progress
     }
 
-    /// Stops, stores what was offered before, and says how it ended.
+    /// Stops, stores the frames that were offered before, and returns how the recording ended.
     #[must_use]
     pub fn stop(mut self) -> Progress {
         self.end();
@@ -165,7 +165,7 @@ impl Recorder {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
             if thread.join().is_err() {
-                tracing::error!("a thread that recorded ended by a panic");
+                tracing::error!("a recording thread panicked");
             }
         }
     }
@@ -243,7 +243,7 @@ impl Storer {
         let finished = writer.finish(ended.clone());
 
         let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
-        // A shard that could not be written took the frames with it that waited for it.
+        // If a shard could not be written, the frames that waited for it are lost.
         progress.frames = writer.stored() as u64;
         progress.ended = Some(match (ended, finished) {
             (Ended::Stopped, Err(error)) => Ended::Failed(error.to_string()),
@@ -251,11 +251,11 @@ impl Storer {
         });
     }
 
-    /// Stores a frame; returns why this was the last, if it was.
+    /// Stores a frame. Returns why the recording ends, if it does.
     fn store(&mut self, row: FrameRow, frame: Vec<u8>) -> Option<Ended> {
         let bytes = frame.len() as u64;
 
-        // A disk that does not tell its room is written to until it is full.
+        // If the space on the disk is unknown, frames are written until it is full.
         let room = room(self.writer.folder()).map_or(u64::MAX, Room::spare);
         if self.writer.waiting_bytes() + bytes > room {
             return Some(Ended::DiskNearlyFull);
@@ -276,7 +276,7 @@ impl Storer {
 /// Bytes that `mosaic` takes in a recording.
 ///
 /// # Errors
-/// When the codecs do not work.
+/// If the codecs do not work.
 pub fn compressed_size(mosaic: &MosaicFrame) -> Result<usize, RecordingError> {
     Coder::of_frames(mosaic.width(), mosaic.height())?.encode(mosaic.samples()).map(|stored| stored.len())
 }

@@ -57,7 +57,7 @@ impl AnyRecording {
     /// Opens the recording in `folder`, whichever kind it is.
     ///
     /// # Errors
-    /// When there is none, it is of another version, or its description is invalid or damaged.
+    /// If there is none, it has another version, or its description is invalid or damaged.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         match Recording::open(folder) {
             Err(RecordingError::View(_)) => ViewRecording::open(folder).map(Box::new).map(Self::View),
@@ -83,7 +83,7 @@ impl AnyRecording {
         }
     }
 
-    /// Time of the wall's clock from which the frames' times count.
+    /// Wall-clock time from which the frames' times count.
     #[must_use]
     pub const fn started(&self) -> Timestamp {
         match self {
@@ -92,8 +92,8 @@ impl AnyRecording {
         }
     }
 
-    /// The start of the server that recorded it and the monotonic clock at [`AnyRecording::started`], nanoseconds;
-    /// none of recordings of earlier versions, and of those made without a server.
+    /// The number of the server's start that recorded it, and the monotonic clock at [`AnyRecording::started`],
+    /// nanoseconds. `None` for recordings of earlier versions, and for those made without a server.
     #[must_use]
     pub fn clock(&self) -> Option<(i64, i64)> {
         match self {
@@ -111,7 +111,7 @@ impl AnyRecording {
         }
     }
 
-    /// Frames that the recorder was too slow for; none where that is not counted.
+    /// Frames that the recorder was too slow for; `None` if they are not counted.
     #[must_use]
     pub const fn lost(&self) -> Option<u64> {
         match self {
@@ -120,7 +120,7 @@ impl AnyRecording {
         }
     }
 
-    /// How it ended; none while it is under way, and where it was cut short.
+    /// How it ended; `None` while it is under way, or if it was cut short.
     #[must_use]
     pub const fn ended(&self) -> Option<&Ended> {
         match self {
@@ -132,7 +132,7 @@ impl AnyRecording {
     /// SHA-256, hexadecimal, of the file that describes it: `zarr.json` or `view.json`.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If it cannot be read.
     pub fn description_sha256(&self) -> Result<String, RecordingError> {
         let path = self.folder().join(self.kind().description());
         let content = fs::read(&path).map_err(RecordingError::unreadable(&path))?;
@@ -140,14 +140,14 @@ impl AnyRecording {
     }
 }
 
-/// A session's recording that was found: its name, and itself if it could be opened.
+/// A recording found for a session: its name, and the recording if it could be opened.
 pub type Found = (String, Result<AnyRecording, RecordingError>);
 
-/// The recordings of `session` in the folder `recordings`, by name. A recording belongs to a session if it says so, or
-/// has the session's name. Where the folder is not there, there are none.
+/// The recordings of `session` in the folder `recordings`, by name. A recording belongs to a session if its description
+/// says so, or if it is named after the session. Empty if the folder does not exist.
 ///
 /// # Errors
-/// When the folder cannot be read.
+/// If the folder cannot be read.
 pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<Found>, RecordingError> {
     let entries = match fs::read_dir(recordings) {
         Ok(entries) => entries,
@@ -170,8 +170,8 @@ pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<Found>, Record
     Ok(names.into_iter().filter_map(open).collect())
 }
 
-/// The folder of recording `name` in `recordings`, if it belongs to `session`. `name` may come from anywhere: what is
-/// not the name of a folder there has no folder.
+/// The folder of recording `name` in `recordings`, if it belongs to `session`. `name` may be any text: the result is
+/// `None` if it is not the name of a folder directly in `recordings`.
 #[must_use]
 pub fn belonging(recordings: &Path, name: &str, session: &str) -> Option<PathBuf> {
     let mut parts = Path::new(name).components();
@@ -185,7 +185,7 @@ pub fn belonging(recordings: &Path, name: &str, session: &str) -> Option<PathBuf
     belongs.then_some(folder)
 }
 
-/// Whether `name` is `session`, or that and a number after a dash.
+/// Whether `name` is `session`, or `session` followed by a dash and a number.
 fn is_named_after(name: &str, session: &str) -> bool {
     let number = |rest: &str| rest.strip_prefix('-').is_some_and(|number| number.parse::<u32>().is_ok());
     name.strip_prefix(session).is_some_and(|rest| rest.is_empty() || number(rest))

@@ -1,6 +1,6 @@
 //! Shards: files that hold the frames of one stretch of time, each compressed by itself, and an index at their end
-//! (codec `sharding_indexed` of Zarr v3). Written here, because frames are compressed as they come and a shard is
-//! stored whole.
+//! (codec `sharding_indexed` of Zarr v3). We write them ourselves, because frames are compressed as they come and a
+//! shard is stored whole.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -19,17 +19,17 @@ const CHECKSUM: usize = 4;
 /// Offset and length of a frame in its shard, bytes.
 pub type Place = (u64, u64);
 
-/// Reads and writes the index of shards of so many frames.
+/// Encodes and reads the index of shards with a given number of frames.
 pub struct Index {
     coder: Coder,
     frames: usize,
 }
 
 impl Index {
-    /// For shards of `frames` frames.
+    /// An index for shards of `frames` frames.
     ///
     /// # Errors
-    /// When the codecs do not work.
+    /// If the codecs do not work.
     pub fn new(frames: usize) -> Result<Self, RecordingError> {
         let coder = Coder::new(uint64(), FillValue::from(ABSENT), &[frames, 1, 1, 2], plain_codecs())?;
         Ok(Self { coder, frames })
@@ -38,7 +38,7 @@ impl Index {
     /// The index of a shard that begins with these frames, given their stored lengths.
     ///
     /// # Errors
-    /// When there are more than fit.
+    /// If there are more than `frames` of them.
     pub fn encode(&self, lengths: &[usize]) -> Result<Vec<u8>, RecordingError> {
         let mut places = Vec::with_capacity(2 * self.frames);
         let mut offset = 0;
@@ -51,11 +51,11 @@ impl Index {
         self.coder.encode(&places)
     }
 
-    /// Offset and length of each frame in a shard; none for those that it lacks. `None` where the index is cut off or
-    /// damaged.
+    /// Offset and length of each frame in a shard, with `None` for each that it lacks. `None` for the whole shard if
+    /// its index is cut off or damaged.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// If the file cannot be read.
     pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<Place>>>> {
         let length = 16 * self.frames + CHECKSUM;
         let whole = shard.metadata()?.len();
@@ -77,7 +77,7 @@ impl Index {
 /// Writes a shard: its frames, then its index.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If it cannot be written.
 pub fn write(out: &mut dyn Write, frames: &[Vec<u8>], index: &[u8]) -> io::Result<()> {
     for frame in frames {
         out.write_all(frame)?;

@@ -17,12 +17,12 @@ use crate::files::replace;
 pub const VIEW_FORMAT: &str = "parfocal-view";
 /// The pictures, one after another: what `ffmpeg -f mjpeg` reads.
 pub const PICTURES: &str = "view.mjpeg";
-/// A line for each picture.
+/// The index: a line for each picture.
 pub const INDEX: &str = "view.csv";
-/// How it was made.
+/// The description: how the recording was made.
 pub const HEADER: &str = "view.json";
-/// First line of the index. Width and height came later: they stand at the end, so that programs that count columns go
-/// on reading it.
+/// First line of the index. Width and height were added later. They are at the end, so that programs that count columns
+/// can still read the file.
 const COLUMNS: &str = "frame_number,time_ns,offset,length,width,height\n";
 /// Value of [`ViewHeader::version`].
 pub const VIEW_VERSION: u64 = 1;
@@ -36,23 +36,23 @@ pub struct ViewHeader {
     pub version: u64,
     /// The program that made it, and its version.
     pub software: String,
-    /// Time of the wall's clock (UTC) from which `time_ns` counts.
+    /// Wall-clock time (UTC) from which `time_ns` counts.
     pub started: Timestamp,
     /// Name of the camera, for people.
     pub camera: String,
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
-    /// The start of the server that recorded it, as exports count them.
+    /// Number of the server's start that recorded it, as in exports.
     #[serde(default)]
     pub run: Option<i64>,
     /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
     #[serde(default)]
     pub monotonic_ns: Option<i64>,
-    /// How it ended; none while it is under way, and where it was cut short.
+    /// How it ended; `None` while it is under way, or if it was cut short.
     pub ended: Option<Ended>,
 }
 
-/// A recording of the view under way. It holds nothing that tells policies apart.
+/// A recording of the view under way. Nothing in it tells policies apart.
 pub struct ViewWriter {
     folder: PathBuf,
     header: ViewHeader,
@@ -63,10 +63,10 @@ pub struct ViewWriter {
 }
 
 impl ViewWriter {
-    /// Begins one in `folder`, which must not exist.
+    /// Begins a recording in `folder`, which must not exist.
     ///
     /// # Errors
-    /// When the folder exists or cannot be written.
+    /// If the folder exists or cannot be written.
     pub fn create(folder: &Path, header: ViewHeader) -> Result<Self, RecordingError> {
         make_folder(folder)?;
         let failed = |error| RecordingError::unwritable(folder, 0, error);
@@ -89,7 +89,7 @@ impl ViewWriter {
     /// nanoseconds after the start.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn add(
         &mut self,
         number: u64,
@@ -97,7 +97,7 @@ impl ViewWriter {
         (width, height): (usize, usize),
         jpeg: &[u8],
     ) -> Result<(), RecordingError> {
-        // The picture first: a line in the index stands for a picture that is there.
+        // The picture is written first, so that every line of the index has its picture.
         let line = format!("{number},{time},{},{},{width},{height}\n", self.bytes, jpeg.len());
         let written = self.pictures.write_all(jpeg).and_then(|()| self.index.write_all(line.as_bytes()));
         written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, error))?;
@@ -107,10 +107,10 @@ impl ViewWriter {
         Ok(())
     }
 
-    /// Notes how it ended, and waits until the disk has it.
+    /// Notes how the recording ended, and waits until everything is on disk.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn finish(mut self, ended: Ended) -> Result<(), RecordingError> {
         self.header.ended = Some(ended);
         let synced = self.pictures.sync_data().and_then(|()| self.index.sync_data());

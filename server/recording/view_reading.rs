@@ -13,7 +13,7 @@ use super::view::{HEADER, INDEX, PICTURES, VIEW_FORMAT, VIEW_VERSION, ViewHeader
 const JPEG_BEGINS: [u8; 2] = [0xFF, 0xD8];
 const JPEG_ENDS: [u8; 2] = [0xFF, 0xD9];
 
-/// A picture of the view, and where it lies in the file of pictures.
+/// A picture of the view, and its place in the file of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 pub struct ViewRow {
     /// The camera's number of the frame.
@@ -22,14 +22,14 @@ pub struct ViewRow {
     /// End of the exposure, nanoseconds since the recording's start.
     #[serde(rename = "time_ns")]
     pub time: u64,
-    /// Its first byte.
+    /// Offset of its first byte in that file.
     pub offset: u64,
-    /// Its bytes.
+    /// Its length in bytes.
     pub length: u64,
-    /// Its width in pixels; none in recordings of earlier versions.
+    /// Its width in pixels; `None` in recordings of earlier versions.
     #[serde(default)]
     pub width: Option<u32>,
-    /// Its height in pixels; none in recordings of earlier versions.
+    /// Its height in pixels; `None` in recordings of earlier versions.
     #[serde(default)]
     pub height: Option<u32>,
 }
@@ -45,7 +45,7 @@ impl ViewRecording {
     /// Opens the recording in `folder`.
     ///
     /// # Errors
-    /// When there is none, it is of another version, or its description or index is invalid.
+    /// If there is none, it has another version, or its description or index is invalid.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let path = folder.join(HEADER);
         let text = fs::read(&path).map_err(|error| match error.kind() {
@@ -83,7 +83,8 @@ impl ViewRecording {
         &self.rows
     }
 
-    /// Bytes of its pictures, as its index says. Any row but the last may be damaged and say anything.
+    /// Bytes of its pictures, by the index. The sum saturates, because a damaged row before the last may give any
+    /// length.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.rows.iter().fold(0, |sum, row| sum.saturating_add(row.length))
@@ -92,7 +93,7 @@ impl ViewRecording {
     /// Picture `number`, from 0, as JPEG.
     ///
     /// # Errors
-    /// When there is no such picture, or its file cannot be read or is damaged.
+    /// If there is no such picture, or its file cannot be read or is damaged.
     pub fn picture(&self, number: usize) -> Result<Vec<u8>, RecordingError> {
         let Some(row) = self.rows.get(number) else {
             let frames = self.rows.len();
@@ -111,15 +112,15 @@ impl ViewRecording {
         if whole { Ok(jpeg) } else { Err(damaged()) }
     }
 
-    /// Reads every picture; what is wrong with each that is not whole.
+    /// Reads every picture, and returns what is wrong with those that are not whole.
     #[must_use]
     pub fn check(&self) -> Vec<String> {
         (0..self.rows.len()).filter_map(|number| self.picture(number).err()).map(|error| error.to_string()).collect()
     }
 }
 
-/// The index's rows up to the last one that is whole and whose picture is there: a program or machine that ended in the
-/// middle may leave a line half written, or pictures that the disk never got.
+/// The index's rows up to the last one that is whole and whose picture is there. A crash or a power cut may leave a
+/// half-written line, or lines whose pictures never reached the disk.
 fn read_index(folder: &Path) -> Result<Vec<ViewRow>, RecordingError> {
     let path = folder.join(INDEX);
     let text = fs::read_to_string(&path).map_err(RecordingError::unreadable(&path))?;

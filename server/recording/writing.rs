@@ -1,5 +1,5 @@
-//! Writes a recording. Each shard becomes whole under another name and is then renamed; only after that do the arrays
-//! become longer. So whatever ends the program, what was stored before opens.
+//! Writes a recording. Each shard is written under another name and then renamed. Only after that do the arrays become
+//! longer. So however the program ends, what was stored before can be opened.
 
 use std::fs;
 use std::io::Write;
@@ -27,13 +27,13 @@ pub struct Writer {
     fixed: Vec<(String, Value)>,
     index: Index,
     columns: Columns,
-    /// Rows of the file of each column that is not full yet, those of frames that wait for their shard included.
+    /// Rows of each column's last file, which is not full yet. Includes the rows of frames that wait for their shard.
     rows: Vec<FrameRow>,
-    /// Frames that wait for their shard, compressed.
+    /// Compressed frames that wait for their shard to be full.
     waiting: Vec<Vec<u8>>,
     /// Frames in whole shards.
     sharded: usize,
-    /// Of those, the frames that the recording's description speaks of: what a reader finds.
+    /// Of those, the frames that the recording's description counts: what a reader finds.
     stored: usize,
 }
 
@@ -41,7 +41,7 @@ impl Writer {
     /// Begins a recording of mosaics of `size` (width and height in samples) in `folder`, which must not exist.
     ///
     /// # Errors
-    /// When the folder exists or cannot be written.
+    /// If the folder exists or cannot be written.
     pub fn create(
         folder: &Path,
         header: Header,
@@ -94,19 +94,19 @@ impl Writer {
         self.size
     }
 
-    /// How it is being made.
+    /// How the recording is made.
     #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Frames that would be there if the program were killed now.
+    /// Number of frames that a reader would find if the program were killed now.
     #[must_use]
     pub const fn stored(&self) -> usize {
         self.stored
     }
 
-    /// Bytes that the frames that wait for their shard will take.
+    /// Bytes of the frames that wait for their shard.
     #[must_use]
     pub fn waiting_bytes(&self) -> u64 {
         self.waiting.iter().map(|frame| frame.len() as u64).sum()
@@ -120,7 +120,7 @@ impl Writer {
     /// Adds a frame, compressed by [`Coder::of_frames`] of this size. Every [`SHARD_FRAMES`] frames become a file.
     ///
     /// # Errors
-    /// When it cannot be written; then the frames of this shard are lost, and those before it are kept.
+    /// If it cannot be written. Then the frames of this shard are lost, and those before it are kept.
     pub fn add(&mut self, row: FrameRow, compressed: Vec<u8>) -> Result<(), RecordingError> {
         self.rows.push(row);
         self.waiting.push(compressed);
@@ -130,20 +130,20 @@ impl Writer {
     /// Stores the frames that still wait, and notes how the recording ended. No frame can be added after that.
     ///
     /// # Errors
-    /// When it cannot be written; [`Writer::stored`] tells how many frames are there all the same.
+    /// If it cannot be written. [`Writer::stored`] is then the number of frames that a reader finds.
     pub fn finish(&mut self, ended: Ended) -> Result<(), RecordingError> {
         self.header.ended = Some(ended);
         if self.waiting.is_empty() { self.describe() } else { self.store() }
     }
 
-    /// Makes a file of the frames that wait, and the arrays longer by these.
+    /// Writes the waiting frames as a shard, then makes the arrays longer by them.
     fn store(&mut self) -> Result<(), RecordingError> {
         let frames = std::mem::take(&mut self.waiting);
         let lengths: Vec<usize> = frames.iter().map(Vec::len).collect();
         let stored = self.index.encode(&lengths).and_then(|index| self.store_shard(&frames, &index));
 
         if let Err(error) = stored {
-            // The rows of frames that are not there must not become those of later ones.
+            // The rows of the lost frames must not become those of later ones.
             self.rows.truncate(self.rows.len() - frames.len());
             return Err(error);
         }
@@ -167,7 +167,8 @@ impl Writer {
         replace_with(&path, |out| shard::write(out as &mut dyn Write, frames, index)).map_err(failed)
     }
 
-    /// Describes what is stored now: first all of it in one file, then each array for readers that do not look there.
+    /// Describes what is stored now: first all arrays in the group's file, then each array for readers that do not look
+    /// there.
     fn describe(&mut self) -> Result<(), RecordingError> {
         let growing = growing(&self.header, self.size, self.sharded);
         let mut arrays = growing.clone();
@@ -184,10 +185,10 @@ impl Writer {
     }
 }
 
-/// Makes the folder of a recording or another that must be new.
+/// Makes a folder that must be new, for a recording or anything else.
 ///
 /// # Errors
-/// When it exists or cannot be made.
+/// If it exists or cannot be made.
 pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
     let failed = |error| RecordingError::unwritable(folder, 0, error);
     make_parent(folder).map_err(failed)?;

@@ -1,5 +1,4 @@
-//! What a bench has recorded, as scenes to train on: focal-time scans and focal stacks, some of them
-//! kept for validation.
+//! Recordings of a bench as scenes to train on: focal-time scans and focal stacks. Some are kept for validation.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,22 +12,22 @@ use super::simulated::Scene;
 use super::stack::source::{ScaledStack, StackSource, UnfitStack};
 use crate::camera::recorded::{HEADER, ScanError, ScanFolder};
 
-/// Of so many folders one is kept for validation.
+/// One folder in this many is kept for validation.
 const KEPT_OF: usize = 5;
-/// Planes that make the range in training, least and most, of those that are asked for: how far a
-/// lens reaches differs from lens to lens.
+/// In training, the number of planes that make the range varies by these factors (least, most), because lenses differ
+/// in how far they reach.
 const REACH: (f64, f64) = (0.75, 1.3);
 
 /// Scenes of a bench.
 #[derive(Debug, Clone)]
 pub struct BenchScenes {
-    /// Those to train on.
+    /// Scenes to train on.
     pub training: Vec<Scene>,
-    /// Those to validate on: every fifth folder's, or the same where there are fewer.
+    /// Scenes to validate on: those of every fifth folder, or the training scenes if there are fewer than five folders.
     pub validation: Vec<Scene>,
-    /// The folders of those that are kept for validation, as they were named.
+    /// Folders kept for validation, as the caller named them.
     pub kept: Vec<String>,
-    /// What is doubtful about the pictures, in words.
+    /// Warnings about the pictures, as text for people.
     pub doubts: Vec<String>,
     /// SHA-256 of all pictures as they are used, in hexadecimal.
     pub sha256: String,
@@ -43,8 +42,8 @@ pub enum BenchError {
     /// A recorded scan cannot be read.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// A recorded scan of a still scene.
-    #[error("the scan {0} has one pose alone; name the folder with its pictures, to use them as a focal stack")]
+    /// A recorded scan has only one pose.
+    #[error("the scan {0} has only one pose; to use its pictures as a focal stack, name the folder that holds them")]
     OnePose(String),
     /// A focal stack cannot be used.
     #[error(transparent)]
@@ -52,11 +51,11 @@ pub enum BenchError {
 }
 
 impl BenchScenes {
-    /// Reads the recordings in `folders`: each is a recorded scan, or a focal stack, which `DIR:PLANES`
-    /// gives the number of planes that make the range 0..=1.
+    /// Reads the recordings in `folders`. Each is a recorded scan or a focal stack. For a stack, `DIR:PLANES` says how
+    /// many planes make the range 0..=1.
     ///
     /// # Errors
-    /// When a folder is missing, or what is in it cannot be used.
+    /// If a folder is missing, or what is in it cannot be used.
     pub fn read(folders: &[String]) -> Result<Self, BenchError> {
         let mut hash = Sha256::new();
         let mut doubts = Vec::new();
@@ -115,7 +114,7 @@ fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Resul
     Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())
 }
 
-/// A photographed stack of which about `planes` planes make the range.
+/// A photographed stack in which about `planes` planes make the range of focal power.
 fn scene(planes: usize, pictures: PlaneStack) -> StackScene {
     let (first, last) = pictures.range();
     let reach = |factor: f64| (factor * planes.saturating_sub(1) as f64).clamp(1.0, last - first);

@@ -22,12 +22,12 @@ pub const SEED: u64 = 2023;
 /// How a set's simulated scans are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Conditions {
-    /// All by these settings.
+    /// All with these settings.
     Same(ScanSettings),
-    /// As fits each scene: [`ScanSettings::fitting`].
+    /// With settings that fit each scene: [`ScanSettings::fitting`].
     Fitting,
-    /// The first so many as fits each scene, the others as varied as training's scans can be: what
-    /// holds on both is likely to hold elsewhere.
+    /// This many scans with settings that fit each scene, the others as varied as training scans can be. What holds on
+    /// both is likely to hold elsewhere.
     VariedFrom(usize),
 }
 
@@ -36,13 +36,13 @@ pub enum Conditions {
 pub struct Benchmark {
     /// What is scanned.
     pub scenes: Vec<Scene>,
-    /// How.
+    /// How the scans are drawn.
     pub conditions: Conditions,
     /// Seed that all scans' courses are drawn from.
     pub seed: u64,
     /// Number of scans.
     pub count: usize,
-    /// Frames of each.
+    /// Frames of each scan.
     pub frames: usize,
 }
 

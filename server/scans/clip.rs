@@ -1,4 +1,4 @@
-//! Clips, of which simulated scans are made: sharp pictures in order of time.
+//! Clips: sharp pictures in order of time. Simulated scans are made from them.
 
 use std::sync::{Arc, OnceLock};
 
@@ -11,7 +11,7 @@ use crate::imaging::{GrayImage, reduced};
 pub struct Clip {
     frames: Vec<Arc<GrayImage>>,
     area: Area,
-    /// The pictures at half the resolution, made when they are first asked for.
+    /// The pictures at half the resolution, made on first use.
     coarse: Vec<OnceLock<GrayImage>>,
 }
 
@@ -28,7 +28,7 @@ pub struct Area {
     pub bottom: usize,
 }
 
-/// Why no scan can be made of pictures.
+/// Why pictures cannot be made into a scan.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClipError {
     /// There is no picture at all.
@@ -46,18 +46,18 @@ pub enum ClipError {
         height: usize,
     },
     /// The pictures differ in size.
-    #[error("picture {index} is not of the first one's size")]
+    #[error("picture {index} differs in size from the first one")]
     SizesDiffer {
-        /// Position, from 0.
+        /// Index of the picture, from 0.
         index: usize,
     },
 }
 
 impl Clip {
-    /// A clip of `frames`; patches stay within `area`, or anywhere where it is `None`.
+    /// A clip of `frames`. Patches stay within `area`; if it is `None`, they may lie anywhere.
     ///
     /// # Errors
-    /// When there is no frame, sizes differ, or less than 64x64 pixels can be used.
+    /// If there is no frame, sizes differ, or less than 64x64 pixels can be used.
     pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, ClipError> {
         let first = frames.first().ok_or(ClipError::Empty)?;
         let size = (first.width, first.height);
@@ -81,12 +81,12 @@ impl Clip {
     /// A clip of one picture.
     ///
     /// # Errors
-    /// When it is smaller than 64x64 pixels.
+    /// If it is smaller than 64x64 pixels.
     pub fn still(picture: GrayImage) -> Result<Self, ClipError> {
         Self::new(vec![Arc::new(picture)], None)
     }
 
-    /// The picture at time `t`; after the end the clip runs backwards, and so on.
+    /// The picture at time `t`. After its end the clip runs backwards, then forwards again, and so on.
     #[must_use]
     pub fn at(&self, t: usize) -> &GrayImage {
         &self.frames[self.index(t)]
@@ -111,7 +111,7 @@ impl Clip {
         self.frames.len()
     }
 
-    /// Adds all that scans show of it to `hash`.
+    /// Adds everything that scans show of the clip to `hash`.
     pub(crate) fn digest(&self, hash: &mut Sha256) {
         let Area { left, top, right, bottom } = self.area;
         for number in [self.frames.len(), left, top, right, bottom] {
@@ -131,7 +131,7 @@ impl Clip {
     }
 }
 
-/// Which of `count` pictures is shown at time `t` when they are played forwards and backwards for ever.
+/// Index of the picture at time `t` when `count` pictures are played forwards and backwards forever.
 pub(super) fn to_and_fro(t: usize, count: usize) -> usize {
     let last = count.saturating_sub(1);
     if last == 0 {

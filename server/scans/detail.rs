@@ -1,4 +1,4 @@
-//! Whether focal-time scans show anything to focus on. On a blank wall every policy has the figures of chance.
+//! Whether focal-time scans show anything to focus on. On a blank wall every policy performs as chance does.
 
 use rayon::prelude::*;
 
@@ -10,8 +10,8 @@ use crate::scans::ScanSet;
 
 /// Standard deviation in gray levels above which a patch is not mere sensor noise, whatever its spectrum.
 const MOST_NOISE: f32 = 16.0;
-/// How many times as great the mean gradient magnitude must be in focus as far out of it. Shading, as
-/// of a lamp or at the rim of a lens, looks the same in and out of focus.
+/// Least ratio of the mean gradient magnitude in focus to that far out of focus. Shading, from a lamp or at the rim of
+/// a lens, looks the same in both.
 const LEAST_PEAK: f64 = 1.2;
 
 /// No scan shows anything to focus on.
@@ -22,7 +22,7 @@ const LEAST_PEAK: f64 = 1.2;
 )]
 pub struct NothingToFocusOn(pub usize);
 
-/// Number of scans in `set` in which at no frame even the sharpest patch has detail.
+/// Number of scans in `set` without detail: in no frame does even the sharpest patch show any.
 #[must_use]
 pub fn without_detail(set: &dyn ScanSet) -> usize {
     let blank = |index: &usize| {
@@ -32,10 +32,10 @@ pub fn without_detail(set: &dyn ScanSet) -> usize {
     (0..set.count()).into_par_iter().filter(blank).count()
 }
 
-/// What is wrong with a set of `count` scans of which `blank` are without detail, in words; nothing where none is.
+/// A warning about a set of `count` scans, `blank` of them without detail. `None` if `blank` is 0.
 ///
 /// # Errors
-/// When all of them are.
+/// If all scans are without detail.
 pub fn warning(blank: usize, count: usize) -> Result<Option<String>, NothingToFocusOn> {
     if blank == count {
         return Err(NothingToFocusOn(count));
@@ -46,7 +46,7 @@ pub fn warning(blank: usize, count: usize) -> Result<Option<String>, NothingToFo
     Ok((blank > 0).then(words))
 }
 
-/// Whether any frame has something to focus on; most scans show it at the first.
+/// Whether any frame has something to focus on; most scans show it in the first frame.
 fn shows_detail(scan: &mut dyn FocalTimeScan, frames: usize) -> bool {
     (0..frames).any(|_| {
         let found = frame_shows_detail(scan);
@@ -89,7 +89,7 @@ mod tests {
         GrayImage { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(level).collect() }
     }
 
-    /// The share of 20 scans over `picture` that show nothing.
+    /// The share of 20 scans over `picture` that show no detail.
     fn share(picture: GrayImage) -> f64 {
         let scenes = vec![Scene::Flat(Arc::new(Clip::still(picture).unwrap()))];
         let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 3, count: 20, frames: 20 };

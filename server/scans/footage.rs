@@ -1,5 +1,5 @@
-//! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures 480 lines high at
-//! most.
+//! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures of at most 480
+//! lines.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,21 +20,21 @@ pub enum FootageError {
     /// It cannot be read.
     #[error(transparent)]
     Source(#[from] footage::FootageError),
-    /// Its pictures are of no use.
+    /// Its pictures cannot be made into a clip.
     #[error("cannot scan {}: {source}", path.display())]
     Unusable {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with them.
         source: ClipError,
     },
 }
 
-/// The clips in `path`: one of a video or an image; one of each image of a folder. A note on standard
-/// error says what is left out of a video that is longer than 1500 frames or damaged.
+/// The clips in `path`: one for a video or an image, or one for each image in a folder. If a video is damaged or longer
+/// than 1500 frames, a note on standard error says what is left out.
 ///
 /// # Errors
-/// When it cannot be read, holds no picture, or its pictures are too small.
+/// If it cannot be read, holds no picture, or its pictures are too small.
 pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, FootageError> {
     let unusable = |path: &Path| {
         let path = path.to_owned();
@@ -75,7 +75,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     }
 
     let output = ffmpeg(path)
-        // One more, to know whether there are more.
+        // One frame more than is used, to know whether the video is longer.
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
@@ -111,7 +111,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     Ok(frames)
 }
 
-/// The pictures that follow one another in `stream`, up to the first that is not whole.
+/// The pictures in `stream`, one after another, up to the first incomplete one.
 fn pictures(mut stream: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
     std::iter::from_fn(move || {
         let picture = footage::next_pnm(&mut stream).ok().flatten()?.into_luma8();
@@ -121,13 +121,13 @@ fn pictures(mut stream: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
     })
 }
 
-/// A clip of these pictures, within the content area of the first where it has one.
+/// A clip of `frames`, limited to the content area of the first frame if it has one.
 fn clip(frames: Vec<Arc<GrayImage>>) -> Result<Clip, ClipError> {
     let area = frames.first().and_then(|frame| content_area::detect(frame)).map(|circle| within(&circle));
     Clip::new(frames, area)
 }
 
-/// The square that fits into the circle with a little to spare; what of it lies outside the picture is cut by the clip.
+/// A square that fits into the circle with a little to spare. The clip cuts off any part outside the picture.
 fn within(circle: &ContentArea) -> Area {
     let half = 0.68 * circle.radius;
     let pixel = |place: f64| place.max(0.0) as usize;
@@ -166,7 +166,7 @@ mod tests {
     fn a_picture_of_many_lines_is_made_smaller_and_keeps_its_gray_levels() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("large.png");
-        // Blocks of 2x2 pixels, as large as one of the result.
+        // Blocks of 2x2 pixels: each becomes one pixel of the result.
         let gray = |x: u32, y: u32| u8::try_from((7 * (x / 2) + 31 * (y / 2)) % 256).unwrap();
         image::GrayImage::from_fn(1000, 960, |x, y| image::Luma([gray(x, y)])).save(&file).unwrap();
         let clips = clips(&file).unwrap();
@@ -180,7 +180,7 @@ mod tests {
     fn a_mosaic_is_developed_not_taken_for_a_gray_picture() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("mosaic.png");
-        // An even surface, of which each band sees another share.
+        // An even surface that looks different in each band.
         let bands: Vec<u16> = (0..16).map(|band| 100 + 40 * band).collect();
         let sample = |x: u32, y: u32| image::Luma([bands[(4 * (y % 4) + x % 4) as usize]]);
         image::ImageBuffer::from_fn(2048, 1088, sample).save(&file).unwrap();

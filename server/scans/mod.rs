@@ -33,7 +33,7 @@ pub trait FocalTimeScan {
     fn advance(&mut self);
 }
 
-/// Several focal-time scans, for a policy to be evaluated on.
+/// Several focal-time scans on which a policy is evaluated.
 pub trait ScanSet: Sync {
     /// Number of scans.
     fn count(&self) -> usize;
@@ -41,7 +41,8 @@ pub trait ScanSet: Sync {
     /// Scan `index`, from 0, at its beginning, and the number of its frames.
     fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize);
 
-    /// Number of stretches that each scan is cut into for intervals and tests, which need many independent figures.
+    /// Number of stretches into which each scan is cut for confidence intervals and tests. These need many independent
+    /// figures.
     fn parts(&self) -> usize {
         1
     }

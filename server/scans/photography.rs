@@ -1,10 +1,10 @@
-//! How a simulated scene becomes a focal stack as people photograph them: few pictures, each with noise and
-//! brightness of its own, and often not aligned.
+//! Makes a simulated scene's focal stack look as if a person had photographed it: few pictures, each with its own noise
+//! and brightness, and often not aligned.
 //!
-//! Of the four real stacks that we looked at, one has pictures that lie 3 to 10 pixels from their neighbours, since
-//! magnification follows focus, and one has noise that is coarser than a pixel (`docs/notebook.md`). A mix of two
-//! pictures that are not aligned shows everything twice and is less sharp than either, so that sharpness falls on the
-//! way to a sharper picture. A policy that has never met that takes it for a peak that it has passed.
+//! We looked at four real stacks (`docs/notebook.md`). One has pictures that lie 3 to 10 pixels from their neighbours,
+//! because magnification follows focus. One has noise that is coarser than a pixel. A mix of two pictures that are not
+//! aligned shows everything twice and is less sharp than either. So sharpness first falls on the way to a sharper
+//! picture. A policy that has never seen this concludes that it has passed the peak.
 
 use rand::{Rng, RngExt};
 
@@ -12,24 +12,23 @@ use crate::imaging::GrayImage;
 use crate::simulation::blur::gaussian_blur;
 use crate::simulation::normal::{cheap_normal, standard_normal};
 
-/// Least positions in a unit of focal power.
+/// Least number of positions in a unit of focal power.
 const LEAST_PLANES: f64 = 5.0;
 
-/// What photographed stacks may be like.
+/// Limits within which photographed stacks are drawn.
 #[derive(Debug, Clone, Copy)]
 pub struct Manner {
     /// Least noise, in gray levels.
     pub least_noise: f32,
-    /// Share whose pictures do not lie exactly over one another.
+    /// Share of stacks whose pictures are not aligned.
     pub misplaced: f64,
-    /// Share whose noise is coarser than a pixel.
+    /// Share of stacks whose noise is coarser than a pixel.
     pub grainy: f64,
-    /// Share over which scans follow what is in view.
+    /// Share of stacks whose scans follow what is in view.
     pub followed: f64,
 }
 
-/// How one stack is photographed. Through a lens that moves between its pictures, a mix of two has less noise than
-/// either.
+/// How one stack is photographed. When the focal plane lies between two pictures, their mix has less noise than either.
 #[derive(Debug)]
 pub struct Photography {
     /// Pixels of blur from one picture to the next.
@@ -38,14 +37,15 @@ pub struct Photography {
     noise: f32,
     /// Standard deviation of a picture's brightness, as a share.
     flicker: f32,
-    /// How far from one another the pictures lie.
+    /// How far the pictures are shifted against one another.
     places: Places,
-    /// Standard deviation in pixels of what smooths the noise, as a camera's compression does; 0 for white noise.
+    /// Standard deviation, in pixels, of the Gaussian that smooths the noise, as a camera's compression does. 0 for
+    /// white noise.
     grain: f64,
 }
 
 impl Photography {
-    /// Draws one, as `manner` allows.
+    /// Draws one within the limits of `manner`.
     pub fn draw(manner: Manner, most_blur: f32, rng: &mut impl Rng) -> Self {
         let noise = rng.random_range(manner.least_noise..3.5);
         let flicker = if rng.random_bool(0.5) { rng.random_range(0.0f32..0.03) } else { 0.0 };
@@ -64,12 +64,12 @@ impl Photography {
         (-each_side..=each_side).map(|plane| plane as f32 * self.spacing).collect()
     }
 
-    /// Least slope, in pixels of blur a unit of focal power, at which the pictures are close enough.
+    /// Least slope, in pixels of blur a unit of focal power, at which the pictures lie close enough together.
     pub fn least_slope(&self) -> f64 {
         LEAST_PLANES * f64::from(self.spacing)
     }
 
-    /// Gives each of `pictures` (positions and pictures) its place, brightness and noise.
+    /// Shifts each of `pictures` (position and picture), changes its brightness and adds noise.
     pub fn spoil(&self, pictures: &mut [(f32, GrayImage)], rng: &mut impl Rng) {
         for (position, picture) in pictures {
             if self.places != Places::default() {
@@ -85,38 +85,39 @@ impl Photography {
         }
     }
 
-    /// Where scans follow what is in view, the way from one picture to the next in pixels of blur.
+    /// If scans follow what is in view, the distance from one picture to the next in pixels of blur. Else `None`.
     pub fn followed(&self, manner: Manner, rng: &mut impl Rng) -> Option<f64> {
         happens(manner.followed, rng).then(|| f64::from(self.spacing))
     }
 }
 
-/// Whether what has this share happens. Nothing is drawn for what never does, so that the scenes of the reference
-/// benchmark stay what they are.
+/// Draws whether something with probability `share` happens. At 0 it draws nothing from `rng`, so that the scenes of
+/// the reference benchmark stay the same.
 fn happens(share: f64, rng: &mut impl Rng) -> bool {
     share > 0.0 && rng.random_bool(share)
 }
 
-/// How far a stack's pictures lie from one another, in pixels.
+/// How far a stack's pictures are shifted against one another, in pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Places {
-    /// From each picture to the next, as magnification follows focus: at one place of the view it is nearly a drift.
+    /// Shift from each picture to the next, because magnification follows focus. At one place of the view it is nearly
+    /// constant.
     drift: [f32; 2],
-    /// Share of pictures that something has knocked aside, and the standard deviation of how far.
+    /// Share of pictures that were knocked aside, and the standard deviation of their shift.
     knocked: (f64, f32),
-    /// Standard deviation of what else each picture is off.
+    /// Standard deviation of each picture's remaining shift.
     jitter: f32,
 }
 
 impl Places {
-    /// Most that a drift takes the first and the last picture aside.
+    /// Largest shift of the first and the last picture by a drift.
     const MOST_DRIFT: f32 = 60.0;
 
-    /// `spacing` is that from one picture to the next, as a share of the way from the middle to an end.
+    /// `spacing` is the distance from one picture to the next, as a share of the way from the middle to an end.
     fn draw(spacing: f32, rng: &mut impl Rng) -> Self {
         let mut places = Self::default();
         if rng.random_bool(0.5) {
-            // Small ones more often than large ones.
+            // Small drifts are more frequent than large ones.
             let most = 8.0f32.min(Self::MOST_DRIFT * spacing);
             let size = most * rng.random::<f32>().powi(2);
             let angle = rng.random_range(0.0..std::f32::consts::TAU);
@@ -131,7 +132,7 @@ impl Places {
         places
     }
 
-    /// How far the picture that is `number` pictures from the middle one lies aside, in whole pixels.
+    /// Shift, in whole pixels, of the picture that is `number` pictures from the middle one.
     fn of(&self, number: f32, rng: &mut impl Rng) -> [i64; 2] {
         let (share, far) = self.knocked;
         let knocked = if rng.random_bool(share) { far } else { 0.0 };
@@ -142,7 +143,7 @@ impl Places {
     }
 }
 
-/// White noise smoothed by a Gaussian of `sigma` pixels, as strong as before.
+/// White noise smoothed by a Gaussian of `sigma` pixels, with its energy unchanged.
 fn smoothed(noise: GrayImage, sigma: f64) -> GrayImage {
     if sigma <= 0.0 {
         return noise;

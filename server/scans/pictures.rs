@@ -1,4 +1,4 @@
-//! The sharp pictures of training, validation and the reference benchmark: never the same ones.
+//! The sharp pictures of training, validation and the reference benchmark. No picture is in two of them.
 
 use std::sync::Arc;
 
@@ -11,14 +11,14 @@ use crate::simulation::texture::{texture, vary_contrast};
 /// Side in pixels of drawn pictures: the height of the paper's clips.
 const SIDE: usize = 480;
 
-/// What pictures are for. Each split draws from seeds of its own.
+/// What pictures are for. Each split has its own seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
     /// To learn from.
     Training,
-    /// To choose the best of the learned.
+    /// To choose the best learned policy.
     Validation,
-    /// To report.
+    /// To report results.
     Test,
 }
 
@@ -36,7 +36,7 @@ impl Split {
 /// [`super::simulated::ScanSettings::reference`].
 const UNEVEN: f32 = 1.0;
 
-/// The pictures of the reference benchmark's `split`, `0..count`: brain phantoms of uneven contrast.
+/// Pictures `0..count` of the reference benchmark's `split`: brain phantoms of uneven contrast.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
@@ -62,9 +62,8 @@ pub fn sharp_phantom_of(split: Split, index: u64, side: usize) -> GrayImage {
     Scene::new(split.first_seed() + index).sharp_gray(side, side)
 }
 
-/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds.
-/// Half of all have a contrast that varies from place to place, and half of all are soft, as optics,
-/// demosaicing and compression leave footage.
+/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds. In half of them
+/// contrast varies from place to place. Half of them are soft, as footage is after optics, demosaicing and compression.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.

@@ -28,23 +28,24 @@ pub struct PlaneStack {
 /// Why pictures cannot be a focal stack.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlanesError {
-    /// Fewer than three.
+    /// Fewer than three pictures, or positions that do not rise.
     #[error("a focal stack needs at least 3 pictures at rising positions, but has {0}")]
     TooFew(usize),
     /// Sizes differ.
     #[error("picture {0} of the focal stack differs in size from the first")]
     SizesDiffer(usize),
-    /// Too small to hold a patch and its way.
+    /// Too small for a patch to move within them.
     #[error("the pictures of the focal stack need at least 64x64 pixels, but have {0}x{1}")]
     TooSmall(usize, usize),
 }
 
 impl PlaneStack {
-    /// A stack of `pictures`, each with the position of its focal plane, which rise. Gray levels
-    /// beyond 0..=255 are clipped.
+    /// A stack of `pictures`, each with the position of its focal plane. Positions must rise. Gray levels beyond
+    /// 0..=255 are clipped.
     ///
     /// # Errors
-    /// When there are fewer than three, sizes differ, or they are smaller than 64x64 pixels.
+    /// If there are fewer than three pictures, positions do not rise, sizes differ, or pictures are smaller than 64x64
+    /// pixels.
     pub fn new(pictures: &[(f32, GrayImage)]) -> Result<Self, PlanesError> {
         let (Some((_, first)), 3..) = (pictures.first(), pictures.len()) else {
             return Err(PlanesError::TooFew(pictures.len()));
@@ -74,7 +75,7 @@ impl PlaneStack {
         Ok(Self { width, height, positions, planes, curves, sharpest })
     }
 
-    /// Feeds `hash` with all that can be seen.
+    /// Adds everything that can be seen to `hash`.
     pub(crate) fn digest(&self, hash: &mut Sha256) {
         hash.update((self.width as u64).to_le_bytes());
         for (position, plane) in self.positions.iter().zip(&self.planes) {
@@ -102,8 +103,8 @@ impl PlaneStack {
         f64::from(self.sharpest[self.place(corner)])
     }
 
-    /// The same among the positions from `low` to `high` alone. A patch that holds several depths has several peaks, and
-    /// the highest may lie outside.
+    /// As [`PlaneStack::sharpest`], but only among the positions from `low` to `high`. A patch that holds several
+    /// depths has several peaks, and the highest may lie outside.
     #[must_use]
     pub fn sharpest_within(&self, corner: (usize, usize), (low, high): (f64, f64)) -> f64 {
         let sharpest = self.sharpest(corner);
@@ -117,7 +118,7 @@ impl PlaneStack {
         let first = self.positions.partition_point(|&at| f64::from(at) <= low);
         let end = self.positions.partition_point(|&at| f64::from(at) < high).max(first);
 
-        // The range from end to end; at its ends pictures are mixed, and so is their sharpness.
+        // The curve over the whole range. At its ends pictures are mixed, and so is their sharpness.
         let inner = self.positions[first..end].iter().copied().zip(curve[first..end].iter().copied());
         let ends = [low, high].map(|at| (at as f32, mixed_at(&self.positions, curve, at as f32)));
         let (positions, curve): (Vec<f32>, Vec<f32>) = [ends[0]].into_iter().chain(inner).chain([ends[1]]).unzip();
@@ -132,9 +133,9 @@ impl PlaneStack {
         row * columns + column
     }
 
-    /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two
-    /// pictures around it. Beyond the first and the last picture, those; beyond the borders, the
-    /// nearest patch within them.
+    /// The patch with its corner at `corner` and the focal plane at `position`: a mix of the two pictures around that
+    /// position. Beyond the first or last picture, that picture. If `corner` is too close to the border or beyond it,
+    /// the nearest patch inside.
     #[must_use]
     pub fn patch(&self, corner: (usize, usize), position: f64) -> Patch {
         let (x, y) = self.inside(corner);
@@ -143,7 +144,7 @@ impl PlaneStack {
         patch
     }
 
-    /// What policies see with [`PlaneStack::patch`] as the patch.
+    /// What a policy sees, with [`PlaneStack::patch`] as the patch.
     #[must_use]
     pub fn view(&self, corner: (usize, usize), position: f64) -> View {
         let corner = self.inside(corner);
@@ -240,7 +241,7 @@ fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
     out
 }
 
-/// `curve` over `positions` at `position`, linear between two of them.
+/// The value of `curve` (over `positions`) at `position`, interpolated linearly.
 fn mixed_at(positions: &[f32], curve: &[f32], position: f32) -> f32 {
     let above = positions.partition_point(|&at| at <= position).clamp(1, positions.len() - 1);
     let low = positions[above - 1];
@@ -248,8 +249,8 @@ fn mixed_at(positions: &[f32], curve: &[f32], position: f32) -> f32 {
     curve[above - 1] + share * (curve[above] - curve[above - 1])
 }
 
-/// Where `curve` over `positions` peaks: at the vertex of the parabola through its greatest value and
-/// that one's neighbours.
+/// Where `curve` (over `positions`) peaks: at the vertex of the parabola through its greatest value and the two
+/// neighbours.
 fn peak(positions: &[f32], curve: &[f32]) -> f32 {
     let top = (0..curve.len()).max_by(|&a, &b| curve[a].total_cmp(&curve[b])).unwrap_or(0);
     if top == 0 || top + 1 == curve.len() {
@@ -279,7 +280,8 @@ mod tests {
         assert!((peak(&positions, &[5.0, 4.0, 3.0, 2.0, 1.0]) - 0.0).abs() < 1e-6);
     }
 
-    /// Stripes of `contrast` along x, four pixels a stripe, in the left half; of 160 less that in the right one.
+    /// Stripes along x, four pixels each, with amplitude `contrast` in the left half and `80 - contrast` in the right
+    /// one.
     fn stripes(contrast: f32) -> GrayImage {
         let value = |i: usize| {
             let (x, contrast) = (i % 128, if i % 128 < 64 { contrast } else { 80.0 - contrast });
@@ -295,7 +297,7 @@ mod tests {
         let stack = PlaneStack::new(&pictures).unwrap();
         assert!((stack.sharpest((8, 8)) - 2.0).abs() < 1e-3);
         assert!((stack.sharpest((90, 8)) - 5.0).abs() < 1e-3);
-        // Where the peak is out of reach, the greatest of what is left counts: an end, or another peak.
+        // If the peak is out of reach, the greatest remaining value counts: an end, or another peak.
         assert!((stack.sharpest_within((8, 8), (2.5, 5.0)) - 2.5).abs() < 1e-3);
         assert!((stack.sharpest_within((8, 8), (-3.0, 1.5)) - 1.5).abs() < 1e-3);
         assert!((stack.sharpest_within((90, 8), (0.0, 3.5)) - 0.0).abs() < 1e-3);

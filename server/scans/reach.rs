@@ -13,9 +13,9 @@ use crate::simulation::walk::Walk;
 /// How a lens's focal power becomes a position in a focal stack.
 #[derive(Debug, Clone, Copy)]
 pub struct Optics {
-    /// Positions a unit of focal power; below 0 where they fall with it.
+    /// Positions per unit of focal power; below 0 if positions fall when focal power rises.
     pub slope: f64,
-    /// How far from straight the response is: 0, or the change of slope over half a unit.
+    /// Curvature of the response: 0 if it is straight, else the relative change of slope over half a unit.
     bend: f64,
     /// Pixels that the picture moves along each axis when the position changes by one, as
     /// magnification follows focus.
@@ -27,9 +27,10 @@ pub struct Optics {
 /// What a lens reaches of a focal stack at one frame.
 #[derive(Debug, Clone, Copy)]
 pub enum Reach {
-    /// Position `slope * (off + bend * off^2)`, `off` from the focal power at which the ground is sharp.
+    /// Position `slope * (off + bend * off^2)`, where `off` is counted from the focal power at which the ground is
+    /// sharp.
     Ground {
-        /// That focal power.
+        /// The focal power at which the ground is sharp.
         focus: f64,
     },
     /// Position `origin + slope * focal_power`.
@@ -40,7 +41,7 @@ pub enum Reach {
 }
 
 impl Optics {
-    /// Optics for one scan of `scene`.
+    /// Draws the optics for one scan of `scene`.
     pub fn draw(scene: &StackScene, course: &mut ChaCha8Rng) -> Self {
         let (least, most) = scene.slopes;
         let size = least * (most.max(least) / least).powf(course.random::<f64>());
@@ -56,8 +57,8 @@ impl Optics {
         }
     }
 
-    /// What the lens reaches of `scene` while `focus` is the walking focal power and `anchor` the sharpest position,
-    /// smoothed over the way.
+    /// What the lens reaches of `scene` at one frame. `focus` is the walking focal power; `anchor` is the sharpest
+    /// position, smoothed over frames.
     pub fn reach(&self, scene: &StackScene, focus: f64, anchor: f64) -> Reach {
         let Distance::Following { spacing } = scene.distance else { return Reach::Ground { focus } };
 
@@ -84,8 +85,8 @@ impl Optics {
         match reach {
             Reach::View { origin } => (position - origin) / self.slope,
             Reach::Ground { focus } => {
-                // The root that is 0 where place is, written so that a small bend is never divided by:
-                // off + bend off^2 = place.
+                // Solves off + bend off^2 = place. Takes the root that is 0 where place is 0, in a form that never
+                // divides by a small bend.
                 let place = position / self.slope;
                 let root = (1.0 + 4.0 * self.bend * place).max(0.0).sqrt();
                 focus + 2.0 * place / (1.0 + root)
@@ -100,15 +101,15 @@ impl Optics {
     }
 }
 
-/// Frames (standard deviation) over which a hand's distance follows what is in view.
+/// A hand's distance follows what is in view, smoothed with this standard deviation in frames.
 const SMOOTHING: f64 = 12.0;
-/// Frames that it sees ahead, and remembers.
+/// Frames that the smoothing looks ahead and back.
 const LEAD: usize = 30;
 
-/// A hand that follows what is in view: it knows its way some frames ahead.
+/// A hand that follows what is in view. It knows its way [`LEAD`] frames ahead.
 #[derive(Debug, Clone)]
 pub struct Following {
-    /// Where the patch's corner lies, from this frame on.
+    /// Where the patch's corner lies at this frame and the next [`LEAD`].
     corners: VecDeque<(f64, f64)>,
     /// The sharpest positions from [`LEAD`] frames ago to as many ahead.
     sharpest: VecDeque<f64>,
@@ -116,7 +117,7 @@ pub struct Following {
 }
 
 impl Following {
-    /// Begins where `crop` is, which it walks on by [`LEAD`] frames.
+    /// Begins where `crop` is, and advances `crop` by [`LEAD`] frames.
     pub fn new(stack: &StackScene, crop: &mut [Walk; 2], course: &mut ChaCha8Rng) -> Self {
         let start = stack.planes.sharpest(whole(corner(crop)));
         let mut following = Self {
@@ -151,18 +152,18 @@ impl Following {
         self.corners[0]
     }
 
-    /// The sharpest position, smoothed over the way.
+    /// The sharpest position, smoothed over the frames around this one.
     pub fn anchor(&self) -> f64 {
         self.sharpest.iter().zip(&self.weights).map(|(position, weight)| position * weight).sum()
     }
 }
 
-/// The pixel that holds a place; those before the first become it.
+/// The pixel that holds a place. Coordinates below 0 become 0.
 pub fn whole((x, y): (f64, f64)) -> (usize, usize) {
     (x.max(0.0) as usize, y.max(0.0) as usize)
 }
 
-/// Where walks along both axes are.
+/// Where the walks along both axes are now.
 pub fn corner(walks: &[Walk; 2]) -> (f64, f64) {
     (walks[0].position(), walks[1].position())
 }

@@ -1,4 +1,4 @@
-//! Recorded focal-time scans, ready to be replayed: at each pose one view for each of some discrete focal powers.
+//! Recorded focal-time scans, ready to be replayed: each pose has one view for each of several discrete focal powers.
 
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ use crate::simulation::phantom::{Haste, SENSOR_HEIGHT, SENSOR_WIDTH, Still, Traj
 
 /// Poses of the paper's robotic scan.
 pub const POSES: usize = 1184;
-/// Focal powers at each pose: as far apart as the paper's step.
+/// Focal powers at each pose. They are as far apart as the paper's step.
 pub const FOCAL_POWERS: usize = 21;
-/// How the hand moves over the phantom; `benches/calibrate_recorded.rs` tells how it was chosen.
+/// How the hand moves over the phantom; `benches/calibrate_recorded/main.rs` says how it was chosen.
 pub const HASTE: Haste = Haste { sideways: 40.0, focus: 3.0 };
-/// Stretches that a replay is cut into for intervals and tests: 74 poses each of [`POSES`].
+/// Stretches into which a replay is cut for confidence intervals and tests: with [`POSES`], 74 poses each.
 pub const PARTS: usize = 16;
 
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
@@ -36,7 +36,7 @@ pub enum Between {
     /// The picture taken at the nearest focal power.
     #[default]
     Nearest,
-    /// A mix of the two neighbours', by distance.
+    /// A mix of the two neighbouring pictures, by distance.
     Interpolated,
 }
 
@@ -54,11 +54,11 @@ pub struct Stack {
     pub optimum: FocalPower,
     /// One patch for each focal power, in rising order.
     pub patches: Vec<Box<[u8; PIXELS]>>,
-    /// The wider patches of each, or nothing where only patches are known.
+    /// The wider patches for each focal power; empty if only patches are known.
     wider: Vec<[Option<Coarse>; WIDER.len()]>,
 }
 
-/// A wider patch, in steps of 1/256 of a gray level: its values are means, and finer than whole levels.
+/// A wider patch, in steps of 1/256 of a gray level. Its values are means, so they are finer than whole levels.
 #[derive(Debug, Clone, PartialEq)]
 struct Coarse(Box<[u16; PIXELS]>);
 
@@ -104,8 +104,8 @@ pub fn evenly_spread(count: usize) -> Vec<FocalPower> {
     (0..=last).map(|index| FocalPower::nearest(index as f64 / last as f64)).collect()
 }
 
-/// Positions `0..count` in the random order in which pose `pose` (from 0) of the scan of `seed` takes
-/// its focal powers, so that a lens's hysteresis favours none.
+/// The indices `0..count` of the focal powers, in the order in which pose `pose` (from 0) takes them. The order is
+/// random, drawn from `seed`, so that a lens's hysteresis favours no focal power.
 #[must_use]
 pub fn capture_order(seed: u64, pose: usize, count: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -116,7 +116,7 @@ pub fn capture_order(seed: u64, pose: usize, count: usize) -> Vec<usize> {
 }
 
 impl RecordedScan {
-    /// A scan of `poses`, each with a patch for each of `powers`, which rise.
+    /// A scan of `poses`, each with a patch for each of `powers`. These must rise.
     #[must_use]
     pub const fn new(powers: Vec<FocalPower>, poses: Vec<Stack>) -> Self {
         Self { powers, poses }
@@ -126,7 +126,7 @@ impl RecordedScan {
     /// pose.
     ///
     /// # Errors
-    /// When poses are missing, or a picture is damaged.
+    /// If poses are missing, or a picture is damaged.
     pub fn read(folder: &ScanFolder, progress: &(dyn Fn() + Sync)) -> Result<Self, ScanError> {
         let powers = folder.header().focal_powers.clone();
         let poses: Vec<_> = folder.clone().whole()?.poses().values().cloned().collect();
@@ -146,8 +146,8 @@ impl RecordedScan {
         Ok(Self { powers, poses })
     }
 
-    /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it, of which only the
-    /// patches are made. `progress` is called after each pose.
+    /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it. Makes only the
+    /// patches. `progress` is called after each pose.
     #[must_use]
     pub fn phantom(trajectory: &Trajectory, seed: u64, powers: usize, progress: &(dyn Fn() + Sync)) -> Self {
         let powers = evenly_spread(powers);
@@ -171,19 +171,19 @@ impl RecordedScan {
         &self.poses
     }
 
-    /// The optimum at pose `index` (the last, beyond it).
+    /// The optimum at pose `index`; beyond the last pose, that of the last.
     #[must_use]
     pub fn optimum(&self, index: usize) -> FocalPower {
         self.poses.get(index).or(self.poses.last()).map_or(FocalPower::MIDDLE, |pose| pose.optimum)
     }
 
-    /// The pose at frame `time` of a replay to and fro that never ends.
+    /// The pose at frame `time` of an endless replay that runs forwards and backwards.
     #[must_use]
     pub fn pose_at(&self, time: usize) -> usize {
         to_and_fro(time, self.poses.len())
     }
 
-    /// Feeds `hash` with all that can be seen.
+    /// Adds everything that can be seen to `hash`.
     pub(crate) fn digest(&self, hash: &mut Sha256) {
         hash.update((self.poses.len() as u64).to_le_bytes());
         self.powers.iter().for_each(|power| hash.update(power.get().to_le_bytes()));
@@ -194,7 +194,7 @@ impl RecordedScan {
         }
     }
 
-    /// What is seen at pose `index` (the last, beyond it) through a lens at `focal_power`.
+    /// What is seen at pose `index` through a lens at `focal_power`; beyond the last pose, at the last.
     #[must_use]
     pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> View {
         let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]).into() };
@@ -219,7 +219,7 @@ impl RecordedScan {
     }
 }
 
-/// The stack of one pose of the phantom, its exposures numbered by the order in which they are taken.
+/// The stack of one pose of the phantom. Its exposures are numbered in the order in which they are taken.
 fn frozen(
     still: &Still,
     reconstructor: &Reconstructor,
@@ -231,7 +231,7 @@ fn frozen(
     for (number, &position) in (0..).zip(order) {
         still.expose_view(number, powers[position], samples);
 
-        // The size is the sensor's own.
+        // Cannot fail: the size is the sensor's own.
         let Ok(mosaic) = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples)) else { continue };
         let mut picture = GrayImage { width: mosaic.band_width(), height: mosaic.band_height(), data: Vec::new() };
         picture.data.resize(picture.width * picture.height, 0.0);
@@ -247,7 +247,7 @@ fn frozen(
     Stack::new(powers, patches).with_wider_of(&views)
 }
 
-/// Puts `levels` into `square` of `picture`, which holds it.
+/// Writes `levels` into `square`, which must lie within `picture`.
 pub(super) fn put_square(picture: &mut GrayImage, square: Square, levels: &[f32]) {
     let lines = picture.data.chunks_exact_mut(picture.width).skip(square.y);
     for (line, levels) in lines.zip(levels.chunks_exact(square.side)) {
@@ -281,7 +281,7 @@ pub fn as_patch(levels: &[u8; PIXELS]) -> Patch {
     Patch(levels.map(f32::from))
 }
 
-/// Rounded; what is beyond 0..=255 becomes its end.
+/// Rounds the values and clips them to 0..=255.
 fn as_levels(patch: &Patch) -> [u8; PIXELS] {
     patch.0.map(|value| value.round() as u8)
 }
@@ -291,7 +291,7 @@ fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
     Patch(std::array::from_fn(|i| (f32::from(low[i]) + part * (f32::from(high[i]) - f32::from(low[i]))).round()))
 }
 
-/// A recorded scan being replayed, a pose a frame; at the last one it stays.
+/// A replay of a recorded scan, one pose a frame. It stays at the last pose.
 #[derive(Debug, Clone)]
 pub struct Playing {
     scan: Arc<RecordedScan>,

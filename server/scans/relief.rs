@@ -23,11 +23,11 @@ use crate::simulation::texture::{Canvas, texture, vary_contrast};
 const SIDE: usize = 360;
 /// Standard deviations in pixels at which each layer is blurred; between them pictures are mixed.
 const SIGMAS: [f32; 12] = [0.0, 0.4, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 7.5, 9.5, 12.0];
-/// The last of them.
+/// The greatest of them.
 const MOST_BLUR: f32 = SIGMAS[SIGMAS.len() - 1];
-/// Most that a place is higher or lower than the middle, in pixels of blur.
+/// Greatest height of a place above or below the middle, in pixels of blur.
 const MOST_RELIEF: f64 = 4.5;
-/// Most softness of the best picture, in pixels of standard deviation.
+/// Greatest softness of the best picture: standard deviation of its blur in pixels.
 const MOST_SOFTNESS: f64 = 3.0;
 /// Blur in pixels a unit of focal power: least and most of any scene.
 const SLOPES: (f64, f64) = (1.5, 24.0);
@@ -39,15 +39,15 @@ pub struct Style {
     flat: f64,
     /// Least relief of the others, in pixels of blur.
     least_relief: f64,
-    /// Most of the range that the relief takes from the middle: its height over the slope.
+    /// Greatest share of the range that the relief takes from the middle: its height over the slope.
     most_share: f64,
-    /// How many times its least slope a scene's slope may be.
+    /// Greatest ratio of a scene's slope to its least slope.
     slopes: f64,
     /// Share of scenes with steps.
     steps: f64,
     /// Share of scenes that are photographed at few positions.
     photographed: f64,
-    /// What those may be like.
+    /// How those are photographed.
     manner: Manner,
 }
 
@@ -86,7 +86,7 @@ pub struct StackScene {
     pub planes: PlaneStack,
     /// Positions a unit of focal power, least and most.
     pub slopes: (f64, f64),
-    /// What stands at the walking focal power.
+    /// What is in focus at the walking focal power.
     pub distance: Distance,
 }
 
@@ -96,15 +96,16 @@ pub enum Distance {
     /// It keeps its distance from the ground, at position 0: the optimum moves with the hand and with the height of
     /// what comes into view. Beyond the stack's ends the blur no longer grows.
     Kept,
-    /// It follows what is in view, so that the sharpest position, smoothed over the way, stands at the walking focal
-    /// power as nearly as the stack's ends allow: how photographed stacks are scanned (`stack/drift.rs`).
+    /// It follows what is in view. So the sharpest position, smoothed over frames, is in focus at the walking focal
+    /// power, as nearly as the stack's ends allow. Photographed stacks are scanned like this (`stack/drift.rs`).
     Following {
-        /// From one position to the next. In half of the scans the range moves by whole positions, as it does there.
+        /// Distance from one position to the next. In half of the scans the range moves by whole positions, as in
+        /// `stack/drift.rs`.
         spacing: f64,
     },
 }
 
-/// The scenes `0..count` of `split`, every second one deep, the others varied; each is drawn from its number alone.
+/// The scenes `0..count` of `split`, every second one deep, the others varied. Each depends only on its number.
 ///
 /// # Errors
 /// None in practice: the scenes are large enough.
@@ -134,13 +135,14 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     let above = rng.random_bool(0.6).then(|| things_above(seed, relief, softness, &mut rng));
     let spots = spots(&mut rng);
     let finish = Finish::draw(&mut rng);
-    // Without it the scene is shown at so many positions, and so well, that only the scan's own noise is in the
-    // pictures.
+    // A scene that is not photographed is shown at many positions and without defects: its pictures have only the
+    // scan's own noise.
     let photography = rng.random_bool(style.photographed).then(|| Photography::draw(style.manner, MOST_BLUR, &mut rng));
 
     let ground = Layer::new(&ground, spots);
     let above = above.map(|Above { colour, cover, height }| {
-        // What the things do not cover must not shine through where they are blurred.
+        // Gray levels are already multiplied by the cover, so what the things do not cover does not shine through their
+        // blur.
         (Layer::new(&colour, spots), Layer::new(&cover, spots), height)
     });
 
@@ -173,7 +175,7 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, distance })
 }
 
-/// Positions of the focal plane that lie close together where blur changes what is seen most.
+/// Positions of the focal plane. They lie closest together where blur changes the picture most.
 fn close_positions() -> Vec<f32> {
     let steps = std::iter::repeat_n(0.25, 12).chain(std::iter::repeat_n(0.5, 6)).chain(std::iter::repeat_n(1.0, 6));
 
@@ -200,7 +202,8 @@ fn surface(split: Split, index: u64, rng: &mut impl Rng) -> GrayImage {
     picture
 }
 
-/// The height of each place, `relief` at most above or below 0: a slope, folds, and in a share of scenes `steps`.
+/// The height of each place, `relief` at most above or below 0: a slope, folds, and steps in the share `steps` of
+/// scenes.
 fn heights(relief: f32, steps: f64, rng: &mut impl Rng) -> Vec<f32> {
     let mut field = Canvas::blank(SIDE);
     let middle = SIDE as f32 / 2.0;
@@ -231,7 +234,7 @@ fn heights(relief: f32, steps: f64, rng: &mut impl Rng) -> Vec<f32> {
     field.data
 }
 
-/// Flat places higher or lower than what is around them, with upright sides: blocks and discs.
+/// Flat places above or below their surroundings, with vertical sides: blocks and discs.
 fn add_steps(field: &mut Canvas, rng: &mut impl Rng) {
     for _ in 0..rng.random_range(3..30) {
         let x = rng.random_range(0..SIDE);
@@ -297,7 +300,7 @@ fn spot(rng: &mut impl Rng) -> LensSpot {
 
 /// A picture at each of [`SIGMAS`], on both sides of focus.
 struct Layer {
-    /// The near side's, then the far side's; empty where the two are the same.
+    /// Those of the near side, then of the far side. The second is empty if both are the same.
     levels: [Vec<Vec<f32>>; 2],
 }
 
@@ -312,7 +315,7 @@ impl Layer {
         if distance < 0.0 && !self.levels[1].is_empty() { &self.levels[1] } else { &self.levels[0] }
     }
 
-    /// The layer `distance` away from the focal plane, all of it.
+    /// The whole layer, `distance` away from the focal plane.
     fn at(&self, distance: f32) -> Vec<f32> {
         let levels = self.side(distance);
         let (level, share) = level(distance.abs());
@@ -342,10 +345,10 @@ fn level(sigma: f32) -> (usize, f32) {
     (above - 1, ((sigma - low) / (high - low)).min(1.0))
 }
 
-/// What a camera makes of the picture that reaches it: gamma and sharpening.
+/// What a camera does to its picture: gamma and sharpening.
 struct Finish {
     gamma: Option<f32>,
-    /// How much of what differs from the picture's blur by a pixel is added.
+    /// Share that is added of the difference between the picture and itself blurred by one pixel.
     sharpening: Option<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! The scenes of training's scans, in groups, each drawn from with a share of its own.
+//! The scenes of training scans, in groups. Each group is drawn with its own share.
 
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ struct Group {
 }
 
 impl Scenery {
-    /// This scenery with `share` of all scans over `scenes`; the others keep their shares among the
-    /// rest. Nothing changes where there are no scenes, or they have no share.
+    /// This scenery with `share` of all scans over `scenes`; the other groups keep their proportions in the rest.
+    /// Nothing changes if `scenes` is empty or `share` is 0.
     #[must_use]
     pub fn with(mut self, scenes: Vec<Scene>, share: f64) -> Self {
         if scenes.is_empty() || share <= 0.0 {
@@ -41,7 +41,8 @@ impl Scenery {
     }
 
     fn group(&self, rng: &mut ChaCha8Rng) -> &[Scene] {
-        // With one group there is nothing to draw, and trainings on flat scenes alone stay what they were.
+        // With one group nothing is drawn from `rng`, so trainings on flat scenes alone give the same results as
+        // before.
         if let [only] = &self.groups[..] {
             return &only.scenes;
         }

@@ -36,19 +36,19 @@ pub struct ScanSettings {
     pub noise: f64,
     /// Hand tremor: each frame is blurred further, by this many pixels (standard deviation) times a normal draw.
     pub tremor: f64,
-    /// Unsteady contrast (light, smoke, wet glints): each frame's is scaled by the exponential of
-    /// this times a normal draw.
+    /// Unsteady contrast (light, smoke, wet glints): each frame's contrast is scaled by the exponential of this times a
+    /// normal draw.
     pub flicker: f64,
     /// Contrast and brightness: gray becomes `gain * gray + offset`.
     pub exposure: (f64, f64),
     /// Share of the light that comes from something in view that moves by itself, as fluids,
     /// instruments and reflections do.
     pub veil: f64,
-    /// Standard deviation, in gray levels, of a pattern that stays with the sensor.
+    /// Standard deviation, in gray levels, of the sensor's fixed pattern.
     pub pattern: f64,
-    /// How restless the scene is, if it is.
+    /// How restless the scene is; `None` if it is not.
     pub unrest: Option<Restlessness>,
-    /// Whether now and then something without detail covers the view: a glove, an instrument, glare.
+    /// Whether something without detail sometimes covers the view: a glove, an instrument, glare.
     pub covered: bool,
 }
 
@@ -60,7 +60,7 @@ impl ScanSettings {
         Self { crop: Motion { speed: 5.0, memory: 30.0 }, ..Self::default() }
     }
 
-    /// What fits `scene`: the default over a video, the reference's over whatever is still.
+    /// The settings that fit `scene`: the default over a video, the reference's over anything that is still.
     #[must_use]
     pub fn fitting(scene: &Scene) -> Self {
         match scene {
@@ -93,15 +93,16 @@ impl Default for ScanSettings {
 /// What a scan is taken of.
 #[derive(Debug, Clone)]
 pub enum Scene {
-    /// Sharp pictures, all of which lie at one distance.
+    /// Sharp pictures, with everything at one distance.
     Flat(Arc<Clip>),
     /// A focal stack, whose places may lie at different distances.
     Stack(Arc<StackScene>),
-    /// A recorded scan, played to and fro: only exposure, noise and cover of the settings apply.
+    /// A recorded scan, played forwards and backwards. Of the settings, only exposure, flicker, noise, pattern and
+    /// cover apply.
     Recorded(Arc<RecordedScan>),
 }
 
-/// One focal-time scan, frame by frame. Its course depends on its seed alone, never on what is looked at.
+/// One focal-time scan, frame by frame. Its course depends only on its seed, never on what is observed.
 #[derive(Debug, Clone)]
 pub struct Scan {
     scene: Scene,
@@ -119,9 +120,9 @@ pub struct Scan {
     following: Option<Following>,
     /// Where the veil lies on the clip, if there is one.
     veil: Option<[Walk; 2]>,
-    /// The sensor's pattern, a gray level a pixel; empty if there is none.
+    /// The sensor's fixed pattern, in gray levels for each pixel; empty if there is none.
     pattern: Vec<f32>,
-    /// The same as the wider patches show it.
+    /// The fixed pattern as the wider patches show it.
     wider_pattern: [Vec<f32>; WIDER.len()],
     unrest: Option<Unrest>,
     cover: Option<Cover>,
@@ -129,7 +130,8 @@ pub struct Scan {
     veil_course: ChaCha8Rng,
     unrest_course: ChaCha8Rng,
     noise: ChaCha8Rng,
-    /// Noise of the wider patches, so that the patch's is the same whether they are looked at or not.
+    /// Noise of the wider patches. It has its own stream, so that the patch's noise is the same whether the wider
+    /// patches are observed or not.
     wider_noise: ChaCha8Rng,
     defocus: Defocus,
 }
@@ -158,8 +160,7 @@ impl Scan {
             _ => 0,
         };
 
-        // Each part draws from a stream of its own, so that turning one off leaves the others as
-        // they are.
+        // Each part has its own random stream, so that turning one off does not change the others.
         let mut noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
         let mut veil_course = ChaCha8Rng::seed_from_u64(seed ^ 0x7665_696c);
         let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
@@ -230,7 +231,7 @@ impl Scan {
         }
     }
 
-    /// How fast blur grows, where that is known: not of photographs.
+    /// How fast blur grows. `None` for photographs, of which it is not known.
     #[must_use]
     pub fn blur(&self) -> Option<BlurRate> {
         match (&self.scene, &self.optics) {
@@ -291,8 +292,8 @@ impl Scan {
         view
     }
 
-    /// Makes of the light of a wider patch what the camera would, as for the patch itself. Noise and
-    /// rounding count for less, since a value is the mean of many pixels.
+    /// Turns the light of a wider patch into what the camera records, as for the patch itself. Noise and rounding
+    /// matter less, because a value is the mean of many pixels.
     fn take_wider(&mut self, patch: &mut Patch, index: usize) {
         let gain = self.settings.exposure.0 as f32;
         let offset = self.settings.exposure.1 as f32;
@@ -440,14 +441,14 @@ impl Scene {
                 let (width, height) = stack.planes.size();
                 (0, 0, width, height)
             }
-            // The recording moved by itself.
+            // The recording itself moves, so the crop stays.
             Self::Recorded(_) => (0, 0, PATCH_SIDE, PATCH_SIDE),
         };
         [(left, right), (top, bottom)].map(|(low, high)| (low as f64, (high - PATCH_SIDE) as f64))
     }
 }
 
-/// Scales what differs from the patch's mean by `contrast`, and all by `gain`.
+/// Scales differences from the patch's mean by `contrast`, then everything by `gain`, and adds `offset`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn expose(patch: &mut Patch, gain: f32, contrast: f32, offset: f32) {
     let mean = patch.0.iter().sum::<f32>() / patch.0.len() as f32;
@@ -456,7 +457,7 @@ fn expose(patch: &mut Patch, gain: f32, contrast: f32, offset: f32) {
     }
 }
 
-/// Whole gray levels, 0..=255.
+/// Rounds to whole gray levels, 0..=255.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn digitise(patch: &mut Patch) {
     for value in &mut patch.0 {
@@ -582,13 +583,14 @@ mod tests {
             scan.advance();
         }
 
-        // Poses 1, 2, 3, 2, 1, ... at the third focal power, from whichever the seed begins with.
+        // Poses 1, 2, 3, 2, 1, ... at the third focal power, beginning with the pose that the seed draws.
         let whole: Vec<u8> = [12, 22, 32, 22].into_iter().cycle().take(12).collect();
         assert!(whole.windows(8).any(|part| part == shown), "{shown:?}");
     }
 
-    /// Where the sharpest depth of a patch is out of reach, the optimum is the sharpest that the lens reaches. Mixed
-    /// pictures have less noise than photographed ones, so the two differ by up to half of the distance between those.
+    /// If the sharpest depth of a patch is out of reach, the optimum is the sharpest one that the lens reaches. Mixed
+    /// pictures have less noise than photographed ones, so the two may differ by up to half the distance between
+    /// photographed pictures.
     #[test]
     fn over_a_followed_stack_the_optimum_is_the_sharpest_that_the_lens_reaches() {
         let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 2).unwrap().remove(1);

@@ -9,16 +9,16 @@ use crate::simulation::patch_defocus::Spot;
 use crate::simulation::unrest::Restlessness;
 use crate::simulation::walk::Motion;
 
-/// How far training leaves the reference's scans.
+/// How far training scans differ from the reference's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variety {
-    /// How much of the variety to apply: 0 gives plain scans, over still pictures the reference's, 1 all of it.
+    /// Share of scans to vary: 0 gives plain scans (over still pictures, the reference's), 1 varies all.
     pub share: f64,
 }
 
 impl Variety {
-    /// Settings for one scan over `scene`: with probability `share` varied in speed, spot, noise,
-    /// exposure and what else is in view.
+    /// Settings for one scan over `scene`: with probability `share` they vary in speed, spot, noise, exposure and what
+    /// else is in view.
     pub fn draw(&self, scene: &Scene, rng: &mut impl Rng) -> ScanSettings {
         let mut settings = ScanSettings::fitting(scene);
         if !rng.random_bool(self.share) {
@@ -32,7 +32,7 @@ impl Variety {
         settings.crop.memory *= factor(rng, 0.4);
 
         if rng.random_bool(0.2) {
-            // Hardly anything that one frame shows is left in the next.
+            // So fast that hardly anything of one frame is left in the next.
             settings.crop = Motion { speed: rng.random_range(15.0..40.0), memory: rng.random_range(5.0..30.0) };
         }
 
@@ -52,7 +52,7 @@ impl Variety {
     }
 }
 
-/// From hardly restless to very: at most about as footage of tissue is, judged by how the energies of
+/// From hardly to very restless. The most is about as restless as footage of tissue, judged by how the energies of
 /// overlaid patches differ from frame to frame.
 fn restlessness(rng: &mut impl Rng) -> Restlessness {
     Restlessness {

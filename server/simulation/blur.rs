@@ -27,7 +27,7 @@ pub fn gaussian_blur(image: &GrayImage, sigma: f64) -> GrayImage {
     GrayImage { width: image.width, height: image.height, data }
 }
 
-/// One half of the kernel, its middle first; it sums to 1 with its mirror image.
+/// Half of the kernel, from its middle outwards. With its mirror image it sums to 1.
 fn gaussian_kernel(sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0 && sigma.is_finite()) {
         return vec![1.0];
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_blurred_step_edge_is_the_normal_distribution() {
-        // The edge stands between pixels 39 and 40, so that pixel 40 + k is k + 0.5 away: interpolate between the two.
+        // The edge is between pixels 39 and 40, so pixel 40 + k is k + 0.5 away. We interpolate between two pixels.
         let upright = gaussian_blur(&step(80, 70, |x, _| x >= 40), 4.0);
         let level = gaussian_blur(&step(70, 80, |_, y| y >= 40), 4.0);
         for (sigmas, expected) in NORMAL_CDF {

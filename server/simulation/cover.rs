@@ -1,5 +1,5 @@
-//! Covers the view now and then in training, as a glove, an instrument or glare does; then there is
-//! nothing to focus on.
+//! Covers the view from time to time in training, as a glove, an instrument or glare does. Meanwhile there is nothing
+//! to focus on.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

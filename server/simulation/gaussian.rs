@@ -24,9 +24,9 @@ pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
     both.into_iter().map(|sample| sample / sum).collect()
 }
 
-/// The discrete Gaussian (Lindeberg 1990) of standard deviation `sigma`, up to `reach` pixels either
-/// way: `exp(-t) I_n(t)` with t = `sigma` squared. `sigma` must be below 1, where samples of a Gaussian
-/// as in [`kernel`] would have less than its variance.
+/// The discrete Gaussian (Lindeberg 1990) of standard deviation `sigma`, up to `reach` pixels either way:
+/// `exp(-t) I_n(t)` with t = `sigma` squared. `sigma` must be below 1. In that range samples of a Gaussian, as in
+/// [`kernel`], have less than its variance.
 #[must_use]
 pub fn discrete_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let half = 0.5 * sigma * sigma;
@@ -48,8 +48,7 @@ pub fn discrete_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// `values` smoothed by a Gaussian of `sigma` places, cut at four of them. Beyond both ends the values
-/// are mirrored.
+/// `values` smoothed by a Gaussian of `sigma` places, cut at four sigma. Beyond both ends the values are mirrored.
 #[must_use]
 pub fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
     let reach = (4.0 * sigma).round() as usize;

@@ -11,13 +11,13 @@ const MAX_REACH: usize = 32;
 pub(super) const MAX_SIDE: usize = PATCH_SIDE + 2 * MAX_REACH;
 /// Widest blur, in pixels of standard deviation.
 const MOST_SIGMA: f64 = 8.0;
-/// From this on wide squares are blurred at half the resolution: nothing is left that would show the difference.
+/// From this sigma on, squares are blurred at half the resolution: no detail is left that would show the difference.
 const WIDE_SIGMA: f64 = 3.0;
-/// Pixels along each axis that a value has the mean of there.
+/// Pixels along each axis that are averaged into one value at half the resolution.
 const COARSE: usize = 2;
-/// Reach of the kernel of a blur narrower than that, of less than one value's width, in values.
+/// Reach, in values at half the resolution, of the kernel of a blur whose sigma is below one such value.
 const NARROW_REACH: usize = 4;
-/// Below this a blur changes no grey value that a camera could tell.
+/// Below this sigma, blur changes gray values by less than a camera can tell.
 const LEAST_SIGMA: f64 = 0.15;
 
 /// Shape of the blur that a point becomes.
@@ -39,15 +39,15 @@ pub struct Defocus {
 
 impl Defocus {
     /// The patch whose top left pixel is `(x, y)` of `image` (which must not be empty), blurred by a spot of standard
-    /// deviation `sigma` pixels (at most 8; more counts as 8). Outside the image its border pixels go on.
+    /// deviation `sigma` pixels (at most 8; more counts as 8). Outside the image its border pixels are repeated.
     pub fn patch(&mut self, image: &GrayImage, (x, y): (isize, isize), sigma: f64, spot: Spot) -> Patch {
         self.patch_of(sigma, spot, |reach, side, source| {
             gather(image, (x - reach as isize, y - reach as isize), side, source);
         })
     }
 
-    /// The same of a scene that `look` shows: it is called with how many pixels around the patch
-    /// matter, how many that makes a row, and where to put them, row after row.
+    /// As [`Defocus::patch`], of a scene that `look` shows. `look` gets the number of pixels around the patch that
+    /// matter, the number of pixels in a row, and the slice to fill row after row.
     pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
@@ -58,9 +58,8 @@ impl Defocus {
         patch
     }
 
-    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide
-    /// blur is made of means of 2x2 pixels: each of the square's values is then twice as wide and
-    /// high as a pixel.
+    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide blur is made from
+    /// means of 2x2 pixels. Each of the square's values is then twice as wide and high as a pixel.
     pub fn square(&mut self, image: &GrayImage, square: Square, sigma: f64, spot: Spot) -> Vec<f32> {
         let Square { x, y, side } = square;
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
@@ -99,8 +98,8 @@ impl Defocus {
         let mut levels = vec![0.0; side * side];
 
         if sigma < 1.0 {
-            // Of so narrow a spot only the variance shows, not the shape; samples of a Gaussian
-            // would have less than its variance.
+            // Such a narrow spot shows only its variance, not its shape. Samples of a Gaussian would have less than its
+            // variance.
             let kernel = || single(gaussian::discrete_kernel(sigma, NARROW_REACH));
             self.blur(side, NARROW_REACH, Blur { sigma, spot: Spot::Gaussian, kernel }, look, &mut levels);
         } else {
@@ -112,8 +111,8 @@ impl Defocus {
         repeated(&levels, side)
     }
 
-    /// Fills `out`, `width` values a row and as many rows, with what `look` shows, blurred by
-    /// `blur`, which reaches `reach` pixels far.
+    /// Fills `out` (`width` x `width` values) with what `look` shows, blurred by `blur`, whose kernel reaches `reach`
+    /// pixels.
     fn blur<K: FnOnce() -> Vec<f32>>(
         &mut self,
         width: usize,
@@ -142,14 +141,14 @@ impl Defocus {
     }
 }
 
-/// A spot, and how to make its kernel where it is a Gaussian.
+/// A spot, and how to make its kernel if it is a Gaussian.
 struct Blur<K> {
     sigma: f64,
     spot: Spot,
     kernel: K,
 }
 
-/// Each of `levels`, `side` a row, in place of [`COARSE`] x [`COARSE`] pixels.
+/// Repeats each of `levels` (`side` in a row) for [`COARSE`] x [`COARSE`] pixels.
 fn repeated(levels: &[f32], side: usize) -> Vec<f32> {
     let wide = |line: &[f32]| -> Vec<f32> { line.iter().flat_map(|&level| [level; COARSE]).collect() };
     levels.chunks_exact(side).map(wide).flat_map(|line| [line.clone(), line]).flatten().collect()
@@ -209,8 +208,8 @@ fn blur_columns(rows: &[f32], kernel: &[f32], width: usize, out: &mut [f32]) {
     }
 }
 
-/// Mean over a disc, its rim weighted by cover along the row: each row's span is a difference of running sums, and all
-/// columns of a row share how their spans lie to the pixels.
+/// Mean over a disc. Pixels at its rim are weighted by the part of them that it covers along the row. Each row's span
+/// is a difference of running sums, and all columns of a row share the same parts at both ends.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, sums: &mut [f32], out: &mut [f32]) {
     for (line, sums) in source.chunks_exact(side).zip(sums.chunks_exact_mut(side + 1)) {
@@ -295,8 +294,8 @@ mod tests {
                 let patch = defocus.patch(&picture, (70 + 32, 80 + 64), sigma, spot);
                 let off = |i: usize| (levels[(64 + i / 32) * 128 + 32 + i % 32] - patch.0[i]).powi(2);
                 let off = ((0..1024).map(off).sum::<f32>() / 1024.0).sqrt();
-                // A wide blur is made at half the resolution, which shifts gray levels by what they
-                // change within a pixel.
+                // A wide blur is made at half the resolution, which shifts gray levels by as much as they change within
+                // a pixel.
                 let most = if sigma < WIDE_SIGMA { 1e-3 } else { 4.0 };
                 assert!(off < most, "{spot:?} of {sigma}: {off}");
             }

@@ -1,4 +1,4 @@
-//! A path through several coordinates: walks as a function of time alone, whatever the frame rate.
+//! A path through several coordinates: walks that depend only on time, not on the frame rate.
 
 use std::time::Duration;
 
@@ -14,12 +14,12 @@ pub struct Habit {
     pub range: (f64, f64),
     /// Standard deviation of its speed, per second.
     pub speed: f64,
-    /// Seconds over which it forgets its speed.
+    /// Seconds after which its speed's autocorrelation has fallen to 1/e.
     pub memory: f64,
 }
 
-/// `N` walks that advance at a fixed rate; between two steps they move evenly. The same seed and habits
-/// give the same path, as long as times are asked for in rising order.
+/// `N` walks that advance at a fixed rate; between two steps they move evenly. The same seed and habits give the same
+/// path, as long as times are requested in rising order.
 #[derive(Debug, Clone)]
 pub struct Path<const N: usize> {
     rng: ChaCha8Rng,

@@ -14,11 +14,11 @@ const CORE: f32 = 0.7;
 pub enum LensSpot {
     /// A Gaussian, as in the paper.
     Gaussian,
-    /// A disc, as a round aperture makes it; its rim, the outer three tenths of its radius, is brighter
-    /// than its core by the factor `1 + rim`, darker where `rim` is below 0. Spherical aberration
-    /// brightens the rim on one side of focus and the core on the other.
+    /// A disc, as a round aperture makes it. Its rim, the outer three tenths of its radius, is brighter than its core
+    /// by the factor `1 + rim`, or darker if `rim` is below 0. Spherical aberration brightens the rim on one side of
+    /// focus and the core on the other.
     Disc {
-        /// Above -1.
+        /// Excess brightness of the rim over the core, above -1.
         rim: f32,
     },
 }
@@ -58,8 +58,7 @@ fn half_width(radius: f32, offset: i32) -> f32 {
     (radius * radius - (offset * offset) as f32).max(0.0).sqrt()
 }
 
-/// The rows of a disc and its half width in each, so that a disc smaller than a pixel still covers the
-/// pixel itself.
+/// The rows of a disc and its half width in each. A disc smaller than a pixel still covers the pixel itself.
 fn spans(radius: f32) -> impl Iterator<Item = (i32, f32)> {
     let reach = radius as i32;
     (-reach..=reach).map(move |offset| {
@@ -72,8 +71,8 @@ fn disc_area(radius: f32) -> f32 {
     spans(radius).map(|(_, half)| 2.0 * half).sum()
 }
 
-/// The sum of `picture` over a disc of `radius` pixels around each pixel; in each row the disc's ends
-/// count by the part of a pixel that they cover.
+/// The sum of `picture` over a disc of `radius` pixels around each pixel; in each row, the pixels at the disc's ends
+/// count by the part of them that it covers.
 fn disc_sums(picture: &GrayImage, radius: f32) -> Vec<f32> {
     let width = picture.width;
     let height = picture.height;
@@ -103,7 +102,7 @@ fn disc_sums(picture: &GrayImage, radius: f32) -> Vec<f32> {
     out
 }
 
-/// Adds to each pixel of `out` the sum from `low` to `high` pixels on from it, by running sums.
+/// Adds to each pixel of `out` the sum from `low` to `high` pixels to the right of it, from running sums.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn add_span(running: &[f32], low: f32, high: f32, out: &mut [f32]) {
     let below = low as usize;

@@ -73,7 +73,7 @@ impl Canvas {
         Self { side, data: vec![0.0; side * side] }
     }
 
-    /// Octaves of smoothly interpolated noise; each finer one weaker by a drawn factor.
+    /// Octaves of smoothly interpolated noise; each finer one is weaker by a random factor.
     fn add_noise(&mut self, rng: &mut impl Rng, amplitude: f32) {
         let falloff = rng.random_range(0.45f32..0.95);
         let mut cell = rng.random_range(24.0f32..80.0);
@@ -133,8 +133,8 @@ impl Canvas {
         rng.random_range(0.0..self.side as f32)
     }
 
-    /// Replaces what is there by an ellipse of the area of a disc of `radius`, `stretch` times as wide
-    /// as high.
+    /// Draws an ellipse over what is there. It has the area of a disc of `radius` and is `stretch` times as wide as
+    /// high.
     pub fn add_leaf(&mut self, (cx, cy): (f32, f32), radius: f32, stretch: f32, shade: f32) {
         let rx = radius * stretch.sqrt();
         let ry = radius / stretch.sqrt();
@@ -186,7 +186,7 @@ impl Canvas {
         }
     }
 
-    /// Brings the values to a drawn brightness and contrast on 0..=255, under an uneven light.
+    /// Brings the values to a random brightness and contrast on 0..=255, under uneven light.
     fn expose(&mut self, rng: &mut impl Rng) {
         let count = self.data.len() as f32;
         let mean = self.data.iter().sum::<f32>() / count;

@@ -22,7 +22,7 @@ pub struct Restlessness {
     pub strain: f64,
     /// Standard deviation of the logarithm of the contrast from place to place.
     pub contrast: f64,
-    /// Size of the field of contrast's cells, pixels.
+    /// Size of the cells of the contrast's field, in pixels.
     pub cell: f64,
     /// Speed of the contrast's field over the scene, in cells a frame.
     pub drift: f64,
@@ -31,7 +31,7 @@ pub struct Restlessness {
 /// The deformation and the contrast of a scene at a frame.
 #[derive(Debug, Clone)]
 pub struct Unrest {
-    /// Added to the unit matrix that maps a place in the patch to one in the picture, row by row.
+    /// Difference from the unit matrix of the matrix that maps a place in the patch to one in the picture, row by row.
     strain: [Walk; 4],
     drift: [Walk; 2],
     cell: f32,
@@ -67,7 +67,7 @@ impl Unrest {
         self.fill(image, centre, self.cell, None, side, out);
     }
 
-    /// The same around a square of `width` pixels whose top left pixel lies at `corner`, where `image`
+    /// As [`Unrest::gather`], around a square of `width` pixels whose top left pixel lies at `corner`, where `image`
     /// holds means of 2x2 pixels.
     pub fn gather_coarsely(&self, image: &GrayImage, corner: (f64, f64), width: usize, side: usize, out: &mut [f32]) {
         let centre = [corner.0, corner.1].map(|at| 0.5 * (at as f32 + 0.5 * width as f32));
@@ -126,12 +126,12 @@ impl Unrest {
 struct Knots {
     before: usize,
     after: usize,
-    /// Share of the way from the one to the other.
+    /// Share of the way from `before` to `after`.
     part: f32,
 }
 
 impl Knots {
-    /// The knots around `place`, in knots from the field's beginning.
+    /// The knots around `place`, which is counted in knots from the field's beginning.
     fn around(place: f32) -> Self {
         let before = place.floor();
         let wrap = |knot: i32| knot.rem_euclid(KNOTS as i32) as usize;
@@ -139,8 +139,7 @@ impl Knots {
     }
 }
 
-/// Fills `line` with the values of `image` at places between its pixels' middles, from `start` on with
-/// a step of `along`.
+/// Fills `line` with values of `image`, interpolated between its pixels, from `start` on with a step of `along`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn sample(image: &GrayImage, start: (f32, f32), along: (f32, f32), line: &mut [f32]) {
     let most = [image.width, image.height].map(|pixels| (pixels - 2) as i32);
@@ -177,7 +176,7 @@ mod tests {
 
     use super::*;
 
-    /// Gray levels that rise by 1 a pixel along and 2 a pixel down.
+    /// Gray levels that rise by 0.5 a pixel to the right and by 1 a pixel down.
     fn slope() -> GrayImage {
         let data = (0..96 * 96).map(|i| (i % 96 + 2 * (i / 96)) as f32 * 0.5).collect();
         GrayImage { width: 96, height: 96, data }

@@ -23,14 +23,13 @@ pub struct Motion {
 }
 
 impl Walk {
-    /// A walk within `low..=high` from a uniformly drawn place, at a velocity from the stationary
-    /// distribution.
+    /// A walk within `range` from a uniformly drawn place, at a velocity from the stationary distribution.
     pub fn new(range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
         let position = range.0 + (range.1 - range.0) * rng.random::<f64>();
         Self::starting(position, range, motion, rng)
     }
 
-    /// A walk within `low..=high` from `position`, at a velocity from the stationary distribution.
+    /// A walk within `range` from `position`, at a velocity from the stationary distribution.
     pub fn starting(position: f64, range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
         Self { position, velocity: motion.speed * standard_normal(rng), range, motion }
     }

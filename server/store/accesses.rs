@@ -1,4 +1,4 @@
-//! Who looked at the evidence: each access is a record of its own, and is chained.
+//! Who looked at the evidence. Each access is a record of its own, with a row in the chain.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,32 +16,32 @@ use crate::ids::SessionId;
 use crate::trial::account::{AccountName, Actor};
 use crate::trial::role::Role;
 
-/// What somebody did that shows them evidence, or copies it.
+/// An act that shows evidence to somebody, or copies it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Access {
-    /// Came in by a role's link.
+    /// Was let in by a role's link.
     Entered,
-    /// Looked at the focal path of a session, which may tell the policies.
+    /// Looked at the focal path of a session, which may reveal the policies.
     PathViewed(SessionId),
     /// Looked at the recording of a session.
     RecordingViewed(SessionId),
-    /// Asked for an export of a session.
+    /// Exported a session.
     Exported {
-        /// The session.
+        /// The exported session.
         session: SessionId,
-        /// Whether with the policies.
+        /// Whether the policies are in the export.
         unblinded: bool,
     },
-    /// Looked at the analysis of a study, or took it along.
+    /// Looked at the analysis of a study, or downloaded it.
     AnalysisViewed {
         /// The study's name.
         study: String,
     },
     /// Copied the database, policies included.
     BackedUp,
-    /// Put a backup in the place of a database.
+    /// Replaced a database by a backup.
     Restored {
-        /// The head of that database, if it had one.
+        /// Chain head of the replaced database; `None` if there was no readable one.
         replaced: Option<Head>,
     },
 }
@@ -78,16 +78,16 @@ impl Access {
     }
 }
 
-/// Records what somebody does with a database.
+/// Records accesses to a database, in that database.
 #[derive(Clone)]
 pub struct Recorder {
     way: Way,
     /// The data folder.
     folder: PathBuf,
     reader: Reader,
-    /// Whose it is; none on the command line.
+    /// The person's role; `None` on the command line.
     role: Option<Role>,
-    /// The account of whoever it is; none for whoever is not signed in.
+    /// The person's account; `None` if nobody is signed in.
     account: Option<AccountName>,
     clock: Arc<dyn Clock>,
 }
@@ -96,12 +96,12 @@ pub struct Recorder {
 enum Way {
     /// Within the server.
     Server(Store),
-    /// From the command line, beside a server or without one.
+    /// From the command line, whether or not a server runs.
     CommandLine(SqlitePool),
 }
 
 impl Recorder {
-    /// What `by` does within the server.
+    /// Records what `by` does through the server.
     #[must_use]
     pub fn of_server(store: &Store, by: Actor, clock: Arc<dyn Clock>) -> Self {
         let folder = store.inner.folder.clone();
@@ -116,11 +116,11 @@ impl Recorder {
         }
     }
 
-    /// What is done from the command line with the database of data folder `folder`, whether or not a server has
-    /// it open.
+    /// Records what is done from the command line with the database of data folder `folder`, whether or not a server
+    /// has it open.
     ///
     /// # Errors
-    /// When there is none, it is not of this version, or it cannot be written.
+    /// If there is no database, it is of another version, or it cannot be written.
     pub async fn open(folder: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
         Self::open_file(&folder.join(DATABASE), clock).await
     }
@@ -144,16 +144,16 @@ impl Recorder {
         &self.folder
     }
 
-    /// For reading.
+    /// The reader of the same database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }
 
-    /// Records `access`. On disk when this returns, with the chain's head then.
+    /// Records `access` and returns the chain's new head. The record is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn record(&self, access: &Access) -> Result<Head, StoreError> {
         let (pool, run, _turn) = match &self.way {
             Way::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
@@ -166,7 +166,7 @@ impl Recorder {
         recorded
     }
 
-    /// Ends its connections where it has its own.
+    /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
         if let Way::CommandLine(pool) = &self.way {
             self.reader.close().await;
@@ -184,12 +184,12 @@ impl Recorder {
         let wall = self.clock.wall().to_string();
         let session = access.session().map(|session| session.to_string());
 
-        // Nobody stays signed in by a backup: a sign-in may have been ended since.
+        // A backup may hold sign-ins that were ended since it was made. So a restore ends all sign-ins.
         if matches!(access, Access::Restored { .. }) {
             sqlx::query("DELETE FROM sign_ins").execute(&mut *transaction).await?;
         }
 
-        // What an export is to prove is chained before it is read.
+        // Chains the session's telemetry first, so that the export can prove it.
         if let Access::Exported { session, .. } = access {
             chain::seal(&mut transaction, &session.to_string(), &wall, false).await?;
         }
@@ -209,7 +209,7 @@ impl Recorder {
 
         let number = done.last_insert_rowid().to_string();
         name_actor(&mut transaction, self.account.as_ref(), "access", &number, access.session(), &wall).await?;
-        // Last: the chain of an export ends with the record of the export.
+        // Last, because the chain in an export ends with the record of that export.
         let head = chain::append(&mut transaction, "access", &number, &wall).await?;
         transaction.commit().await?;
         Ok(head)

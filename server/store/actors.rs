@@ -1,4 +1,4 @@
-//! Under which personal account a record was made: a row beside the record, in the same transaction.
+//! The personal account that made a record. It is a row beside the record, written in the same transaction.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use super::{Reader, StoreError, chain};
 use crate::ids::SessionId;
 use crate::trial::account::AccountName;
 
-/// Records that `account` made the record of kind `kind` with this key, which the transaction on `connection` writes;
-/// does nothing where nobody was signed in. `session` is the record's, if it has one.
+/// Records that `account` made the record of kind `kind` with this key. The transaction on `connection` writes both.
+/// Does nothing if nobody was signed in. `session` is the record's session, if it has one.
 pub(super) async fn name_actor(
     connection: &mut SqliteConnection,
     account: Option<&AccountName>,
@@ -42,7 +42,7 @@ impl Reader {
     /// The names of the accounts that made records of `session`, by the record's kind and key.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn actors(&self, session: SessionId) -> Result<BTreeMap<(String, String), String>, StoreError> {
         let rows: Vec<(String, String, String)> =
             sqlx::query_as("SELECT kind, record, account FROM actors WHERE session = ?")

@@ -16,21 +16,21 @@ use crate::trial::role::Role;
 pub struct StoredConsent {
     /// Order of the record in the database.
     pub number: i64,
-    /// The start of the server that recorded it.
+    /// Number of the run that recorded it.
     pub run: i64,
-    /// Who recorded it.
+    /// Role of the person who recorded it.
     pub by: Role,
     /// When it was recorded.
     pub stamp: Stamp,
-    /// The consent.
+    /// What was consented to, when and how.
     pub consent: Consent,
 }
 
 impl Store {
-    /// Records a consent for `session`. On disk when this returns.
+    /// Records a consent for `session`. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn keep_consent(
         &self,
         session: SessionId,
@@ -82,7 +82,7 @@ impl Reader {
     /// The consents for `session`, in the order in which they were recorded. The latest counts.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn consents(&self, session: SessionId) -> Result<Vec<StoredConsent>, StoreError> {
         let rows = sqlx::query("SELECT * FROM consents WHERE session = ? ORDER BY number")
             .bind(session.to_string())

@@ -1,4 +1,4 @@
-//! Corrections: rows beside what was recorded, which stays as it was.
+//! Corrections: rows beside the original records, which stay unchanged.
 
 use std::collections::BTreeMap;
 
@@ -17,23 +17,23 @@ use crate::trial::role::Role;
 /// A correction to be recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Correction {
-    /// The session.
+    /// Session of the corrected record.
     pub session: SessionId,
-    /// What is corrected.
+    /// Kind of the corrected record.
     pub subject: Subject,
     /// The key of the answer or comment, or the session's id.
     pub record: String,
-    /// What of it.
+    /// Which field of the record is corrected.
     pub field: Field,
-    /// What stood there so far.
+    /// The value so far.
     pub old: String,
-    /// What is right.
+    /// The right value.
     pub new: String,
-    /// Why.
+    /// Reason that the person gave.
     pub reason: String,
-    /// Who.
+    /// Role of the person who corrects.
     pub by: Role,
-    /// When.
+    /// When it is recorded.
     pub stamp: Stamp,
 }
 
@@ -42,9 +42,9 @@ pub struct Correction {
 pub struct StoredCorrection {
     /// Order of the record in the database.
     pub number: i64,
-    /// The start of the server that recorded it.
+    /// Number of the run that recorded it.
     pub run: i64,
-    /// The correction; without its texts where they were erased.
+    /// The correction. Its texts are empty if they were erased.
     pub correction: Correction,
 }
 
@@ -53,7 +53,7 @@ pub struct StoredCorrection {
 pub struct Latest(BTreeMap<(Subject, String, Field), String>);
 
 impl Latest {
-    /// Of `corrections`, which are a session's in the order in which they were recorded.
+    /// Takes the `corrections` of a session, in the order in which they were recorded.
     #[must_use]
     pub fn of(corrections: &[StoredCorrection]) -> Self {
         let entry = |StoredCorrection { correction, .. }: &StoredCorrection| {
@@ -62,13 +62,13 @@ impl Latest {
         Self(corrections.iter().map(entry).collect())
     }
 
-    /// The session's right participant, where that was corrected.
+    /// The session's right participant; `None` if that was not corrected.
     #[must_use]
     pub fn participant(&self, session: SessionId) -> Option<&str> {
         self.get(Subject::Session, session.to_string(), Field::Participant)
     }
 
-    /// The right value of the answer with this key, where it was corrected.
+    /// The right value of the answer with this key; `None` if it was not corrected.
     #[must_use]
     pub fn value(&self, answer: &IdempotencyKey) -> Option<AnswerValue> {
         serde_json::from_str(self.get(Subject::Answer, answer.to_string(), Field::Value)?).ok()
@@ -86,10 +86,10 @@ impl Latest {
 }
 
 impl Store {
-    /// Records a correction by `account`, if somebody was signed in. On disk when this returns.
+    /// Records a correction. `account` is `None` if nobody was signed in. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -137,7 +137,7 @@ impl Reader {
     /// The corrections of `session`, in the order in which they were recorded.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn corrections(&self, session: SessionId) -> Result<Vec<StoredCorrection>, StoreError> {
         let rows = sqlx::query("SELECT * FROM corrections WHERE session = ? ORDER BY number")
             .bind(session.to_string())

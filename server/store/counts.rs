@@ -1,14 +1,14 @@
-//! What became of telemetry.
+//! Counts of telemetry that was written or lost.
 
 use std::sync::atomic::AtomicU64;
 
-/// What became of telemetry since the start.
+/// How much telemetry was written or lost since the start of the server.
 #[derive(Debug, Default)]
 pub struct Counts {
     /// Records written.
     pub written: AtomicU64,
-    /// Batches that could not be written at the first try.
+    /// Failed attempts to write a batch.
     pub failed_batches: AtomicU64,
-    /// Records given up, the disk having failed for too long.
+    /// Records dropped because the disk failed for too long.
     pub lost: AtomicU64,
 }

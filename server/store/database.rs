@@ -28,24 +28,24 @@ use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 /// Name of the lock in the data folder.
 const LOCK: &str = "parfocal.lock";
 
-/// A start of the server.
+/// A start of the server, and what it ran with.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// When, by the wall clock.
+    /// When the server started, by the wall clock.
     pub wall: Timestamp,
-    /// When, by the monotonic clock.
+    /// When the server started, by the monotonic clock.
     pub at: Moment,
-    /// The camera, described.
+    /// Description of the camera.
     pub camera: String,
-    /// The lens, described.
+    /// Description of the lens.
     pub lens: String,
     /// The sensor's calibration, by its title.
     pub calibration: String,
-    /// What the policies were told of how fast the optic blurs.
+    /// How fast the optic blurs, as the policies know it; `None` if they do not.
     pub blur: Option<BlurRate>,
-    /// SHA-256 of each learned policy's weights, by its name.
+    /// SHA-256 of each learned policy's weights, by the policy's name.
     pub weights: BTreeMap<PolicyName, String>,
-    /// The seed given on the command line.
+    /// The seed given on the command line, if any.
     pub seed: Option<u64>,
 }
 
@@ -63,24 +63,24 @@ pub(super) struct Inner {
     pub(super) telemetry: SqlitePool,
     pub(super) checkpoints: SqlitePool,
     pub(super) reader: Reader,
-    /// `SQLite` lets one connection write at a time and polls for its turn; this queue is fair and wakes at once.
+    /// `SQLite` lets one connection write at a time, and the others poll. This queue is fair and wakes the next writer
+    /// at once.
     turn: Mutex<()>,
     pub(super) run: i64,
     /// When this run began.
     pub(super) started: Stamp,
     pub(super) telemetry_counts: Counts,
     pub(super) writes: Writes,
-    /// Released when dropped, or by the kernel when the process ends in whatever way.
+    /// Released when dropped, or by the kernel however the process ends.
     _lock: File,
 }
 
 impl Store {
-    /// Opens the data folder `folder`, making it and its database or bringing the database up to date where needed, and
-    /// records the start of `run`.
+    /// Opens the data folder `folder` and records the start of `run`. Creates the folder and the database if they do
+    /// not exist, and brings an older database up to date.
     ///
     /// # Errors
-    /// When another server has the folder, the database is from a newer version, or the disk does not let itself be
-    /// written.
+    /// If another server uses the folder, the database is from a newer version, or the disk cannot be written.
     pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
         let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
         made.map_err(|error| StoreError::folder(folder, &error))?;
@@ -95,8 +95,8 @@ impl Store {
             .journal_mode(SqliteJournalMode::Wal)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(5))
-            // Checkpoints are made between batches of telemetry and by a connection of their own,
-            // so that none falls on a comment's commit and nobody waits for one.
+            // A connection of its own makes checkpoints, between batches of telemetry. So none falls on a comment's
+            // commit, and nobody waits for one.
             .pragma("wal_autocheckpoint", "0");
 
         // What people say is flushed to the disk at each commit; telemetry may lose its last seconds to a power cut.
@@ -113,7 +113,7 @@ impl Store {
         let run = begin_run(&trial, run).await?;
         // A server that was killed while it erased words may have left copies of them.
         if let Err(error) = scrub(&trial).await {
-            tracing::warn!("copies of erased words may still stand in the database's files: {error}");
+            tracing::warn!("copies of erased words may remain in the database's files: {error}");
         }
 
         let inner = Inner {
@@ -139,19 +139,19 @@ impl Store {
         self.inner.run
     }
 
-    /// For reading.
+    /// The reader of the same database.
     #[must_use]
     pub fn reader(&self) -> &Reader {
         &self.inner.reader
     }
 
-    /// What became of telemetry since the start.
+    /// How much telemetry was written or lost since the start of the server.
     #[must_use]
     pub fn telemetry_counts(&self) -> &Counts {
         &self.inner.telemetry_counts
     }
 
-    /// Closes the database; what was acknowledged is on disk with or without it.
+    /// Closes the database. What was acknowledged is on disk even without this.
     pub async fn close(&self) {
         self.inner.reader.close().await;
         self.inner.checkpoints.close().await;
@@ -159,7 +159,7 @@ impl Store {
         self.inner.trial.close().await;
     }
 
-    /// How writing went since the start.
+    /// How long writes took, and whether they failed, since the start of the server.
     #[must_use]
     pub fn writes(&self) -> &Writes {
         &self.inner.writes
@@ -181,10 +181,10 @@ impl Store {
         self.inner.writes.begin(self.inner.turn.lock().await, Written::Telemetry)
     }
 
-    /// Records that a device began or ceased to work.
+    /// Records that a device started or stopped working.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -193,10 +193,10 @@ impl Store {
         recorded
     }
 
-    /// Adds participant `code`; one that is there already stays as it is.
+    /// Adds participant `code`. A participant that exists already stays as it is.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -205,7 +205,7 @@ impl Store {
         added
     }
 
-    /// Lets no more than `pages` pages be written, as a full disk would: for tests.
+    /// Limits the database to `pages` pages, so that tests can simulate a full disk.
     #[doc(hidden)]
     pub async fn limit_pages(&self, pages: u32) -> Result<(), StoreError> {
         let pragma = sqlx::AssertSqlSafe(format!("PRAGMA max_page_count = {pages}"));
@@ -215,7 +215,7 @@ impl Store {
 }
 
 async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
-    // One connection, kept open: its settings and prepared statements with it.
+    // One connection that stays open, so that its settings and prepared statements are kept.
     let pool = SqlitePoolOptions::new()
         .max_connections(1)
         .min_connections(1)
@@ -227,8 +227,8 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before it, chains what an earlier version recorded, and the telemetry that the run
-/// before did not chain.
+/// Records the start of a run. Before that, chains what an earlier version recorded, and the telemetry that the run
+/// before left unchained.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
@@ -260,7 +260,8 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     Ok(number)
 }
 
-/// Chains the telemetry of the latest run that it did not come to chain: a session under way has an event in every run.
+/// Chains the telemetry that the latest run left unchained. A session under way has an event in every run, so the
+/// sessions with an event in the latest run are enough.
 async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Result<(), StoreError> {
     let sessions = sqlx::query_scalar("SELECT DISTINCT session FROM events WHERE run = (SELECT max(run) FROM events)");
     let sessions: Vec<String> = sessions.fetch_all(&mut *connection).await?;
@@ -308,16 +309,16 @@ async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall:
     Ok(transaction.commit().await?)
 }
 
-/// Keeps other accounts out of the folder and its files, which tell seeds, policies and what
-/// surgeons said. Earlier versions let every account read them. What cannot be changed is no reason
-/// not to serve, but to be told of.
+/// Keeps other accounts of the machine out of the folder and its files, which hold seeds, policies and what surgeons
+/// said. Earlier versions let every account read them. If the rights cannot be changed, the server runs all the same
+/// and logs a warning.
 fn keep_private(folder: &Path) {
     let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));
     for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {
         match make_private(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => tracing::warn!(
                 "other accounts of this machine may be able to read {}, which holds trial data ({error}); \
-                 have its owner take their rights away, or choose a folder of your own with --data-dir",
+                 ask its owner to remove their access, or choose a folder of your own with --data-dir",
                 path.display()
             ),
             _ => {}
@@ -325,7 +326,7 @@ fn keep_private(folder: &Path) {
     }
 }
 
-/// Holds `folder` for this process alone, until what comes back is dropped.
+/// Locks `folder` for this process, until the returned file is dropped.
 pub(super) fn lock(folder: &Path) -> Result<File, StoreError> {
     let path: PathBuf = folder.join(LOCK);
     let failed = |error: std::io::Error| StoreError::folder(folder, &error);
@@ -342,7 +343,7 @@ pub(super) fn lock(folder: &Path) -> Result<File, StoreError> {
         Err(TryLockError::Error(error)) => return Err(failed(error)),
     }
 
-    // Only for the message above; the lock is the kernel's.
+    // The process id is only for the message above. The kernel holds the lock.
     file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
     Ok(file)
 }

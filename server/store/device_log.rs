@@ -1,4 +1,4 @@
-//! Keeps a record of when camera and lens began and ceased to work, or to work as they should.
+//! Records when camera and lens start or stop working, and when a warning about the lens comes or goes.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,14 +9,14 @@ use super::{DeviceEvent, Store};
 use crate::clock::{Clock, Moment};
 use crate::control::ControlStatus;
 
-/// A device that failed counts as working again once it has worked for this long, so that one that comes and goes does
-/// not fill the log.
+/// A device that failed counts as working again once it has worked for this long, so that a device that comes and goes
+/// does not fill the log.
 const SETTLED: Duration = Duration::from_secs(1);
 
-/// Whether a device works, and whether it is to be warned of.
+/// Whether a device works, and whether there is a warning about it.
 type Condition = (bool, bool);
 
-/// What was recorded of a device last.
+/// What was last recorded about a device.
 #[derive(Default)]
 struct Recorded {
     last: Option<Condition>,
@@ -24,7 +24,7 @@ struct Recorded {
 }
 
 impl Recorded {
-    /// Whether `condition`, seen at `now`, is to be recorded.
+    /// Whether `condition`, seen at `now`, has to be recorded.
     fn is_news(&mut self, condition: Condition, now: Moment) -> bool {
         if self.last == Some(condition) {
             self.well_since = None;
@@ -41,7 +41,7 @@ impl Recorded {
     }
 }
 
-/// Records every change until the loop ends, beginning with how the devices were found.
+/// Records the condition in which the devices were found, and then every change until the control loop ends.
 pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Receiver<Arc<ControlStatus>>) {
     let mut recorded = [Recorded::default(), Recorded::default()];
     loop {

@@ -1,5 +1,5 @@
 //! Erasure of words: from their record, from the free pages of the file, and from its log. The record and its hash
-//! stay; the salt of the hash goes, so that nobody can try which words had it.
+//! stay. The salt of the hash is deleted, so that nobody can test which words had that hash.
 
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -16,17 +16,17 @@ use crate::trial::role::Role;
 /// An erasure to be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Erasure {
-    /// The session.
+    /// Session of the record.
     pub session: SessionId,
-    /// What sort of record.
+    /// Kind of the record.
     pub subject: Erasable,
-    /// Its key, as the chain has it.
+    /// The record's key, as in the chain.
     pub record: String,
-    /// Why.
+    /// Reason that the person gave.
     pub reason: String,
-    /// Who.
+    /// Role of the person who erases.
     pub by: Role,
-    /// When.
+    /// When it is recorded.
     pub stamp: Stamp,
 }
 
@@ -35,19 +35,19 @@ pub struct Erasure {
 pub struct StoredErasure {
     /// Order of the record in the database.
     pub number: i64,
-    /// The start of the server that recorded it.
+    /// Number of the run that recorded it.
     pub run: i64,
-    /// The erasure.
+    /// What was erased, by whom and why.
     pub erasure: Erasure,
 }
 
 impl Store {
-    /// Erases the words of all of `erasures`, or of none. What is erased already stays so. When this returns, the
+    /// Erases the words of all `erasures`, or of none. Words that were erased before stay so. When this returns, the
     /// words are nowhere in the database's files.
     ///
     /// # Errors
-    /// When the disk or database failed, or another program has the database open; then the words may still stand in
-    /// free pages of the file or in its log, until the same is asked again or the server starts again.
+    /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
+    /// free pages of the file or in its log, until the same words are erased again or the server starts again.
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -64,7 +64,7 @@ async fn insert_erasures(
     erasures: &[Erasure],
     account: Option<&AccountName>,
 ) -> Result<(), StoreError> {
-    // What is overwritten is zeroed. The driver's connection keeps this; others do not need it.
+    // Deleted content is overwritten with zeros. The setting stays with this connection; the others do not need it.
     sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
     let mut transaction = begin(connection).await?;
     for erasure in erasures {
@@ -87,7 +87,7 @@ async fn insert_erasure(
         .fetch_optional(&mut *connection)
         .await?;
     if let Some(known) = known {
-        // Asked again because the files were not rid of it: they are gone through once more.
+        // The words were erased before, but the files may still hold copies: scrub them once more.
         return note_unfinished(connection, known).await;
     }
 
@@ -148,7 +148,7 @@ impl Reader {
     /// The erasures in `session`, in the order in which they were made.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn erasures(&self, session: SessionId) -> Result<Vec<StoredErasure>, StoreError> {
         let rows = sqlx::query("SELECT * FROM erasures WHERE session = ? ORDER BY number")
             .bind(session.to_string())

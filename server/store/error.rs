@@ -1,4 +1,4 @@
-//! What can go wrong with the disk and the database, said so that the reader knows what to do.
+//! Errors of the disk and the database. Each message says what the reader can do.
 
 use std::path::{Path, PathBuf};
 
@@ -7,16 +7,16 @@ use sqlx::migrate::MigrateError;
 /// A failure of the store. Nothing was acknowledged; what was acknowledged before is safe.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// Another server runs on the folder.
+    /// Another server uses the folder.
     #[error(
         "the data folder {} is in use by another parfocal server (process {process}); \
          stop that one, or choose another folder with --data-dir",
         .folder.display()
     )]
     InUse {
-        /// The folder.
+        /// The data folder.
         folder: PathBuf,
-        /// Its process id.
+        /// Process id of the other server.
         process: String,
     },
     /// The database was made by a newer version.
@@ -34,7 +34,7 @@ pub enum StoreError {
     /// The folder cannot be used.
     #[error("the data folder {} cannot be used: {reason}", .folder.display())]
     Folder {
-        /// The folder.
+        /// The data folder.
         folder: PathBuf,
         /// Why, and what to do.
         reason: String,
@@ -51,7 +51,7 @@ pub enum StoreError {
     /// The disk failed in another way.
     #[error("the disk failed ({0}); check that it has room and works, and try again; what was saved before is safe")]
     Disk(String),
-    /// The file is no database, or damaged.
+    /// The file is not a database, or is damaged.
     #[error("the database is damaged ({0}); keep a copy of the data folder before anything else")]
     Damaged(String),
     /// The file cannot be opened.
@@ -66,16 +66,16 @@ pub enum StoreError {
          program reads the database, such as an export or a backup; end that program and erase again"
     )]
     ErasureUnfinished,
-    /// Another program holds it.
+    /// Another program has locked the database.
     #[error("another program has locked the database; close it and try again")]
     Locked,
-    /// Anything else that the database says.
+    /// Any other error of the database.
     #[error("the database failed: {0}")]
     Database(sqlx::Error),
 }
 
 impl StoreError {
-    /// Whether the disk or the database failed, rather than refused what was asked of it.
+    /// Whether the disk or the database failed, and did not merely refuse a request.
     #[must_use]
     pub const fn is_of_the_disk(&self) -> bool {
         match self {
@@ -111,7 +111,7 @@ impl StoreError {
 /// `SQLITE_IOERR_SHMSIZE`: there is no room to enlarge the file that a database's connections share.
 const NO_ROOM_TO_SHARE: u32 = 4874;
 
-/// `SQLite`'s result codes (sqlite.org/rescode.html); an extended code's lowest byte is its primary code.
+/// By `SQLite`'s result codes (sqlite.org/rescode.html). The lowest byte of an extended code is its primary code.
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         let code = error

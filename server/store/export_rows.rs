@@ -1,5 +1,5 @@
-//! The rows of an export that come straight from the database, one by one: telemetry is too much to
-//! gather first.
+//! The rows of an export that come straight from the database. Long tables such as telemetry come row by row, because
+//! they are too large to gather first.
 
 use futures_util::TryStreamExt;
 use jiff::Timestamp;
@@ -14,7 +14,7 @@ use super::values::parsed;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 
-/// What the database tells of a study's plan.
+/// A study's plan, as the database has it.
 pub(super) struct PlannedStudy {
     /// SHA-256 of its definition.
     pub definition_sha256: String,
@@ -25,7 +25,7 @@ pub(super) struct PlannedStudy {
 }
 
 impl Reader {
-    /// The starts of the server that `session` has records of.
+    /// The starts of the server that recorded something of `session`.
     pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<RunRow>, StoreError> {
         let rows = sqlx::query(
             "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
@@ -44,7 +44,7 @@ impl Reader {
         rows.iter().map(run_row).collect()
     }
 
-    /// The row of study `study`: what was planned.
+    /// The plan of study `study`.
     pub(super) async fn export_study(&self, study: &str) -> Result<PlannedStudy, StoreError> {
         let row = sqlx::query("SELECT definition_sha256, sites, wall FROM studies WHERE study = ?")
             .bind(study)
@@ -58,7 +58,7 @@ impl Reader {
         })
     }
 
-    /// The events of study `study` that are about all of it or about `session`.
+    /// The events of study `study` that are about the whole study or about `session`.
     pub(super) async fn export_study_events(
         &self,
         study: &str,
@@ -81,14 +81,14 @@ impl Reader {
         Ok(rows.bind(session.to_string()).fetch_all(self.pool()).await?)
     }
 
-    /// Hands the blinded telemetry of `session` to `take`, row by row.
+    /// Passes the blinded telemetry of `session` to `take`, row by row.
     pub(super) async fn export_telemetry<E: From<StoreError>>(
         &self,
         session: SessionId,
         take: impl AsyncFnMut(TelemetryRow) -> Result<(), E>,
     ) -> Result<(), E> {
-        // Holds caused by the policy are left out: only learned ones take time to start and to
-        // compute.
+        // Holds caused by the policy are left out, because they would reveal it: only learned policies take time to
+        // start and to compute.
         let sql = "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured,
                     coalesce(t.held IN ('paused', 'lens-failed', 'camera-failed'), FALSE) AS held, t.optimal
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
@@ -96,7 +96,7 @@ impl Reader {
         self.hand_out(session, sql, take).await
     }
 
-    /// Hands what of the telemetry of `session` tells the policy to `take`, row by row.
+    /// Passes the part of the telemetry of `session` that reveals the policy to `take`, row by row.
     pub(super) async fn export_policy_steps<E: From<StoreError>>(
         &self,
         session: SessionId,
@@ -110,7 +110,7 @@ impl Reader {
         self.hand_out(session, sql, take).await
     }
 
-    /// Hands the weights of the learned policies of `session` to `take`, run by run.
+    /// Passes the weights of the learned policies of `session` to `take`, run by run.
     pub(super) async fn export_weights<E: From<StoreError>>(
         &self,
         session: SessionId,
@@ -131,7 +131,7 @@ impl Reader {
         rows.iter().map(access_row).collect()
     }
 
-    /// Hands every row of the chain to `take`, whole.
+    /// Passes every row of the chain to `take`, with all its columns.
     pub(super) async fn export_chain<E: From<StoreError>>(
         &self,
         mut take: impl AsyncFnMut(ChainRow) -> Result<(), E>,
@@ -145,7 +145,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Hands the salts to `take` that a blinded export of `session` withholds, those of the server's starts aside.
+    /// Passes the salts that a blinded export of `session` withholds to `take`, except those of the server's starts.
     pub(super) async fn export_chain_salts<E: From<StoreError>>(
         &self,
         session: SessionId,
@@ -158,7 +158,7 @@ impl Reader {
         self.hand_out(session, sql, take).await
     }
 
-    /// Hands the rows of `sql`, whose one parameter is `session`, to `take`.
+    /// Passes the rows of `sql` to `take`. The only parameter of `sql` is `session`.
     async fn hand_out<R, E>(
         &self,
         session: SessionId,

@@ -1,9 +1,8 @@
-//! Store: everything SQLite; the only place with SQL. Decides nothing.
+//! The store: everything that is SQLite, and the only place with SQL. It decides nothing.
 //!
-//! One file, `parfocal.db`, in WAL mode. Three ways in: trial data on a connection that syncs every
-//! commit to the disk before it is acknowledged; telemetry on its own, which does not; readers that
-//! never write. A lock on the folder keeps a second server out, while programs that only read come
-//! and go.
+//! The database is one file, `parfocal.db`, in WAL mode. A server uses three kinds of connections. The one for trial
+//! data syncs every commit to the disk before it is acknowledged. The one for telemetry does not. Readers never write.
+//! A lock on the folder keeps a second server out, while programs that only read come and go.
 
 mod accesses;
 mod accounts;

@@ -1,4 +1,5 @@
-//! How the lens was driven in one setting, in a few figures that are added up row by row: a study has millions of rows.
+//! How the lens was driven in one setting, in a few figures. They are added up row by row, because a study has millions
+//! of rows.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -6,46 +7,46 @@ use std::sync::{Arc, Mutex};
 use crate::autofocus::IN_FOCUS;
 use crate::ids::SessionId;
 
-/// A change of focal power below this is none, as in evaluations.
+/// A change of focal power up to this size does not count, as in evaluations.
 const LEAST_MOVE: f64 = 1e-9;
 
-/// A longer time without a frame is a gap, in nanoseconds.
+/// A time between frames that is longer than this is a gap, in nanoseconds.
 const GAP_NS: i64 = 1_000_000_000;
 
 /// How the lens was driven in a setting. Frames at which the loop held the lens for a pause or a failed device are left
-/// out; what a policy did, or failed to do, is not.
+/// out. Frames that were held because of the policy are counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Motion {
     /// Setting, from 1.
     pub setting: usize,
-    /// Frames.
+    /// Number of frames.
     pub frames: u64,
-    /// Time between them, in seconds. Gaps of more than a second are left out: nothing was driven there.
+    /// Time between the frames, in seconds. Gaps of more than a second are left out, because nothing was driven there.
     pub seconds: f64,
-    /// Way of the focal power that was asked for, up and down.
+    /// Distance that the commanded focal power travelled, up and down added.
     pub travel: f64,
-    /// Its changes of direction.
+    /// Changes of direction of the commanded focal power.
     pub turns: u64,
-    /// Frames of which a simulation knew the optimum.
+    /// Number of frames whose optimum is known from a simulation.
     pub known: u64,
-    /// Sum over them of the distance between the focal power at exposure and the optimum.
+    /// Sum over the `known` frames of the distance between the focal power at exposure and the optimum.
     pub error: f64,
-    /// How many of them were in focus: nearer than [`IN_FOCUS`].
+    /// How many of the `known` frames were in focus: nearer to the optimum than [`IN_FOCUS`].
     pub in_focus: u64,
 }
 
-/// A row of telemetry: run, end of the exposure, focal powers asked for and at exposure, the optimum, whether the loop
-/// was held for a pause or a failed device.
+/// A row of telemetry: run, end of the exposure in nanoseconds, focal power commanded, focal power at exposure,
+/// optimum, and whether the loop was held for a pause or a failed device.
 pub type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
 
-/// Figures of sessions that are over, by session: their telemetry does not change any more.
+/// Figures of ended sessions, by session. Their telemetry no longer changes.
 pub type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<Motion>>>>;
 
 /// A setting's figures so far.
 #[derive(Default)]
 pub struct Watched {
     pub motion: Motion,
-    /// Run, end of the exposure and focal power of the frame before, unless the loop was held then.
+    /// Run, end of the exposure and focal power of the frame before; `None` if the loop was held then.
     before: Option<(i64, i64, f64)>,
     /// The latest change of focal power.
     moved: f64,

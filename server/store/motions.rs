@@ -10,10 +10,10 @@ use crate::ids::SessionId;
 
 impl Reader {
     /// The same as [`Reader::motions`] for a session whose telemetry is complete. It is read once and then remembered,
-    /// because a whole study's takes many seconds.
+    /// because reading that of a whole study takes many seconds.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn motions_of_ended(&self, session: SessionId) -> Result<Vec<Motion>, StoreError> {
         let remembered = self.ended.lock().unwrap_or_else(PoisonError::into_inner).get(&session).cloned();
         if let Some(motions) = remembered {
@@ -28,7 +28,7 @@ impl Reader {
     /// How the lens was driven in each setting of `session` that has telemetry.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn motions(&self, session: SessionId) -> Result<Vec<Motion>, StoreError> {
         let segments: Vec<(i64, i64)> =
             sqlx::query_as("SELECT number, setting FROM segments WHERE session = ? ORDER BY setting")

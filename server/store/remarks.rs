@@ -1,4 +1,4 @@
-//! Comments and answers: kept once each, however often they are sent, and never changed.
+//! Comments and answers. Each is kept once, however often it is sent, and never changed.
 
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -10,22 +10,22 @@ use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::trial::question::AnswerValue;
 use crate::trial::remark::{Holding, Origin, Said, WaitClock};
 
-/// What became of something given.
+/// The outcome of keeping a comment or an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
-    /// It is on disk.
+    /// It is on disk now.
     New,
-    /// It was on disk already, from an earlier time it was sent.
+    /// It was on disk already, because it was sent before.
     Before,
-    /// Its key stands for something else.
+    /// Its key belongs to another comment or answer.
     KeyTaken,
 }
 
 impl Store {
-    /// Keeps a comment. On disk when this returns.
+    /// Keeps a comment. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -34,10 +34,10 @@ impl Store {
         kept
     }
 
-    /// Keeps an answer. On disk when this returns.
+    /// Keeps an answer. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -46,10 +46,10 @@ impl Store {
         kept
     }
 
-    /// Notes how much of a session a surgeon's device holds, at `stamp`.
+    /// Notes how many comments and answers of a session a surgeon's device still holds, at `stamp`.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn note_holding(&self, holding: &Holding, stamp: Stamp) -> Result<(), StoreError> {
         let _turn = self.turn().await;
         sqlx::query(
@@ -162,8 +162,8 @@ async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Ans
     Ok(if same { Kept::Before } else { Kept::KeyTaken })
 }
 
-/// Whether the words of what was said under this key were erased: a tablet that sends them again is told that they are
-/// kept, and keeps them no longer itself.
+/// Whether the words of the comment or answer with this key were erased. If a tablet sends them again, the server
+/// answers that they are kept, so that the tablet deletes its copy.
 pub(super) async fn is_erased(
     connection: &mut SqliteConnection,
     subject: &str,
@@ -177,7 +177,7 @@ impl Reader {
     /// The comments of `session`, in the order they were kept, each with the start of the server that kept it.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn comments(&self, session: SessionId) -> Result<Vec<(i64, Comment)>, StoreError> {
         let rows = sqlx::query("SELECT * FROM comments WHERE session = ? ORDER BY number")
             .bind(session.to_string())
@@ -187,10 +187,11 @@ impl Reader {
         rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
     }
 
-    /// The surgeons' devices on which something of `session` was said or that told of it, each with what it told last.
+    /// The surgeons' devices on which something of `session` was said or that reported what they hold of it, each with
+    /// its last report.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn surgeon_devices(&self, session: SessionId) -> Result<Vec<DeviceReport>, StoreError> {
         let rows = sqlx::query(
             "SELECT d.device, t.holding, t.run, t.monotonic_ns
@@ -221,7 +222,7 @@ impl Reader {
     /// that kept it.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn answers(&self, session: SessionId) -> Result<Vec<(i64, Answer)>, StoreError> {
         let rows = sqlx::query("SELECT * FROM answers WHERE session = ? ORDER BY number")
             .bind(session.to_string())
@@ -274,7 +275,7 @@ fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
         waited_by: waited_by.as_deref().and_then(WaitClock::named),
     };
 
-    // What older versions kept names no clock: it was the wall clock.
+    // Records of older versions name no clock. It was the wall clock.
     Ok(origin.plausible())
 }
 

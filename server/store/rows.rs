@@ -14,12 +14,12 @@ use crate::trial::question::AnswerValue;
 use crate::trial::remark::{Origin, Said};
 use crate::trial::standing::{Given, Standing, by_question};
 
-/// When and by which server something was recorded.
+/// When something was recorded, by both clocks of the server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
-    /// By the server's wall clock.
+    /// When it was recorded, by the server's wall clock.
     pub wall: Timestamp,
-    /// By the monotonic clock.
+    /// When it was recorded, by the monotonic clock.
     pub at: Moment,
 }
 
@@ -34,11 +34,11 @@ pub struct Comment {
     pub segment: Option<SegmentId>,
     /// Number of the frame on screen.
     pub frame: Option<u64>,
-    /// The run that counted it.
+    /// The run that counted the frame.
     pub frame_run: Option<i64>,
-    /// Where and when it was said, as the page told.
+    /// Where and when it was said, as the page reported.
     pub origin: Origin,
-    /// Whether it arrived when nothing counted any more.
+    /// Whether it arrived too late to count.
     pub late: bool,
     /// When it was kept.
     pub stamp: Stamp,
@@ -53,13 +53,13 @@ pub struct Answer {
     pub key: IdempotencyKey,
     /// Its session.
     pub session: SessionId,
-    /// Its segment; none for a closing question.
+    /// Its segment; `None` for a closing question.
     pub segment: Option<SegmentId>,
     /// The question's id.
     pub question: String,
     /// The answer, or the part of it that was given.
     pub value: AnswerValue,
-    /// Where and when it was given, as the page told.
+    /// Where and when it was given, as the page reported.
     pub origin: Origin,
     /// Whether it arrived too late to count.
     pub late: bool,
@@ -68,7 +68,8 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// As the answers to its question are compared; it was kept in run `run`, of which `clocks` know the clocks.
+    /// The answer in the form in which the answers to a question are compared. `run` is the run that kept it, and
+    /// `clocks` has the clocks of that run.
     #[must_use]
     pub fn given(&self, run: i64, clocks: &RunClocks) -> Given {
         Given {
@@ -81,24 +82,25 @@ impl Answer {
     }
 }
 
-/// What became of each of `answers`, which are a session's in the order they were kept, each with the run that kept it.
+/// The standing of each of `answers`, such as whether it counts. `answers` are those of a session in the order they
+/// were kept, each with the run that kept it.
 #[must_use]
 pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<Standing> {
     let asked = |(run, answer): &(i64, Answer)| ((answer.segment, answer.question.clone()), answer.given(*run, clocks));
     by_question(answers.iter().map(asked))
 }
 
-/// What a surgeon's device told last of what it holds of a session, if it told anything.
+/// The last report of a surgeon's device about how many comments and answers of a session it still holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceReport {
     /// The device.
     pub device: DeviceId,
-    /// How much it held; in which run of the server it told so, and when.
+    /// How many it held, the run in which it reported this, and when; `None` if it never reported.
     pub told: Option<(u32, i64, Moment)>,
 }
 
 impl DeviceReport {
-    /// How much the device held, and when it told so on the time of `clocks`; none where it never told.
+    /// How many the device held, and when it reported this, by `clocks`; `None` if it never reported.
     #[must_use]
     pub fn told_on(&self, clocks: &RunClocks) -> Option<(u32, Timestamp)> {
         let (holding, run, at) = self.told?;
@@ -153,7 +155,7 @@ pub struct SessionLine {
     pub withdrawn: bool,
 }
 
-/// A point of a session's focal path, with the metric, which is for those alone who know the policy.
+/// A point of a session's focal path. Only people who know the policy may see its metric.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPoint {
     /// Setting, from 1.
@@ -166,43 +168,44 @@ pub struct PathPoint {
     pub exposed: Moment,
     /// Focal power asked for, 0..=1.
     pub asked: f64,
-    /// Focal power that the frame was exposed at, 0..=1.
+    /// Focal power that the frame was exposed at, 0..=1; `None` if it is not known.
     pub measured: Option<f64>,
-    /// The optimum, 0..=1, where a simulation knows it.
+    /// The optimum, 0..=1, if a simulation knows it.
     pub optimal: Option<f64>,
-    /// The policy's focus metric, which names the policy by its scale.
+    /// The policy's focus metric. Its scale reveals the policy.
     pub metric: Option<f64>,
 }
 
-/// A device began or ceased to work.
+/// A device started or stopped working.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceEvent {
-    /// By the server's wall clock.
+    /// When it was recorded, by the server's wall clock.
     pub wall: Timestamp,
-    /// By the monotonic clock.
+    /// When it was recorded, by the monotonic clock.
     pub at: Moment,
     /// `camera` or `lens`.
     pub device: String,
     /// Whether it works now.
     pub working: bool,
-    /// What it says of itself.
+    /// What the device reports, or what was changed, in words.
     pub message: String,
 }
 
-/// The clocks at each start of the server: by them a moment of any run has a time of day.
+/// The clocks at each start of the server. They give each moment of a run its time of day.
 #[derive(Debug, Clone, Default)]
 pub struct RunClocks(pub(super) BTreeMap<i64, Stamp>);
 
 impl RunClocks {
-    /// The time of day of `at` in run `run`, by the wall clock as it was when that run began; so times
-    /// within a run keep their distances when the wall clock is set.
+    /// The time of day of `at` in run `run`, counted from the wall clock at the start of that run. So setting the wall
+    /// clock does not change the distances between times of a run.
     #[must_use]
     pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
         let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };
         start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
     }
 
-    /// When something was said that arrived at `at` in run `run`: its wait on the surgeon's device is taken off.
+    /// When something was said that arrived at `at` in run `run`: its time of arrival, less its wait on the surgeon's
+    /// device.
     #[must_use]
     pub fn said(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
         let arrived = self.wall(run, at);

@@ -1,4 +1,4 @@
-//! Ridding the database's files of erased words: SQLite leaves copies of them in free pages, in the free space of
+//! Removes erased words from the database's files. SQLite leaves copies of them in free pages, in the free space of
 //! pages, and in its log.
 
 use sqlx::sqlite::SqliteConnection;
@@ -6,10 +6,10 @@ use sqlx::{Row, SqlitePool};
 
 use super::StoreError;
 
-/// Rids the database's files of what was erased and may still stand in them. Nothing is done where nothing is left.
+/// Removes copies of erased words that may remain in the database's files. Does nothing if no erasure is unfinished.
 ///
 /// # Errors
-/// When the disk or database failed, or another program reads the database.
+/// If the disk or database fails, or another program reads the database.
 pub(super) async fn scrub(trial: &SqlitePool) -> Result<(), StoreError> {
     let mut connection = trial.acquire().await?;
     let unfinished: i64 =
@@ -18,7 +18,7 @@ pub(super) async fn scrub(trial: &SqlitePool) -> Result<(), StoreError> {
         return Ok(());
     }
 
-    // Pages that were split earlier may hold copies in their free space: every page is written anew.
+    // Pages that were split earlier may hold copies in their free space, so every page is written anew.
     sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
     sqlx::query("VACUUM").execute(&mut *connection).await?;
     // The log still holds pages as they were before.

@@ -1,4 +1,4 @@
-//! The events of sessions as they are written.
+//! Writes the events of sessions.
 
 use sqlx::sqlite::SqliteConnection;
 
@@ -8,7 +8,7 @@ use super::{StoreError, chain};
 use crate::ids::SessionId;
 use crate::trial::event::Event;
 
-/// Writes `event` of `session`, recorded by the start `run` of the server. The same event again changes nothing.
+/// Writes `event` of `session`, recorded in run `run`. Writing the same event again changes nothing.
 pub(super) async fn insert_event(
     connection: &mut SqliteConnection,
     run: i64,
@@ -18,8 +18,8 @@ pub(super) async fn insert_event(
     let wall = event.wall.to_string();
     let payload = serde_json::to_string(&event.kind).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
-    // A commit that the disk reported as failed may have reached it all the same: the same event again is the same
-    // event, and another one of its number is still refused.
+    // A commit that the disk reported as failed may have reached it all the same. So the same event is accepted again,
+    // while another event with its number is still refused.
     let done = sqlx::query(
         "INSERT INTO events (session, number, run, wall, monotonic_ns, role, kind, payload)
          SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS (

@@ -1,4 +1,4 @@
-//! Sessions, their segments and events: made, extended and read back whole.
+//! Creates, extends and reads sessions with their segments and events.
 
 use std::time::Duration;
 
@@ -23,9 +23,9 @@ use crate::trial::role::Role;
 /// A session to be made.
 #[derive(Debug, Clone)]
 pub struct NewSession {
-    /// Its id.
+    /// Id of the session.
     pub session: SessionId,
-    /// When.
+    /// When it is made.
     pub stamp: Stamp,
     /// Participant's code.
     pub participant: String,
@@ -37,13 +37,13 @@ pub struct NewSession {
     pub protocol_sha256: String,
     /// Whether it is practice.
     pub practice: bool,
-    /// How its order was drawn.
+    /// The algorithm that draws its order.
     pub algorithm: Algorithm,
-    /// From which seed.
+    /// The seed that its order is drawn from.
     pub seed: Seed,
-    /// Index in the set that shares the seed.
+    /// Index in the balanced set that shares the seed, from 0.
     pub set_index: usize,
-    /// Commitment to all that.
+    /// SHA-256 that commits to protocol, algorithm, seed, index and order, hexadecimal.
     pub commitment: String,
     /// Its segments, in order, each with its policy.
     pub segments: Vec<(SegmentId, PolicyName)>,
@@ -54,34 +54,34 @@ pub struct NewSession {
 pub struct StoredSession {
     /// As it was made.
     pub made: NewSession,
-    /// The start of the server that made it.
+    /// Number of the run that made it.
     pub run: i64,
     /// Its events so far, each with the start of the server that recorded it.
     pub events: Vec<(i64, Event)>,
-    /// The study that it belongs to; none outside any study.
+    /// The study that it belongs to; `None` outside any study.
     pub study: Option<String>,
-    /// When its study was locked, by the wall clock, if it belongs to one that was.
+    /// When its study was locked, by the wall clock; `None` if it was not, or outside any study.
     pub study_locked: Option<Timestamp>,
 }
 
 impl StoredSession {
-    /// Its protocol. Its own policies are known, whatever this version has now.
+    /// Its protocol. The session's own policies count as known, even if this version no longer has them.
     ///
     /// # Errors
-    /// When this version cannot read it.
+    /// If this version cannot read it.
     pub fn protocol(&self) -> Result<Protocol, ProtocolError> {
         let known: Vec<PolicyName> = self.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
         Protocol::parse(&self.made.protocol_toml, &self.made.protocol, &known)
     }
 
-    /// When its participant withdrew and who recorded that, if so.
+    /// When the withdrawal of its participant was recorded, and by which role; `None` without a withdrawal.
     #[must_use]
     pub fn withdrawn(&self) -> Option<(Timestamp, Role)> {
         let withdrawal = self.events.iter().find(|(_, event)| matches!(event.kind, EventKind::Withdrawn { .. }));
         withdrawal.map(|(_, event)| (event.wall, event.by))
     }
 
-    /// Whether what arrives for it still counts; `clocks` are those of the server's starts.
+    /// Decides whether what arrives for the session still counts. `clocks` are those of the server's starts.
     #[must_use]
     pub fn grace(&self, clocks: &RunClocks) -> Grace {
         let mut grace = Grace::new(self.protocol().map_or(DEFAULT_GRACE, |protocol| protocol.grace));
@@ -93,10 +93,10 @@ impl StoredSession {
 }
 
 impl Store {
-    /// Makes a session with its first event, and with its place in a study if it has one; or nothing.
+    /// Creates a session with its first event, and with its place in a study if it has one: all of it or nothing.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn create_session(
         &self,
         new: &NewSession,
@@ -110,10 +110,10 @@ impl Store {
         made
     }
 
-    /// Appends `events` to `session`, all or none. The same events again change nothing.
+    /// Appends `events` to `session`, all or none. Appending the same events again changes nothing.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -122,10 +122,10 @@ impl Store {
         appended
     }
 
-    /// Notes how far the clock of `segment`, under way in `session`, has come.
+    /// Notes how long `segment`, under way in `session`, has been inspected so far.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn note_clock(
         &self,
         session: SessionId,
@@ -209,10 +209,10 @@ async fn insert_events(
 }
 
 impl Reader {
-    /// Session `session` whole, or `None` where there is none.
+    /// The whole of session `session`, or `None` if there is none.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn session(&self, session: SessionId) -> Result<Option<StoredSession>, StoreError> {
         let row = sqlx::query("SELECT * FROM sessions WHERE session = ?")
             .bind(session.to_string())
@@ -255,7 +255,7 @@ impl Reader {
     /// The events of `session`, each with the start of the server that recorded it.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn events(&self, session: SessionId) -> Result<Vec<(i64, Event)>, StoreError> {
         let rows = sqlx::query(
             "SELECT run, number, wall, monotonic_ns, role, payload, (SELECT account FROM actors AS a
@@ -272,7 +272,7 @@ impl Reader {
     /// The latest session that is neither completed nor aborted.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn session_under_way(&self) -> Result<Option<SessionId>, StoreError> {
         let row = sqlx::query(
             "SELECT session FROM sessions WHERE NOT EXISTS (
@@ -285,10 +285,10 @@ impl Reader {
         row.map(|row| parsed(&row, "session")).transpose()
     }
 
-    /// How far the clock of `segment` had come when it was last noted; zero where it never was.
+    /// How long `segment` had been inspected when that was last noted; zero if it never was.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn noted_clock(&self, segment: SegmentId) -> Result<Duration, StoreError> {
         let noted: Option<i64> = sqlx::query_scalar("SELECT inspected_ms FROM session_clocks WHERE segment = ?")
             .bind(segment.to_string())

@@ -11,10 +11,11 @@ use crate::trial::balanced_set::{BalancedSet, Member};
 use crate::trial::phase::SessionStatus;
 
 impl Reader {
-    /// The set of the latest session outside any study by the protocol with this hash and algorithm, if there is one.
+    /// The balanced set of the latest session outside any study that has this protocol, by its hash, and this
+    /// algorithm; `None` if there is no such session.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn latest_set(
         &self,
         protocol_sha256: &str,
@@ -39,7 +40,7 @@ impl Reader {
     /// The sessions that share `seed`, in the order in which they were made.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn balanced_set(&self, seed: Seed) -> Result<BalancedSet, StoreError> {
         let rows = sqlx::query(
             "SELECT session, participant, wall, set_index,

@@ -1,5 +1,5 @@
-//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and
-//! nothing waits for it. What belongs to no setting of a session is forgotten after a while.
+//! Writes telemetry to SQLite, in batches and on a connection of its own, so that it delays nothing and nothing waits
+//! for it. Steps that belong to no setting of a session are deleted after a while.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::Ordering;
@@ -18,24 +18,25 @@ use crate::control::{Hold, StepRecord};
 use crate::ids::SegmentId;
 use crate::lens::FocalPower;
 
-/// A batch is written when it is this old,
+/// A batch is written when it is this old.
 const BATCH_TIME: Duration = Duration::from_millis(250);
-/// or has this many records.
+/// A batch is also written when it has this many records.
 const BATCH_RECORDS: usize = 256;
 /// Records kept for another try while the disk fails: some three minutes at 50 a second.
 const MOST_WAITING: usize = 9_000;
-/// What could not be written is tried again after this time where no further record comes.
+/// A failed batch is tried again after this time if no further record comes.
 const RETRY: Duration = Duration::from_secs(1);
 /// Batches between two checkpoints: about every 16 s.
 const CHECKPOINT_BATCHES: u32 = 64;
 
-/// Latest steps kept beside those of settings: eleven hours at 50 a second, some 110 MB.
+/// The latest steps, which are kept even if they belong to no setting: eleven hours at 50 a second, some 110 MB.
 pub const KEPT_OUTSIDE: i64 = 2_000_000;
-/// Steps looked at between two checkpoints for whether they can be forgotten: more than come in that time, and few
-/// enough to hold up no comment.
+/// Steps that are looked at between two checkpoints to delete those of no setting. This is more than arrive in that
+/// time, and few enough not to delay a comment.
 const LOOKED_AT: i64 = 4_000;
 
-/// Writes what comes until the sender is gone. A failing disk is logged, counted and tried again; it never ends this.
+/// Writes incoming steps until the sender is gone. A failing disk is logged, counted and tried again; it never ends
+/// this task.
 pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
     let mut writer = Writer::default();
     let mut batches = 0_u32;
@@ -68,13 +69,13 @@ struct Writer {
     names: Names,
     /// Segments with steps that are written and not yet chained.
     unsealed: BTreeSet<SegmentId>,
-    /// When the latest of them was exposed.
+    /// When the latest step that was written was exposed.
     latest: Moment,
 }
 
 impl Writer {
-    /// Gathers the next batch; `false` once the sender is gone. What could not be written is tried again also where
-    /// nothing more comes, because the camera is silent.
+    /// Gathers the next batch. Returns `false` once the sender is gone. If an earlier batch could not be written,
+    /// returns after a while even without a new record, as when the camera is silent, so that it is tried again.
     async fn collect(&mut self, receiver: &mut Receiver<StepRecord>) -> bool {
         let first = if self.waiting.is_empty() {
             receiver.recv().await
@@ -116,7 +117,7 @@ impl Writer {
                 }
             }
             Err(error) => {
-                // What was interned in a transaction that was undone means nothing.
+                // Numbers from a transaction that was rolled back may not exist.
                 self.names = Names::default();
                 counts.failed_batches.fetch_add(1, Ordering::Relaxed);
                 if !std::mem::replace(&mut self.failing, true) {
@@ -165,11 +166,11 @@ impl Writer {
 }
 
 impl Store {
-    /// Forgets steps that belong to no setting of a session, of the `count` after step `from`, but never one of the
-    /// latest `kept`. Gives the step up to which it looked, which is where to go on.
+    /// Deletes steps that belong to no setting of a session, among the `count` steps after step `from`, but never one
+    /// of the latest `kept`. Returns the last step that it looked at, which is the next `from`.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn forget_steps_outside(&self, from: i64, count: i64, kept: i64) -> Result<i64, StoreError> {
         let _turn = self.telemetry_turn().await;
 
@@ -195,7 +196,7 @@ impl Store {
 }
 
 impl Store {
-    /// Chains the steps of these segments that are not chained yet, the latest of them exposed at `latest`.
+    /// Chains the steps of these segments that are not chained yet. The latest of them was exposed at `latest`.
     async fn seal_telemetry(&self, segments: &BTreeSet<SegmentId>, latest: Moment) -> Result<(), StoreError> {
         let started = self.inner.started;
         let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
@@ -251,7 +252,7 @@ async fn insert(
     Ok(())
 }
 
-/// Numbers that stand for segments and policies in the rows.
+/// The numbers that stand for segments and policies in the rows, as far as they are known.
 #[derive(Default)]
 struct Names {
     segments: HashMap<SegmentId, Option<i64>>,
@@ -288,7 +289,7 @@ impl Names {
             return Ok(Some(number));
         }
 
-        // The update changes nothing; it makes the row come back when it was there before.
+        // The update changes nothing. It makes the statement return the row even if it existed before.
         let number = sqlx::query_scalar(
             "INSERT INTO policies (name) VALUES (?) ON CONFLICT (name) DO UPDATE SET name = name RETURNING number",
         )
@@ -301,10 +302,10 @@ impl Names {
     }
 }
 
-/// Moves what was written from the log into the database, as far as no reader stands in the way. Not in a turn: writers
-/// go on meanwhile.
+/// Moves what was written from the log into the database, as far as readers allow. It takes no turn, so writers
+/// continue meanwhile.
 async fn checkpoint(store: &Store) {
     if let Err(error) = sqlx::query("PRAGMA wal_checkpoint(PASSIVE)").execute(&store.inner.checkpoints).await {
-        tracing::warn!("the database's log could not be folded in: {error}; it is tried again");
+        tracing::warn!("the database's log could not be moved into its file: {error}; the server tries again");
     }
 }

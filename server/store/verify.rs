@@ -1,4 +1,4 @@
-//! Verification of a database, whether or not a server has it open: nothing is written.
+//! Verifies a database, whether or not a server has it open. Nothing is written.
 
 use std::path::Path;
 
@@ -16,11 +16,11 @@ use super::{Reader, StoreError};
 use crate::ids::SessionId;
 use crate::trial::commitment::Allocation;
 
-/// Checks the database of data folder `path`, or the database file `path`: every check, in order. With `expected`,
-/// a head known from elsewhere, also whether the chain is the one that had it.
+/// Runs every check, in order, on the database of data folder `path` or on the database file `path`. If `expected`, a
+/// head known from elsewhere, is given, also checks that the chain has this head in it.
 ///
 /// # Errors
-/// When there is no database, or it is of another version.
+/// If there is no database, or it is of another version.
 pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
     let file = if path.is_dir() { path.join(DATABASE) } else { path.to_owned() };
     let snapshot = Reader::open_snapshot(&file).await?;
@@ -29,7 +29,7 @@ pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<
     Ok(checks)
 }
 
-/// Checks what `snapshot`, which has one connection, reads.
+/// Runs every check on `snapshot`, which has one connection.
 pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Check> {
     let check = |name, outcome: Result<String, Wrong>| Check {
         name,
@@ -45,13 +45,13 @@ pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Che
     ]
 }
 
-/// What is wrong.
+/// Why a check failed.
 #[derive(Debug, thiserror::Error)]
 enum Wrong {
-    /// With what was found.
+    /// Something that was found is wrong, in words.
     #[error("{0}")]
     Found(String),
-    /// With the database itself.
+    /// The database cannot be read.
     #[error("{0}")]
     Database(#[from] StoreError),
 }
@@ -68,7 +68,7 @@ impl From<sqlx::Error> for Wrong {
     }
 }
 
-/// Whether the file is whole by the database's own checks.
+/// Checks that the file is undamaged, by SQLite's own checks.
 async fn whole(snapshot: &Reader) -> Result<String, Wrong> {
     snapshot.check_file(Thoroughness::Full).await?;
     if let Some(row) = sqlx::query("PRAGMA foreign_key_check").fetch_optional(snapshot.pool()).await? {
@@ -138,8 +138,8 @@ async fn check_block(connection: &mut SqliteConnection, block: &BlockToCheck) ->
     Ok(block.check(hashes.steps, &hashes.open, Some(&hashes.sealed))?)
 }
 
-/// How many steps of telemetry have no block yet. Only the latest run may have such: the next start of the server
-/// chains what a killed one did not come to chain.
+/// How many steps of telemetry have no block yet. Only the latest run may have such steps, because the next start of
+/// the server chains what a killed one left unchained.
 async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64, Wrong> {
     let sessions = sqlx::query_as(
         "SELECT session, session IN (SELECT session FROM events WHERE run = (SELECT max(run) FROM events))
@@ -160,23 +160,23 @@ async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64
     Ok(waiting)
 }
 
-/// Whether the recordings of what surgeons said are as they were sent.
+/// Checks that the recordings of what surgeons said are as they were sent.
 async fn voice(snapshot: &Reader) -> Result<String, Wrong> {
     Ok(snapshot.check_voice().await??)
 }
 
-/// Whether each study is as it was planned, and its sessions have the orders drawn for them.
+/// Checks that each study is as it was planned, and that its sessions have the orders drawn for them.
 async fn studies(snapshot: &Reader) -> Result<String, Wrong> {
     Ok(check_studies(snapshot).await??)
 }
 
-/// Whether each session has the protocol and the order that it was made with.
+/// Checks that each session has the protocol and the order that it was made with.
 async fn commitments(snapshot: &Reader) -> Result<String, Wrong> {
     let sessions = sqlx::query_scalar("SELECT session FROM sessions ORDER BY rowid");
     let sessions: Vec<String> = sessions.fetch_all(snapshot.pool()).await?;
     for session in &sessions {
         let named = |what: &str| format!("sessions: session {session}: {what}");
-        let id: SessionId = session.parse().map_err(|_| named("its id is none"))?;
+        let id: SessionId = session.parse().map_err(|_| named("its id is not valid"))?;
         let stored = snapshot.session(id).await?.ok_or_else(|| named("it is not there"))?;
 
         let protocol_sha256: [u8; 32] = Sha256::digest(&stored.made.protocol_toml).into();

@@ -1,5 +1,5 @@
-//! What surgeons said aloud: the pieces of each recording, kept once each, however often they are sent, and never
-//! changed. An erasure of the comment takes the sound; each piece's length and hash stay.
+//! What surgeons said aloud. Each piece of a recording is kept once, however often it is sent, and never changed. If
+//! the comment is erased, the sound is deleted; each piece's length and hash stay.
 
 use std::collections::BTreeMap;
 
@@ -24,26 +24,26 @@ pub struct VoicePiece {
     pub session: SessionId,
     /// Its place in the recording, from 1.
     pub piece: u32,
-    /// What it is.
+    /// Media type of the sound.
     pub media_type: MediaType,
-    /// How far the recording had come at its end, milliseconds.
+    /// Length of the recording up to the end of this piece, in milliseconds.
     pub through_ms: i64,
-    /// Why the recording ended, on its last piece.
+    /// Why the recording ended; only on its last piece.
     pub ended: Option<Ending>,
-    /// The sound.
+    /// The sound, as the browser encoded it.
     pub audio: Vec<u8>,
     /// When it was kept.
     pub stamp: Stamp,
 }
 
-/// What became of a piece.
+/// The outcome of keeping a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PieceKept {
-    /// It is on disk, now or since an earlier time it was sent.
+    /// It is on disk, now or since it was sent before.
     Kept,
-    /// Something else is on disk in its place.
+    /// Another piece is on disk in its place, or the recording has another media type.
     PlaceTaken,
-    /// The session has no such comment, or that is no voice comment.
+    /// The session has no such voice comment.
     NoSuchComment,
     /// With it the recording would be too large.
     TooLarge,
@@ -54,15 +54,15 @@ pub enum PieceKept {
 pub struct StoredPiece {
     /// Order of the record in the database.
     pub number: i64,
-    /// The start of the server that kept it.
+    /// Number of the run that kept it.
     pub run: i64,
     /// Its place in the recording, from 1.
     pub piece: u32,
-    /// What it is.
+    /// Media type of the sound.
     pub media_type: MediaType,
-    /// How far the recording had come at its end, milliseconds.
+    /// Length of the recording up to the end of this piece, in milliseconds.
     pub through_ms: i64,
-    /// Why the recording ended, on its last piece.
+    /// Why the recording ended; only on its last piece.
     pub ended: Option<Ending>,
     /// Its length in bytes.
     pub bytes: i64,
@@ -72,34 +72,34 @@ pub struct StoredPiece {
     pub stamp: Stamp,
 }
 
-/// A recording without its sound: its pieces by their places.
+/// A recording without its sound: its pieces, in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Recorded {
-    /// The pieces there are.
+    /// The pieces that arrived.
     pub pieces: Vec<StoredPiece>,
 }
 
 impl Recorded {
-    /// Bytes in all.
+    /// Length of all pieces in bytes.
     #[must_use]
     pub fn bytes(&self) -> i64 {
         self.pieces.iter().map(|piece| piece.bytes).sum()
     }
 
-    /// How long it is, in seconds, as the page told.
+    /// How long it is, in seconds, as the page reported.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         let longest = self.pieces.iter().map(|piece| piece.through_ms).max().unwrap_or(0);
         longest as f64 / 1000.0
     }
 
-    /// What it is; none before its first piece.
+    /// Media type of its sound; `None` before its first piece.
     #[must_use]
     pub fn media_type(&self) -> Option<MediaType> {
         self.pieces.first().map(|piece| piece.media_type)
     }
 
-    /// Why it ended; none where it was cut off.
+    /// Why it ended; `None` if it was cut off.
     #[must_use]
     pub fn ended(&self) -> Option<Ending> {
         self.pieces.iter().find_map(|piece| piece.ended)
@@ -127,10 +127,11 @@ pub struct KeptVoice {
 }
 
 impl Store {
-    /// Keeps a piece of a recording. On disk when this returns. Of an erased comment only its length and hash are kept.
+    /// Keeps a piece of a recording. It is on disk when this returns. If the comment was erased, only the length and
+    /// the hash of the piece are kept.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn keep_voice(&self, piece: &VoicePiece) -> Result<PieceKept, StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
@@ -212,7 +213,7 @@ impl Reader {
     /// The recordings of `session` without their sound, by the comment that each belongs to.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn voice(&self, session: SessionId) -> Result<BTreeMap<IdempotencyKey, Recorded>, StoreError> {
         let rows = sqlx::query(
             "SELECT number, comment, piece, media_type, through_ms, ended, bytes, sha256, run, wall, monotonic_ns
@@ -229,11 +230,11 @@ impl Reader {
         Ok(recordings)
     }
 
-    /// The sound of the recording that belongs to `comment` of `session`, with what it is: its pieces one after
-    /// another. None where there is no sound, or it was erased.
+    /// Media type and sound of the recording that belongs to `comment` of `session`. The sound is its pieces, one after
+    /// another. `None` if there is no sound, or it was erased.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn voice_audio(
         &self,
         session: SessionId,
@@ -261,7 +262,7 @@ impl Reader {
     /// The voice comments that were not erased, oldest first.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn kept_voice(&self) -> Result<Vec<KeptVoice>, StoreError> {
         let rows = sqlx::query(
             "SELECT comments.session, sessions.protocol_toml, comments.key, comments.wall
@@ -284,11 +285,11 @@ impl Reader {
         rows.iter().map(kept).collect()
     }
 
-    /// Checks the sound of every recording against the hashes of its pieces: what was found, or what is wrong, in
-    /// words. The hashes themselves are the chain's.
+    /// Checks the sound of every recording against the hashes of its pieces. The inner result says what was found or
+    /// what is wrong, in words. The hashes themselves are checked with the chain.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub(super) async fn check_voice(&self) -> Result<Result<String, String>, StoreError> {
         let mut rows = sqlx::query(
             "SELECT comment, piece, bytes, sha256, audio, EXISTS (

@@ -1,4 +1,4 @@
-//! Whether the file of a database is whole, by SQLite's own checks.
+//! Checks whether the file of a database is undamaged, by SQLite's own checks.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub async fn database_state(folder: &Path) -> DatabaseState {
     }
 }
 
-/// How many bytes the database `file` has, if it is whole and no newer version made it.
+/// How many bytes the database `file` has, or an error if it is damaged or a newer version made it.
 async fn look(file: &Path) -> Result<u64, StoreError> {
     let snapshot = Reader::open_snapshot_unchecked(file).await?;
     let found = size_if_whole(&snapshot).await;
@@ -51,7 +51,7 @@ impl Reader {
     /// Checks that every page of the file is as SQLite wrote it.
     ///
     /// # Errors
-    /// When the file is damaged, with the first thing that is wrong, or it cannot be read.
+    /// If the file is damaged, with the first problem found, or if it cannot be read.
     pub(super) async fn check_file(&self, thoroughness: Thoroughness) -> Result<(), StoreError> {
         let pragma = match thoroughness {
             Thoroughness::Quick => "PRAGMA quick_check(1)",
@@ -60,7 +60,7 @@ impl Reader {
         let said: Option<String> = sqlx::query_scalar(pragma).fetch_optional(self.pool()).await?;
         match said.as_deref() {
             Some("ok") => Ok(()),
-            // What is wrong stands below a heading that names the database.
+            // The problem is in the last line, below a heading that names the database.
             Some(wrong) => Err(StoreError::Damaged(wrong.lines().last().unwrap_or_default().to_owned())),
             None => Err(StoreError::Damaged("SQLite's check says nothing".to_owned())),
         }

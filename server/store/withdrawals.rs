@@ -1,4 +1,4 @@
-//! Sessions whose participants withdrew: that they did, and the place of each session in its study.
+//! Sessions whose participants withdrew, with the place of each among the sessions of its protocol.
 
 use jiff::Timestamp;
 use sqlx::Row;
@@ -11,7 +11,7 @@ use crate::ids::SessionId;
 /// A withdrawn session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Withdrawal {
-    /// The session.
+    /// Id of the session.
     pub session: SessionId,
     /// Its protocol's name.
     pub protocol: String,
@@ -19,7 +19,7 @@ pub struct Withdrawal {
     pub place: i64,
     /// When it was withdrawn, by the server's wall clock.
     pub wall: Timestamp,
-    /// By whom.
+    /// Role that recorded the withdrawal.
     pub role: String,
 }
 
@@ -27,7 +27,7 @@ impl Reader {
     /// The withdrawn sessions of the protocol of `session`.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn withdrawals(&self, session: SessionId) -> Result<Vec<Withdrawal>, StoreError> {
         let rows = sqlx::query(
             "SELECT s.session, s.protocol, s.place, e.wall, e.role
@@ -48,16 +48,16 @@ impl Reader {
     /// Whether the participant of `session` has withdrawn.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn is_withdrawn(&self, session: SessionId) -> Result<bool, StoreError> {
         let withdrawn = "SELECT EXISTS (SELECT 1 FROM events WHERE session = ? AND kind = 'withdrawn')";
         Ok(sqlx::query_scalar(withdrawn).bind(session.to_string()).fetch_one(self.pool()).await?)
     }
 
-    /// How often something was taken back in the sessions of `study`, by a withdrawal or an erasure. It only grows.
+    /// Number of withdrawals and erasures in the sessions of `study`. It only grows.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn taken_back(&self, study: &str) -> Result<i64, StoreError> {
         let count = "SELECT
             (SELECT count(*) FROM study_sessions JOIN events USING (session) WHERE study = ?1 AND kind = 'withdrawn')

@@ -1,5 +1,5 @@
-//! What writing to the database comes to: how long it takes, and whether it works. Whoever asks how the server is
-//! reads it here, and waits for no writer and no disk.
+//! How writing to the database goes: how long it takes, and whether it works. Reading these figures waits for no writer
+//! and no disk.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -14,7 +14,8 @@ use tokio::time::Instant;
 use super::StoreError;
 use super::values::drop_if_failed;
 
-/// Upper ends of the histograms' buckets, seconds: from a solid-state disk's few milliseconds to a disk that hangs.
+/// Upper bounds of the histograms' buckets, in seconds: from a solid-state disk's few milliseconds to a disk that
+/// hangs.
 const BUCKETS: [f64; 12] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 5.0];
 
 /// Times of writing, by what was written: `records`, which are on disk when the time ends, or `telemetry`.
@@ -38,7 +39,7 @@ pub struct Writes {
     origin: Instant,
     /// When the write under way began.
     under_way: Mark,
-    /// When the first of the writes began to fail that have failed since the last one that worked.
+    /// When the first write failed since the last one that worked.
     failing: Mark,
     /// When a write failed last.
     failed: Mark,
@@ -70,26 +71,26 @@ impl Writes {
         &self.times
     }
 
-    /// For how long the write under way has been, if one is.
+    /// How long the write under way has taken so far; `None` if there is none.
     #[must_use]
     pub fn under_way_for(&self) -> Option<Duration> {
         self.under_way.age(self.now())
     }
 
-    /// For how long writes have failed, if the last one did.
+    /// How long writes have been failing; `None` if the last one worked.
     #[must_use]
     pub fn failing_for(&self) -> Option<Duration> {
         self.failing.age(self.now())
     }
 
-    /// How long ago a write failed last, if one ever did.
+    /// How long ago a write last failed; `None` if none ever did.
     #[must_use]
     pub fn failed_ago(&self) -> Option<Duration> {
         self.failed.age(self.now())
     }
 
-    /// Notes what became of a write. Only the disk's and the database's failures count: a record that is refused is
-    /// no reason to worry about the disk.
+    /// Notes the outcome of a write. Only failures of the disk and the database count. A record that is refused is no
+    /// reason to worry about the disk.
     pub(super) fn note<T>(&self, outcome: &Result<T, StoreError>) {
         match outcome {
             Ok(_) => self.failing.clear(),
@@ -101,7 +102,7 @@ impl Writes {
         }
     }
 
-    /// Begins a turn of writing with the right to write, `guard`.
+    /// Begins a turn of writing. `guard` is the right to write.
     pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, what: Written) -> Turn<'a> {
         self.under_way.set(self.now());
         Turn { writes: self, what, began: Instant::now(), _guard: guard }
@@ -122,7 +123,7 @@ pub(super) struct Turn<'a> {
 }
 
 impl Turn<'_> {
-    /// Notes what became of a write on `connection`, and ends the connection where it failed.
+    /// Notes the outcome of a write on `connection`, and closes the connection if it failed.
     pub(super) fn end<T>(&self, connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
         self.writes.note(outcome);
         drop_if_failed(connection, outcome);
@@ -154,7 +155,7 @@ impl Mark {
     }
 
     fn set_if_clear(&self, at: Duration) {
-        // Where it is set already, it stays as it is.
+        // If it is set already, it stays as it is.
         let _ = self.0.compare_exchange(0, Self::value(at), Ordering::Relaxed, Ordering::Relaxed);
     }
 

@@ -1,5 +1,5 @@
-//! Studies' exports while the server runs: one of a study at a time, made in the background, kept for a while so that a
-//! download that was cut off can be repeated, and then removed.
+//! Exports of studies while the server runs. Each study has one export at a time. It is made in the background, kept
+//! for a while so that an interrupted download can be repeated, and then removed.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,24 +17,24 @@ use crate::store::{Reader, Recorder, StoreError};
 /// The folder within the data folder in which exports are made.
 const FOLDER: &str = "study-exports";
 
-/// How long a finished export is kept.
+/// How long an export is kept after it has finished or failed.
 const KEPT: Duration = Duration::from_hours(1);
 
-/// Why a finished export is given up.
-const OUTDATED: &str = "since it was begun, a surgeon has withdrawn or words were erased; export again";
+/// The reason that people see when a finished export is discarded.
+const OUTDATED: &str = "a surgeon has withdrawn or words were erased after this export was begun; export again";
 
-/// The exports of studies, each study's latest.
+/// The latest export of each study.
 #[derive(Clone)]
 pub struct StudyExports {
     folder: PathBuf,
     latest: Arc<Mutex<BTreeMap<String, Latest>>>,
 }
 
-/// A study's latest export.
+/// The latest export of a study.
 struct Latest {
     unblinded: bool,
     stage: Stage,
-    /// Tells it apart from the one before.
+    /// Number of the export, which distinguishes it from the one before.
     number: u64,
 }
 
@@ -44,52 +44,52 @@ enum Stage {
     Ready(Made),
 }
 
-/// A finished export. Its folder is removed when nobody holds it any more.
+/// A finished export. Its folder is removed when the last clone is dropped.
 #[derive(Clone)]
 pub struct Made {
-    /// Whether policies are in it.
+    /// Whether the export contains the policies.
     pub unblinded: bool,
-    /// The package.
+    /// Folder of the package.
     pub folder: PathBuf,
-    /// Sessions in it.
+    /// Number of sessions in the export.
     sessions: usize,
-    /// How often something had been taken back in the study before it was begun.
+    /// Number of withdrawals and erasures in the study when the export began.
     taken_back: i64,
-    /// Around the package.
+    /// Temporary folder around the package; dropping it removes the files.
     _room: Arc<TempDir>,
 }
 
-/// How a study's latest export stands.
+/// The state of a study's latest export.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(tag = "state", rename_all = "lowercase")]
 pub enum StudyExportState {
-    /// There is none, or it was removed.
+    /// There is no export, or it was removed.
     None,
-    /// It is being made.
+    /// The export is being made.
     Running {
-        /// Whether policies will be in it.
+        /// Whether the export will contain the policies.
         unblinded: bool,
-        /// How far it has come.
+        /// Progress of the export.
         progress: Progress,
     },
-    /// It can be downloaded.
+    /// The export can be downloaded.
     Ready {
-        /// Whether policies are in it.
+        /// Whether the export contains the policies.
         unblinded: bool,
-        /// Sessions in it.
+        /// Number of sessions in the export.
         sessions: usize,
     },
-    /// It failed; nothing is left of it.
+    /// The export failed, and its files are removed.
     Failed {
-        /// Whether policies were asked for.
+        /// Whether an export with the policies was requested.
         unblinded: bool,
-        /// Why, for people.
+        /// Reason for the failure, for people.
         reason: String,
     },
 }
 
 impl StudyExports {
-    /// None yet. What an earlier server left in the data folder `data` is removed.
+    /// Starts without exports. Removes those that an earlier server left in the data folder `data`.
     #[must_use]
     pub fn new(data: &Path) -> Self {
         let folder = data.join(FOLDER);
@@ -102,10 +102,10 @@ impl StudyExports {
         Self { folder, latest: Arc::default() }
     }
 
-    /// How the latest export of `study` stands.
+    /// The state of the latest export of `study`.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn state(&self, reader: &Reader, study: &str) -> Result<StudyExportState, StoreError> {
         self.give_up_outdated(reader, study).await?;
         Ok(self.lock().get(study).map_or(StudyExportState::None, Latest::state))
@@ -114,14 +114,14 @@ impl StudyExports {
     /// The latest export of `study`, if it is finished.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database failed.
     pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<Made>, StoreError> {
         self.give_up_outdated(reader, study).await?;
         Ok(self.lock().get(study).and_then(Latest::made))
     }
 
-    /// Gives up the finished export of `study` if a surgeon has withdrawn since it was begun, or words were erased: it
-    /// still holds them.
+    /// Discards the finished export of `study` if a surgeon has withdrawn or words were erased since it was begun,
+    /// because it still contains them.
     async fn give_up_outdated(&self, reader: &Reader, study: &str) -> Result<(), StoreError> {
         let taken_back = reader.taken_back(study).await?;
         let mut exports = self.lock();
@@ -137,7 +137,8 @@ impl StudyExports {
         Ok(())
     }
 
-    /// Begins to export `study` as `recorder` records it, unless that is already under way. How it then stands.
+    /// Starts an export of `study`, unless one is already running, and returns the state. `recorder` records the
+    /// export.
     #[must_use]
     pub fn start(&self, recorder: Recorder, study: &str, unblinded: bool) -> StudyExportState {
         let mut latest = self.lock();
@@ -147,7 +148,7 @@ impl StudyExports {
             None => 1,
         };
 
-        // The one before goes now: two packages of a study may be more than the disk has room for.
+        // Removes the previous export now, because the disk may not have room for two packages of a study.
         let started = Latest { unblinded, stage: Stage::Running(Progress::default()), number };
         let state = started.state();
         let before = latest.insert(study.to_owned(), started);
@@ -159,7 +160,7 @@ impl StudyExports {
         state
     }
 
-    /// Takes away export `number` of `study`, unless a later one is in its place.
+    /// Removes export `number` of `study` from the list, unless a later one has replaced it.
     fn take(&self, study: &str, number: u64) -> Option<Latest> {
         let mut latest = self.lock();
         let same = latest.get(study).is_some_and(|latest| latest.number == number);
@@ -190,7 +191,7 @@ impl Latest {
     }
 }
 
-/// An export under way.
+/// A running export.
 struct Job {
     exports: StudyExports,
     study: String,
@@ -208,7 +209,7 @@ impl Job {
             }
         };
         self.stands_at(stage);
-        // The server may end meanwhile: it closes its database without waiting for this.
+        // Dropped before the wait, so that a server that stops meanwhile can close its database.
         drop(recorder);
 
         tokio::time::sleep(KEPT).await;
@@ -244,7 +245,7 @@ impl Job {
     }
 }
 
-/// Removes an export's files, on a thread that may wait for the disk.
+/// Removes an export's files on a thread that may block on the disk.
 fn forget(export: Option<Latest>) {
     if export.is_some() {
         tokio::task::spawn_blocking(move || drop(export));

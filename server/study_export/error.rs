@@ -1,4 +1,4 @@
-//! Why no study was exported.
+//! Why a study could not be exported.
 
 use std::path::PathBuf;
 
@@ -6,21 +6,21 @@ use crate::package::PackageError;
 use crate::store::StoreError;
 use crate::store::export::ExportError;
 
-/// Why no study was exported.
+/// Why a study could not be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyExportError {
     /// There is no such study.
     #[error("there is no study '{study}'; known are: {known}")]
     NoStudy {
-        /// What was asked for.
+        /// Name of the requested study.
         study: String,
-        /// The studies that there are.
+        /// Names of the existing studies.
         known: String,
     },
-    /// All sessions are withdrawn, or there is none yet.
+    /// All sessions of the study are withdrawn, or there are none yet.
     #[error("study '{0}' has no session to export")]
     NoSession(String),
-    /// The policies are asked for too early.
+    /// The policies were requested before the study was unblinded.
     #[error("study '{0}' is not unblinded: export it without its policies, or unblind it first")]
     StillBlinded(String),
     /// A session could not be exported.
@@ -35,23 +35,23 @@ pub enum StudyExportError {
     /// A folder could not be made.
     #[error("cannot write {}: {error}; see that it can be written and has room, and export again", .path.display())]
     Unwritable {
-        /// Which.
+        /// Path of the folder.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         error: std::io::Error,
     },
-    /// The disk has too little room beside what the trial needs.
+    /// The disk has too little space in addition to the reserve for trials.
     #[error(
         "the disk of {} has no room for the export: {:.1} GB have to stay free for trials; \
          remove what is no longer needed there, and export again", .path.display(), *.reserve as f64 / 1e9
     )]
     NoRoom {
-        /// Where it was to be written.
+        /// Folder in which the export was to be written.
         path: PathBuf,
-        /// Bytes that no export takes.
+        /// Reserve in bytes, which exports never use.
         reserve: u64,
     },
-    /// A thread failed.
+    /// A thread of the export panicked.
     #[error("the export ended before it was whole; export again, and report it if that happens again")]
     Broken,
 }

@@ -1,5 +1,5 @@
-//! A study's export being made. Sessions are read and checked on a few threads behind all others, so that neither the
-//! control loop nor a viewer waits for it.
+//! Makes the export of a study. Sessions are read and verified on a few threads of lower priority than all others, so
+//! that neither the control loop nor a viewer waits for the export.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -23,32 +23,33 @@ use crate::store::{Reader, Recorder};
 use crate::trial::study::places::Enrolled;
 use crate::trial::study::stage::Stage;
 
-/// Most sessions that are exported at a time. Each takes some 50 MB, and more than the processors gain nothing.
+/// Maximum number of sessions that are exported at the same time. Each takes about 50 MB of memory. More sessions than
+/// processors would bring nothing.
 const AT_A_TIME: usize = 4;
 
-/// How far an export has come.
+/// The progress of an export.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
 #[schema(as = StudyExportProgress)]
 pub struct Progress {
-    /// Sessions to export.
+    /// Number of sessions to export.
     pub sessions: usize,
-    /// Sessions that are exported and verified.
+    /// Number of sessions that are exported and verified.
     pub exported: usize,
-    /// Steps of joining them; 0 until all sessions are exported.
+    /// Number of steps for joining the sessions; 0 until all sessions are exported.
     pub steps: usize,
-    /// Steps of joining that are done.
+    /// Number of steps for joining that are done.
     pub joined: usize,
 }
 
-/// Hears how far an export has come.
+/// A callback that is given the progress of an export.
 pub type Told = Arc<dyn Fn(Progress) + Send + Sync>;
 
-/// Exports study `study` as a package into the folder `out`, which must be new or empty and appears whole or not at
-/// all. Each session's export is recorded as one.
+/// Exports the study `study` as a package into the folder `out`. The folder must be new or empty, and appears complete
+/// or not at all. Each session's export is recorded in the database as an export of its own.
 ///
 /// # Errors
-/// When there is no such study or no session in it, it is asked for unblinded before it was, an export does not
-/// verify, or `out` cannot be written.
+/// If there is no such study, it has no session to export, the policies are requested before it is unblinded, an export
+/// cannot be verified, or `out` cannot be written.
 pub async fn export_study(
     recorder: &Recorder,
     study: &str,
@@ -63,9 +64,9 @@ pub async fn export_study(
     let (done, made) = oneshot::channel();
     let thread = thread::Builder::new().name("study-export".to_owned());
     let work = move || {
-        // The threads that this one starts stand behind the others like it.
+        // The threads that this one starts inherit the lower priority.
         priority::lower_further();
-        // Whoever asked for it may be gone.
+        // The receiver may have been dropped; then nobody needs the result.
         let _ = done.send(making.run(&runtime));
     };
 
@@ -73,15 +74,16 @@ pub async fn export_study(
     made.await.map_err(|_| StudyExportError::Broken)?
 }
 
-/// Checks that `study` can be exported: before anything is recorded or begun.
+/// Checks that `study` can be exported, before anything is recorded or started.
 ///
 /// # Errors
-/// When there is no such study or no session in it, it is asked for unblinded before it was, or the database failed.
+/// If there is no such study, it has no session to export, the policies are requested before it is unblinded, or the
+/// database failed.
 pub async fn check(reader: &Reader, study: &str, unblinded: bool) -> Result<(), StudyExportError> {
     sessions_of(reader, study, unblinded).await.map(|_| ())
 }
 
-/// The sessions of `study` that are exported, and those that are not.
+/// The sessions of `study` to export, and those that are left out because they are withdrawn.
 async fn sessions_of(
     reader: &Reader,
     study: &str,
@@ -109,7 +111,7 @@ async fn sessions_of(
     Ok((kept.into_iter().map(|session| session.session).collect(), left_out))
 }
 
-/// What is to be exported, and where to.
+/// An export with its sessions and its target folder.
 struct Making {
     recorder: Recorder,
     sessions: Vec<SessionId>,
@@ -120,7 +122,7 @@ struct Making {
 }
 
 impl Making {
-    /// Makes the package. Not on a thread of `runtime`.
+    /// Makes the package. Must not be called on a thread of `runtime`, because it blocks.
     fn run(&self, runtime: &Handle) -> Result<Summary, StudyExportError> {
         let parent = self.out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let unwritable = |error| StudyExportError::Unwritable { path: parent.to_owned(), error };
@@ -128,7 +130,7 @@ impl Making {
         let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;
 
         let sources = self.export_sessions(runtime, exports.path())?;
-        // The joined tables tell once more what the exports tell.
+        // The joined tables take about as much space again as the exports.
         check_room(parent, size_of(exports.path()).map_err(unwritable)?)?;
 
         let all = self.sessions.len();
@@ -168,18 +170,19 @@ impl Making {
     }
 }
 
-/// The sessions being exported, shared by all threads that do it.
+/// The sessions being exported, shared by all worker threads.
 struct Work<'a> {
     making: &'a Making,
     runtime: &'a Handle,
     folder: &'a Path,
-    /// The place of the next session.
+    /// Index of the next session to export.
     next: AtomicUsize,
-    /// Whether an export failed, so that the others need not go on.
+    /// Whether an export failed, so that the other threads can stop.
     stopped: AtomicBool,
-    /// What is exported, each with its place in the study.
+    /// The finished exports, each with the session's index in the study.
     exported: Mutex<Vec<(usize, Source)>>,
-    /// An export ends with its own record in the chain, so two must not be recorded in the same moment.
+    /// Held while an export is prepared. An export ends with its own record in the chain, so two exports must not be
+    /// recorded at the same moment.
     turn: tokio::sync::Mutex<()>,
 }
 
@@ -210,10 +213,10 @@ impl Work<'_> {
     }
 }
 
-/// Refuses to take `bytes` of the disk of `folder` where that would leave less than its reserve: what is said in a
-/// session has to find room.
+/// Checks that `bytes` more on the disk of `folder` leave its reserve free. Comments and answers of a session need that
+/// space.
 fn check_room(folder: &Path, bytes: u64) -> Result<(), StudyExportError> {
-    // A disk that does not tell its room says itself when it is full.
+    // If the free space is unknown, writing reports an error when the disk is full.
     let Ok(room) = room(folder) else { return Ok(()) };
     if room.spare() < bytes {
         return Err(StudyExportError::NoRoom { path: folder.to_owned(), reserve: room.reserve });
@@ -221,7 +224,7 @@ fn check_room(folder: &Path, bytes: u64) -> Result<(), StudyExportError> {
     Ok(())
 }
 
-/// Bytes of all files below `folder`.
+/// Total size of all files below `folder`, in bytes.
 fn size_of(folder: &Path) -> io::Result<u64> {
     let mut bytes = 0;
     for file in files_below(folder)? {

@@ -1,5 +1,5 @@
-//! The export of a whole study: each session exported and verified, several at a time, then all of them joined to one
-//! package. On the command line somebody waits for it; while the server runs it is made in the background.
+//! The export of a whole study: each session is exported and verified, several at a time, and then all are joined into
+//! one package. The command waits for the export; a running server makes it in the background.
 
 mod background;
 mod error;

@@ -1,9 +1,9 @@
-//! The local authority: made once, kept in the data folder, trusted once by each tablet and laptop. It signs the
-//! server's certificates.
+//! The local certificate authority. It is made once, kept in the data folder, and trusted once by each tablet and
+//! laptop. It signs the server's certificates.
 //!
-//! Its certificate limits what it can sign for: private networks, this machine's names, and the addresses that the
-//! machine had when the authority was made. So whoever steals its key cannot pretend to be any other site towards the
-//! devices that trust it.
+//! Its certificate limits the names and addresses that it can sign for: private networks, this machine's names, and the
+//! addresses that the machine had when the authority was made. So a thief of its key cannot impersonate any other site
+//! to the devices that trust it.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -37,17 +37,19 @@ const PUBLIC_FILE: &str = "authority.crt";
 
 const DAY: Duration = Duration::from_hours(24);
 
-/// How long the authority lives. Every device has to trust a new one, so it outlives a study.
+/// How long the authority is valid. Every device has to trust a new one, so it outlasts a study.
 const AUTHORITY_LIVES: Duration = DAY.saturating_mul(10 * 365);
 
-/// How long a certificate lives. Apple's devices refuse one of a local authority that lives over 825 days
-/// (support.apple.com/en-us/103769). As a new one is signed at each start, less does.
+/// How long a server certificate is valid. Apple's devices refuse a local authority's certificate that is valid for
+/// more than 825 days (support.apple.com/en-us/103769). A shorter time is enough, because a new one is signed at each
+/// start.
 const CERTIFICATE_LIVES: Duration = DAY.saturating_mul(90);
 
-/// How far the clock of a tablet may be behind this machine's.
+/// How far a tablet's clock may be behind this machine's clock.
 const SLOW_CLOCKS: Duration = DAY.saturating_mul(2);
 
-/// Networks that anybody may use as their own: RFC 1918, RFC 6598, RFC 3927, RFC 4193, and each machine's own.
+/// Networks that anybody may use privately (RFC 1918, RFC 6598, RFC 3927, RFC 4193), and each machine's loopback
+/// network.
 const PRIVATE_NETWORKS: [(&str, u8); 8] = [
     ("10.0.0.0", 8),
     ("172.16.0.0", 12),
@@ -59,16 +61,16 @@ const PRIVATE_NETWORKS: [(&str, u8); 8] = [
     ("::1", 128),
 ];
 
-/// What everybody may know of the authority.
+/// The public part of the authority.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PublicAuthority {
-    /// Its certificate, PEM.
+    /// Certificate of the authority, in PEM form.
     pub pem: String,
-    /// What devices call it.
+    /// Common name of the certificate, which devices show.
     pub name: String,
-    /// SHA-256 of its certificate, in pairs of hexadecimal digits, as devices show it.
+    /// SHA-256 of the certificate as pairs of hexadecimal digits, as devices show it.
     pub fingerprint: String,
-    /// SHA-256 of its certificate.
+    /// SHA-256 of the certificate.
     pub digest: [u8; 32],
 }
 
@@ -89,7 +91,7 @@ pub(super) struct Authority {
 }
 
 impl Authority {
-    /// The authority kept in `data_dir`; made on first use, with a private key that only its owner can read.
+    /// Loads the authority from `data_dir`. The first use makes it, with a private key that only the owner can read.
     pub(super) fn load_or_create(data_dir: &Path, now: Timestamp) -> Result<Self, TlsError> {
         let folder = data_dir.join(FOLDER);
         let path = folder.join(FILE);
@@ -129,9 +131,9 @@ impl Authority {
         if read.public_key().subject_public_key.data != key.public_key_raw() {
             return Err(damaged("its private key belongs to another certificate"));
         }
-        // The authority signed its own certificate. A changed one must go no further: rcgen writes the authority's name
-        // into whatever it signs, and panics on a name that nobody could have written.
-        read.verify_signature(None).map_err(|_| damaged("its certificate is not what was signed"))?;
+        // The authority signed its own certificate. A changed certificate must be refused here, because rcgen writes
+        // the authority's name into everything that it signs, and panics on an impossible name.
+        read.verify_signature(None).map_err(|_| damaged("the signature of its certificate does not match"))?;
 
         let name = read.subject().iter_common_name().next().and_then(|name| name.as_str().ok());
         let name = name.unwrap_or_default().to_owned();
@@ -162,8 +164,8 @@ impl Authority {
         Ok(())
     }
 
-    /// A new certificate for `names`. Those that the authority may not sign for are left out, since one of them would
-    /// make the whole certificate invalid.
+    /// Signs a new certificate for `names`. Leaves out the names that the authority may not sign for, because one of
+    /// them would make the whole certificate invalid.
     pub(super) fn sign(&self, names: &Names, now: Timestamp) -> Result<Signed, TlsError> {
         self.check(now)?;
         let hosts = names.hosts.iter().filter(|host| self.permitted.host(host));
@@ -189,20 +191,20 @@ impl Authority {
         Ok(Signed { certificate, key, facts })
     }
 
-    /// Those of `names` that the authority may not sign for, in words.
+    /// The hosts and addresses in `names` that the authority may not sign for, as texts.
     pub(super) fn not_permitted(&self, names: &Names) -> Vec<String> {
         let hosts = names.hosts.iter().filter(|host| !self.permitted.host(host)).cloned();
         let addresses = names.addresses.iter().filter(|address| !self.permitted.address(**address));
         hosts.chain(addresses.map(ToString::to_string)).collect()
     }
 
-    /// The file that holds it.
+    /// File with the authority's certificate and private key.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 }
 
-/// A new authority for a machine with these names: certificate and private key, PEM.
+/// Makes a new authority for a machine with these names. Returns its certificate and private key in PEM form.
 fn make(machine: &Names, now: Timestamp) -> Result<String, TlsError> {
     let host = machine.hosts.iter().find(|host| host.as_str() != "localhost");
     let name = host.map_or_else(|| "parfocal".to_owned(), |host| format!("parfocal on {host}"));
@@ -220,9 +222,9 @@ fn make(machine: &Names, now: Timestamp) -> Result<String, TlsError> {
     Ok(format!("{}{}", certificate.pem(), key.serialize_pem()))
 }
 
-/// What the authority of a machine with these names may sign for.
+/// The name constraints of an authority on a machine with these names.
 fn limits(machine: &Names) -> NameConstraints {
-    // `local` is every machine's name in its own network (RFC 6762), so that the machine can be renamed.
+    // `local` covers the name of any machine in its local network (RFC 6762), so that the machine can be renamed.
     let hosts = machine.hosts.iter().map(String::as_str).chain(["local"]);
     let hosts = hosts.map(|host| GeneralSubtree::DnsName(host.to_owned()));
 
@@ -262,7 +264,7 @@ fn later(now: Timestamp, by: Duration) -> Timestamp {
     now.saturating_add(by).unwrap_or(now)
 }
 
-/// Certificates count in seconds.
+/// Converts a time. Certificates have whole seconds.
 fn date(timestamp: Timestamp) -> OffsetDateTime {
     OffsetDateTime::from_unix_timestamp(timestamp.as_second()).unwrap_or(OffsetDateTime::UNIX_EPOCH)
 }

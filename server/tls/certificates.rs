@@ -1,4 +1,4 @@
-//! The certificate that the server shows now, and how it is kept current.
+//! The server's present certificate, and how it is kept up to date.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -22,16 +22,17 @@ use super::given::{Contents, Files};
 use super::names::Names;
 use crate::clock::Clock;
 
-/// A local certificate is replaced so long before it ends, and so long before its end a given one is warned of.
+/// A local certificate is replaced this long before it ends. For a given certificate, warnings begin this long before
+/// its end.
 const BEFORE_THE_END: Duration = Duration::from_hours(30 * 24);
 
-/// How often it is looked whether the certificate is still right: addresses change when a cable is plugged in.
+/// How often the certificate is checked. The machine's addresses change when a cable is plugged in.
 const LOOK_EVERY: Duration = Duration::from_mins(1);
 
-/// How often a certificate that is about to end is warned of.
+/// How often the log warns about a certificate that ends soon.
 const WARN_EVERY: Duration = Duration::from_hours(24);
 
-/// The certificate that the server shows.
+/// The certificate that the server shows, and its source.
 pub struct Certificates {
     source: Source,
     provider: Arc<CryptoProvider>,
@@ -40,25 +41,25 @@ pub struct Certificates {
 
 /// Where certificates come from.
 enum Source {
-    /// The local authority signs them for a server that listens on an address.
+    /// The local authority signs them, for a server that listens on the address `listening`.
     Local { authority: Box<Authority>, listening: IpAddr },
-    /// Two files hold them. What they held last is kept, so that a bad one is told of once.
+    /// Two files hold them. Their last contents are kept, so that a bad certificate is reported only once.
     Given { files: Files, last: Mutex<Contents> },
 }
 
-/// The certificate shown now.
+/// The certificate that the server shows now.
 struct Shown {
     key: Arc<CertifiedKey>,
     facts: Facts,
-    /// The names that a local one was asked for.
+    /// Names that a local certificate was requested for.
     wanted: Names,
 }
 
 impl Certificates {
-    /// Certificates of the local authority kept in `data_dir`, for a server that listens on `listening`.
+    /// Certificates signed by the local authority in `data_dir`, for a server that listens on `listening`.
     ///
     /// # Errors
-    /// When the authority cannot be read or kept, is damaged, or is not valid now.
+    /// If the authority cannot be read or stored, is damaged, or is not valid now.
     pub fn local(data_dir: &Path, listening: IpAddr, now: Timestamp) -> Result<Self, TlsError> {
         let provider = Arc::new(ring::default_provider());
         let authority = Box::new(Authority::load_or_create(data_dir, now)?);
@@ -67,10 +68,10 @@ impl Certificates {
         Ok(Self { source, provider, shown: ArcSwap::from_pointee(shown) })
     }
 
-    /// The certificate in the file `certificate` with the private key in the file `key`, both PEM.
+    /// The certificate in the file `certificate`, with the private key in the file `key`. Both are in PEM form.
     ///
     /// # Errors
-    /// When a file cannot be read, or the certificate cannot be shown now.
+    /// If a file cannot be read, or the certificate cannot be used now.
     pub fn given(certificate: PathBuf, key: PathBuf, now: Timestamp) -> Result<Self, TlsError> {
         let provider = Arc::new(ring::default_provider());
         let files = Files { certificate, key };
@@ -82,7 +83,7 @@ impl Certificates {
         Ok(Self { source, provider, shown: ArcSwap::from_pointee(shown) })
     }
 
-    /// The authority that devices must trust first, if it is a local one.
+    /// The local authority, which devices must trust first; none if the certificate was given.
     #[must_use]
     pub fn authority(&self) -> Option<&PublicAuthority> {
         match &self.source {
@@ -91,14 +92,14 @@ impl Certificates {
         }
     }
 
-    /// Host and port for links to a server that is reached at `address`: by a name of the certificate, where that does
-    /// not hold the address.
+    /// Host and port for links to a server that is reached at `address`. If the certificate does not list the address,
+    /// the host is a name that it lists.
     #[must_use]
     pub fn host(&self, address: SocketAddr) -> String {
         let shown = self.shown.load();
         let names = &shown.facts.names;
         let name = names.hosts.iter().find(|host| !host.starts_with('*'));
-        // A machine that has just got another address: within a minute its local certificate holds that too.
+        // The machine has just got another address. Within a minute, its local certificate will list that too.
         let is_new = matches!(self.source, Source::Local { .. }) && !shown.wanted.addresses.contains(&address.ip());
 
         match name {
@@ -109,10 +110,11 @@ impl Certificates {
         }
     }
 
-    /// The settings of connections that show this certificate, whatever it is by then. They speak HTTP/2 and HTTP/1.1.
+    /// The TLS settings for connections. Each connection gets the certificate that is current when it begins.
+    /// Connections use HTTP/2 or HTTP/1.1.
     ///
     /// # Errors
-    /// When the cryptography cannot be set up.
+    /// If the cryptography cannot be set up.
     pub fn settings(self: &Arc<Self>) -> Result<Arc<ServerConfig>, TlsError> {
         let mut settings = ServerConfig::builder_with_provider(Arc::clone(&self.provider))
             .with_safe_default_protocol_versions()?
@@ -122,11 +124,11 @@ impl Certificates {
         Ok(Arc::new(settings))
     }
 
-    /// Looks whether the certificate is still right, and replaces it if not: a local one that is about to end, or does
-    /// not have this machine's present `names`; a given one whose files were renewed. Whether it was replaced.
+    /// Checks the certificate, and replaces it if necessary: a local one if it ends soon or does not have the machine's
+    /// present `names`, a given one if its files were renewed. Returns whether it was replaced.
     ///
     /// # Errors
-    /// When there is no new one; the present one is kept.
+    /// If no new certificate could be made or read. The present one stays in use.
     pub fn refresh(&self, now: Timestamp, names: impl FnOnce(IpAddr) -> Names) -> Result<bool, TlsError> {
         match &self.source {
             Source::Local { authority, listening } => {
@@ -157,13 +159,13 @@ impl Certificates {
         }
     }
 
-    /// When the certificate shown now ends.
+    /// When the present certificate ends.
     #[must_use]
     pub fn until(&self) -> Timestamp {
         self.shown.load().facts.until
     }
 
-    /// The end of the certificate shown now, if that is near.
+    /// The end of the present certificate, if it ends soon.
     fn near_end(&self, now: Timestamp) -> Option<Timestamp> {
         let shown = self.shown.load();
         shown.ends_soon(now).then_some(shown.facts.until)
@@ -204,8 +206,8 @@ fn signed(authority: &Authority, names: Names, provider: &CryptoProvider, now: T
     Ok(Shown { key: Arc::new(key), facts: signed.facts, wanted: names })
 }
 
-/// Keeps the certificate current for as long as the server runs. What fails is logged, and tried again; it never stops
-/// the server.
+/// Keeps the certificate up to date while the server runs. A failure is logged and tried again; it never stops the
+/// server.
 pub async fn keep_current(certificates: Arc<Certificates>, clock: Arc<dyn Clock>) {
     let mut ticks = interval(LOOK_EVERY);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -216,7 +218,7 @@ pub async fn keep_current(certificates: Arc<Certificates>, clock: Arc<dyn Clock>
         ticks.tick().await;
         let now = clock.wall();
 
-        // Files may lie on a disk that does not answer.
+        // On a blocking thread, because the files may be on a disk that does not answer.
         let looking = Arc::clone(&certificates);
         let looked = spawn_blocking(move || looking.refresh(now, Names::of_machine)).await;
         let found = match looked {

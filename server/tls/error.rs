@@ -11,108 +11,108 @@ pub enum TlsError {
     #[error("cannot read {}: {source}; check the path, and that the account of the server may read the file",
             path.display())]
     Unreadable {
-        /// The file.
+        /// File that could not be read.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file holds no certificate.
     #[error("{} holds no certificate; it must be in PEM form and begin with -----BEGIN CERTIFICATE-----",
             path.display())]
     NoCertificate {
-        /// The file.
+        /// File without a certificate.
         path: PathBuf,
     },
     /// A file holds no private key.
     #[error("{} holds no private key; it must be in PEM form and begin with -----BEGIN PRIVATE KEY-----",
             path.display())]
     NoKey {
-        /// The file.
+        /// File without a private key.
         path: PathBuf,
     },
-    /// A private key that only a passphrase opens.
+    /// The private key is protected by a passphrase.
     #[error("the private key in {} is protected by a passphrase, which nobody could enter at a restart; \
              remove it with `openssl pkey -in FILE -out NEW`, and let only the server's account read the new file",
             path.display())]
     KeyNeedsPassphrase {
-        /// The file.
+        /// File with the private key.
         path: PathBuf,
     },
-    /// The key is not the certificate's.
+    /// The private key does not belong to the certificate.
     #[error("the private key in {} does not belong to the certificate in {}; give the key that the certificate was \
              requested with", key.display(), certificate.display())]
     OtherKey {
-        /// The file with the key.
+        /// File with the private key.
         key: PathBuf,
-        /// The file with the certificate.
+        /// File with the certificate.
         certificate: PathBuf,
     },
-    /// Certificate or key are of a kind that cannot be used.
+    /// The certificate or the key is of a kind that cannot be used.
     #[error("the certificate in {} cannot be used: {reason}; ask for one with an RSA, ECDSA or Ed25519 key",
             path.display())]
     Unusable {
-        /// The file.
+        /// File with the certificate.
         path: PathBuf,
-        /// What is wrong.
+        /// Why it cannot be used.
         reason: String,
     },
-    /// The certificate names nothing that a browser looks at.
+    /// The certificate has no subject alternative names, which are the only names that browsers check.
     #[error("the certificate in {} names no host in its subject alternative names, so every browser refuses it; \
              ask for one that names this machine", path.display())]
     NoNames {
-        /// The file.
+        /// File with the certificate.
         path: PathBuf,
     },
     /// The certificate has ended.
     #[error("the certificate in {} ended on {until}; renew it, or leave out --tls-certificate and --tls-key to use \
              a local authority", path.display())]
     Expired {
-        /// The file.
+        /// File with the certificate.
         path: PathBuf,
-        /// Its end.
+        /// When the certificate ended.
         until: Timestamp,
     },
-    /// The certificate has not begun.
+    /// The certificate is not valid yet.
     #[error("the certificate in {} begins on {from}, and this machine's clock says {now}; set the clock, or wait",
             path.display())]
     NotYetValid {
-        /// The file.
+        /// File with the certificate.
         path: PathBuf,
-        /// Its begin.
+        /// When the certificate begins to be valid.
         from: Timestamp,
-        /// What the clock says.
+        /// Time by this machine's clock.
         now: Timestamp,
     },
-    /// The local authority could not be kept.
+    /// The local authority could not be stored.
     #[error("cannot keep the local authority in {}: {source}; check the folder's permissions and free space",
             path.display())]
     Unwritable {
-        /// The file.
+        /// File that could not be written.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The local authority's file is not what was written.
+    /// The local authority's file is damaged.
     #[error("the local authority in {} is damaged ({reason}); restore the file, or delete it to make a new authority, \
              which every tablet and laptop must then trust anew", path.display())]
     DamagedAuthority {
-        /// The file.
+        /// File with the authority.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the damage.
         reason: &'static str,
     },
-    /// The local authority has ended, or has not begun.
+    /// The local authority has expired, or is not valid yet.
     #[error("the local authority in {} is valid from {from} to {until}, and this machine's clock says {now}; set the \
              clock if it is wrong, else delete the file to make a new authority, which every tablet and laptop must \
              then trust anew", path.display())]
     AuthorityNotValid {
-        /// The file.
+        /// File with the authority.
         path: PathBuf,
-        /// Its begin.
+        /// When the authority begins to be valid.
         from: Timestamp,
-        /// Its end.
+        /// When the authority ends.
         until: Timestamp,
-        /// What the clock says.
+        /// Time by this machine's clock.
         now: Timestamp,
     },
     /// A certificate could not be made.

@@ -1,4 +1,4 @@
-//! What a certificate says of itself.
+//! Facts that are read from a certificate.
 
 use std::net::IpAddr;
 
@@ -8,19 +8,19 @@ use x509_parser::prelude::{FromDer, X509Certificate};
 
 use super::names::Names;
 
-/// What a certificate says of itself.
+/// The validity and the names of a certificate.
 #[derive(Debug, Clone)]
 pub(super) struct Facts {
-    /// When it begins.
+    /// When it begins to be valid.
     pub(super) from: Timestamp,
     /// When it ends.
     pub(super) until: Timestamp,
-    /// Whom it is for.
+    /// Host names and addresses that it is for.
     pub(super) names: Names,
 }
 
 impl Facts {
-    /// What the certificate `der` says; none where it is no certificate.
+    /// Reads the facts from the certificate `der`; none if it is not a certificate.
     pub(super) fn read(der: &[u8]) -> Option<Self> {
         let (_, certificate) = X509Certificate::from_der(der).ok()?;
         let validity = certificate.validity();
@@ -47,12 +47,12 @@ impl Facts {
 #[derive(Debug, Clone)]
 pub(super) struct Permitted {
     hosts: Vec<String>,
-    /// Address and mask.
+    /// Network address and mask.
     networks: Vec<(IpAddr, IpAddr)>,
 }
 
 impl Permitted {
-    /// The constraints of the certificate `der`; none where it has none, or is no certificate.
+    /// Reads the name constraints of the certificate `der`; none if it has none, or is not a certificate.
     pub(super) fn read(der: &[u8]) -> Option<Self> {
         let (_, certificate) = X509Certificate::from_der(der).ok()?;
         let constraints = certificate.name_constraints().ok()??;
@@ -71,7 +71,7 @@ impl Permitted {
         Some(permitted)
     }
 
-    /// Whether `host` is one of the permitted names, or below one.
+    /// Whether `host` is one of the permitted names, or a subdomain of one.
     pub(super) fn host(&self, host: &str) -> bool {
         let is_below = |name: &String| host.strip_suffix(name.as_str()).is_some_and(|rest| rest.ends_with('.'));
         self.hosts.iter().any(|name| host == name || is_below(name))
@@ -87,7 +87,7 @@ impl Permitted {
     }
 }
 
-/// An address as certificates write it: 4 or 16 bytes.
+/// Reads an address as it is encoded in certificates: 4 or 16 bytes.
 fn address(bytes: &[u8]) -> Option<IpAddr> {
     let v4 = <[u8; 4]>::try_from(bytes).map(IpAddr::from).ok();
     v4.or_else(|| <[u8; 16]>::try_from(bytes).map(IpAddr::from).ok())

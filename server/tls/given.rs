@@ -1,4 +1,4 @@
-//! A certificate that the site gives: two files, which somebody renews now and then.
+//! A certificate that the site provides in two files, which somebody renews from time to time.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,16 +13,16 @@ use tokio_rustls::rustls::{Error as RustlsError, InconsistentKeys};
 use super::error::TlsError;
 use super::facts::Facts;
 
-/// The two files.
+/// The two files of a given certificate.
 #[derive(Debug, Clone)]
 pub(super) struct Files {
-    /// The certificate, followed by those between it and its authority.
+    /// File with the certificate, followed by the intermediate certificates up to its authority.
     pub(super) certificate: PathBuf,
-    /// Its private key.
+    /// File with the private key.
     pub(super) key: PathBuf,
 }
 
-/// What the two files hold.
+/// The contents of the two files.
 #[derive(PartialEq, Eq)]
 pub(super) struct Contents {
     certificate: Vec<u8>,
@@ -35,7 +35,7 @@ impl Files {
         Ok(Contents { certificate: read(&self.certificate)?, key: read(&self.key)? })
     }
 
-    /// What the files held, as a certificate that can be shown now.
+    /// Checks the contents of the files, and returns them as a certificate that can be shown now.
     pub(super) fn check(
         &self,
         contents: &Contents,
@@ -68,7 +68,7 @@ impl Files {
 
     fn private_key(&self, pem: &[u8]) -> Result<PrivateKeyDer<'static>, TlsError> {
         let text = String::from_utf8_lossy(pem);
-        // In PKCS #8's form and in OpenSSL's older one.
+        // The two forms of an encrypted key: PKCS #8, and OpenSSL's older form.
         if text.contains("BEGIN ENCRYPTED PRIVATE KEY") || text.contains("Proc-Type: 4,ENCRYPTED") {
             return Err(TlsError::KeyNeedsPassphrase { path: self.key.clone() });
         }

@@ -8,12 +8,12 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 pub struct Names {
     /// Host names, in lower case.
     pub hosts: BTreeSet<String>,
-    /// Addresses.
+    /// IP addresses.
     pub addresses: BTreeSet<IpAddr>,
 }
 
 impl Names {
-    /// The names of this machine, and the addresses at which a server that listens on `listening` is reached now.
+    /// The names of this machine, and the present addresses of a server that listens on `listening`.
     #[must_use]
     pub fn of_machine(listening: IpAddr) -> Self {
         let mut addresses = BTreeSet::from([Ipv4Addr::LOCALHOST.into(), Ipv6Addr::LOCALHOST.into()]);
@@ -33,7 +33,7 @@ impl Names {
     }
 }
 
-/// What the machine calls itself; the kernel's word, which may be anything.
+/// The machine's own name, in lower case. The kernel may report any text.
 fn machine_name() -> String {
     rustix::system::uname().nodename().to_string_lossy().to_ascii_lowercase()
 }
@@ -42,7 +42,7 @@ fn machine_name() -> String {
 fn hosts(name: &str) -> BTreeSet<String> {
     let mut hosts = BTreeSet::from(["localhost".to_owned()]);
     if is_host_name(name) {
-        // The name that a machine announces by itself in its own network (mDNS, RFC 6762).
+        // The name that a machine announces in its local network (mDNS, RFC 6762).
         if !name.contains('.') {
             hosts.insert(format!("{name}.local"));
         }
@@ -62,8 +62,8 @@ fn is_host_name(name: &str) -> bool {
     name.len() <= 253 && name.split('.').all(is_label)
 }
 
-/// The addresses of all network interfaces. Left out are those that cannot stand in a link: of IPv6's link-local ones,
-/// which interface is meant must be said beside them.
+/// The addresses of all network interfaces, except those that cannot be used in a link: link-local IPv6 addresses need
+/// the name of an interface beside them.
 fn interfaces() -> Vec<IpAddr> {
     let found = if_addrs::get_if_addrs().unwrap_or_else(|error| {
         tracing::warn!("the addresses of this machine could not be listed: {error}");

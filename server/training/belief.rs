@@ -1,4 +1,4 @@
-//! Trains the belief tracker: in simulation the optimum is known at every frame, so the posterior is learned directly,
+//! Trains the belief tracker. In simulation the optimum is known at every frame, so the posterior is learned directly,
 //! by cross-entropy, on scans that the tracker itself steers.
 
 use rand::{RngExt, SeedableRng};
@@ -41,22 +41,22 @@ struct Actor {
     wider: usize,
 }
 
-/// Share of scans in which not all wider patches are seen, as in a picture that is too small for them.
+/// Share of scans in which some of the wider patches are missing, as in a picture that is too small for them.
 const NARROW: f64 = 0.1;
 
-/// Share of scans in which the tracker is told how fast the optic blurs.
+/// Share of scans in which the tracker gets the blur rate of the optics as an input.
 const TOLD: f64 = 0.4;
-/// Spread of what it is told around the truth, as a standard deviation of the logarithm.
+/// Error of that blur rate: standard deviation of its logarithm around the true one's.
 const MEASURED: f64 = 0.15;
 
-/// Frames and what should have been believed: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
+/// Frames and the beliefs to learn: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
 struct Batch {
     inputs: Tensor,
     beliefs: Tensor,
 }
 
 impl BeliefTrainer {
-    /// A training from nothing on `scenery`, its network on `device`.
+    /// A training from random weights on `scenery`, with its network on `device`.
     #[must_use]
     pub fn new(recipe: BeliefRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
@@ -83,7 +83,7 @@ impl BeliefTrainer {
         let mut believed = vec![0.0f32; count * BINS];
 
         for t in 0..window {
-            // Each scan has random sources of its own, so how they are shared among cores changes nothing.
+            // Each scan has its own random generators, so the result does not depend on the number of cores.
             self.actors
                 .par_iter_mut()
                 .zip(now.par_chunks_exact_mut(BELIEF_INPUT))

@@ -1,5 +1,4 @@
-//! One of the environments that train side by side: scans, one after another, seen through a lens
-//! that may lag.
+//! One of the environments that train side by side: a simulated focal-time scan, seen through a lens that may lag.
 
 use std::collections::VecDeque;
 
@@ -13,27 +12,29 @@ use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scan;
 use crate::scans::variety::Variety;
 
-/// Most frames by which a lens is late: at 50 frames a second 40 ms, more than one settles in (about
-/// 15 ms) after the frame that decided was read out.
+/// Largest lag of the lens, in frames. At 50 frames a second this is 40 ms. A real lens settles faster, in about 15 ms
+/// after the frame that decided was read out.
 const MOST_DELAY: usize = 2;
 
-/// One of the many scans that run side by side in training.
+/// One of the scans that run side by side in training, with its lens.
 #[derive(Debug, Clone)]
 pub struct Environment {
     scan: Scan,
     focal_power: FocalPower,
-    /// Share of the way to its target that the lens goes within a frame.
+    /// Share of the way to its target that the lens covers in one frame.
     response: f64,
-    /// The lens shows multiples of this alone, whatever it says: hysteresis, or a recorded scan's stack. 0: none.
+    /// The picture is made at the multiple of this nearest to the focal power that the lens reports. It stands for
+    /// hysteresis, or for the steps of a recorded focal stack. 0: no such rounding.
     grid: f64,
-    /// Targets on their way to the lens, oldest first: as many as the frames that exposure, transfer and settling take.
+    /// Targets that have not reached the lens yet, oldest first. Their number is the delay in frames, which stands for
+    /// exposure, transfer and settling.
     under_way: VecDeque<f64>,
-    /// Whether this scan is one on which the policy is now and then led astray, so that it learns to come back.
+    /// Whether the policy's target is replaced now and then by a wrong one, so that the policy learns to recover.
     pub wanders: bool,
 }
 
 impl Environment {
-    /// An environment on a scan over a scene that `rng` draws from `scenery`.
+    /// Draws a scene from `scenery`, then a scan over it and a lens, all with `rng`.
     pub fn draw(scenery: &Scenery, variety: Variety, wandering: f64, rng: &mut ChaCha8Rng) -> Self {
         let scene = scenery.draw(rng);
         let settings = variety.draw(&scene, rng);
@@ -54,19 +55,19 @@ impl Environment {
         Self { scan, focal_power: FocalPower::nearest(start), response, grid, under_way, wanders }
     }
 
-    /// Where the lens stands.
+    /// The focal power that the lens reports.
     #[must_use]
     pub const fn focal_power(&self) -> FocalPower {
         self.focal_power
     }
 
-    /// Where it should stand.
+    /// The focal power at which the patch is in focus.
     #[must_use]
     pub fn optimum(&self) -> FocalPower {
         self.scan.optimum()
     }
 
-    /// How fast blur grows, where the scene has one rate.
+    /// How fast blur grows with the focal power error; `None` if the scene has no known rate.
     #[must_use]
     pub fn blur(&self) -> Option<BlurRate> {
         self.scan.blur()
@@ -82,14 +83,13 @@ impl Environment {
         self.scan.view(self.shown())
     }
 
-    /// The focal power at which the frame is shown, where the lens says it stands or near that.
+    /// The focal power at which the picture is made: the reported one, rounded to the grid if there is one.
     fn shown(&self) -> FocalPower {
         let stands = self.focal_power.get();
         FocalPower::nearest(if self.grid > 0.0 { (stands / self.grid).round() * self.grid } else { stands })
     }
 
-    /// Sends the lens to `target`, where it arrives some frames later if it is late, and advances to
-    /// the next frame.
+    /// Sends the lens to `target` and advances to the next frame. A lens that lags arrives some frames later.
     pub fn advance(&mut self, target: f64) {
         self.under_way.push_back(target);
         let target = self.under_way.pop_front().unwrap_or(target);
@@ -99,7 +99,7 @@ impl Environment {
     }
 }
 
-/// A target in the place of `target` where a wandering environment is led astray: now and then, by up to 0.3.
+/// Returns `target`, or with a probability of 4 % one that differs from it by up to 0.3. For environments that wander.
 pub fn lead_astray(target: f64, rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.04) { target + rng.random_range(-0.3..0.3) } else { target }
 }

@@ -1,41 +1,41 @@
-//! Optimisers whose whole state can be saved, so that a resumed training continues exactly as if it
-//! had never stopped.
+//! Optimisers whose whole state can be saved, so that a resumed training continues exactly as if it had never stopped.
 
 use tch::{Tensor, nn};
 
 use super::run::checkpoint::{Checkpoint, CheckpointError};
 
-/// Which rule turns gradients into steps.
+/// The rule that turns gradients into steps, with its settings.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "name", deny_unknown_fields)]
 pub enum Rule {
-    /// `RMSProp` with momentum, `PyTorch`'s form: smoothing 0.99, epsilon 1e-8, but under the root.
+    /// `RMSProp` with momentum in `PyTorch`'s form, except that epsilon is under the root: smoothing 0.99, epsilon
+    /// 1e-8.
     RmsProp {
-        /// Step size.
+        /// Step size before the schedule's scale.
         learning_rate: f64,
-        /// Momentum.
+        /// Momentum, 0 to below 1.
         momentum: f64,
     },
-    /// Adam (Kingma and Ba 2015) with betas 0.9 and 0.999, epsilon 1e-8, but under the root.
+    /// Adam (Kingma and Ba 2015) with betas 0.9 and 0.999 and epsilon 1e-8, except that epsilon is under the root.
     Adam {
-        /// Step size.
+        /// Step size before the schedule's scale.
         learning_rate: f64,
     },
 }
 
-/// Share of the learning rate after the share `done` of a training: a half cosine from 1 to `floor`.
+/// Scale of the learning rate when the share `done` (0..1) of the training is done: a half cosine from 1 to `floor`.
 #[must_use]
 pub fn half_cosine(done: f64, floor: f64) -> f64 {
     floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos())
 }
 
-/// A store's variables as views of one tensor, in the order of their names: what is done to all of
-/// them is one operation.
+/// A store's variables as views of one tensor, in the order of their names. So an operation on all of them is a single
+/// call.
 #[derive(Debug)]
 pub struct Flat {
-    /// The variables.
+    /// The variables, in the order of their names.
     pub variables: Vec<Tensor>,
-    /// All their values, one after another.
+    /// All their values, one after another: `[total]`.
     pub values: Tensor,
 }
 
@@ -55,24 +55,24 @@ impl Flat {
         Self { variables, values }
     }
 
-    /// Moves all variables towards those of `other`, of the same network, by `share`.
+    /// Moves all variables by `share` of the way towards those of `other`, which has the same network.
     pub fn approach(&mut self, other: &Self, share: f64) {
         let _ = self.values.lerp_(&other.values, share);
     }
 
-    /// The gradient of `loss` by all variables, as one tensor.
+    /// The gradient of `loss` with respect to all variables, as one tensor.
     pub fn gradient(&self, loss: &Tensor) -> Tensor {
         joined(&Tensor::run_backward(&[loss], &self.variables, false, false))
     }
 }
 
-/// All tensors' values, one after another.
+/// The values of all tensors, one after another.
 fn joined(tensors: &[Tensor]) -> Tensor {
     let flat: Vec<Tensor> = tensors.iter().map(|tensor| tensor.reshape([-1])).collect();
     Tensor::cat(&flat, 0)
 }
 
-/// `values` as views that lie one after another and have the shapes of `variables`.
+/// Splits `values` into consecutive views with the shapes of `variables`.
 #[must_use]
 pub fn parts(values: &Tensor, variables: &[Tensor]) -> Vec<Tensor> {
     let mut at = 0;
@@ -89,13 +89,13 @@ pub fn parts(values: &Tensor, variables: &[Tensor]) -> Vec<Tensor> {
 pub struct Optimiser {
     rule: Rule,
     flat: Flat,
-    /// Running averages: of squared gradients; of gradients or steps.
+    /// Running averages: first of the squared gradients, second of the gradients (Adam) or of the steps (`RMSProp`).
     state: [Tensor; 2],
     steps: i32,
 }
 
 impl Optimiser {
-    /// An optimiser of `store`'s variables, which it moves into one tensor.
+    /// An optimiser of `store`'s variables. Moves them into one tensor.
     #[must_use]
     pub fn new(rule: Rule, store: &nn::VarStore) -> Self {
         let flat = Flat::of(store);
@@ -109,13 +109,14 @@ impl Optimiser {
         &self.flat
     }
 
-    /// One step down the gradient of `loss`, its norm clipped to `clip`, the step size scaled by `scale`.
+    /// Takes one step down the gradient of `loss`. The gradient's norm is clipped to `clip`, the step size scaled by
+    /// `scale`.
     pub fn minimise(&mut self, loss: &Tensor, clip: f64, scale: f64) {
         let gradient = self.flat.gradient(loss);
         self.descend(gradient, clip, scale);
     }
 
-    /// One step down `gradient`, by all variables in the order of their names.
+    /// Takes one step down `gradient`, which holds the gradients of all variables in the order of their names.
     pub fn descend(&mut self, mut gradient: Tensor, clip: f64, scale: f64) {
         tch::no_grad(|| {
             let shrink = clip / (gradient.norm().double_value(&[]) + 1e-6);
@@ -129,7 +130,7 @@ impl Optimiser {
         });
     }
 
-    /// Adds the optimiser's state to a checkpoint: both averages, variable by variable.
+    /// Adds the optimiser's state to a checkpoint: both averages, variable by variable, and the number of steps.
     pub fn save(&self, checkpoint: &mut Checkpoint<'_>) {
         for (name, tensor) in self.named_state() {
             checkpoint.put_tensor(&name, &tensor);
@@ -140,7 +141,7 @@ impl Optimiser {
     /// Restores what [`Optimiser::save`] added.
     ///
     /// # Errors
-    /// When the checkpoint is of another network.
+    /// If the checkpoint is damaged or belongs to another network.
     pub fn restore(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), CheckpointError> {
         for (name, mut tensor) in self.named_state() {
             checkpoint.fill(&name, &mut tensor)?;
@@ -177,15 +178,15 @@ fn apply(
             let first = 1.0 - 0.9f64.powi(steps);
             let second = 1.0 - 0.999f64.powi(steps);
 
-            // The step is averaged / first / sqrt(squared / second + epsilon²), its factors drawn together.
+            // The step is averaged / first / sqrt(squared / second + epsilon²), with its factors combined.
             let rate = learning_rate * scale * second.sqrt() / first;
             let _ = variables.addcmul_(&(&*averaged * -rate), &inverse_root(squared, 1e-8 * second.sqrt()));
         }
     }
 }
 
-/// 1 / sqrt(`squared`), hardly more than 1 / `least`: with `least` under the root, not beside it,
-/// libtorch takes half as long.
+/// 1 / sqrt(`squared` + `least`²), so at most 1 / `least`. With `least` under the root instead of beside it, libtorch
+/// takes half as long.
 fn inverse_root(squared: &Tensor, least: f64) -> Tensor {
     (squared + least * least).rsqrt_()
 }
@@ -194,7 +195,7 @@ fn inverse_root(squared: &Tensor, least: f64) -> Tensor {
 mod tests {
     use super::*;
 
-    /// Where a variable that begins at 0 stands after a step down each of `gradients`.
+    /// The value of a variable that begins at 0, after one step down each of `gradients`.
     fn descended(rule: Rule, clip: f64, scale: f64, gradients: &[f64]) -> f64 {
         let store = nn::VarStore::new(tch::Device::Cpu);
         let variable = store.root().zeros("variable", &[1]);
@@ -208,7 +209,8 @@ mod tests {
     #[test]
     fn rms_prop_by_hand() {
         let rule = Rule::RmsProp { learning_rate: 0.1, momentum: 0.9 };
-        // Mean square 0.01, so 1 / 0.1 goes into the momentum; then 0.0199, so 0.9 * 10 + 1 / sqrt(0.0199).
+        // The mean square is 0.01, so the momentum becomes 1 / 0.1 = 10. Then the mean square is 0.0199, and the
+        // momentum 0.9 * 10 + 1 / sqrt(0.0199).
         for (gradients, expected) in [(&[1.0][..], -1.0), (&[1.0, 1.0], -1.0 - 1.608_881_2), (&[1.0, 0.0], -1.9)] {
             let stands = descended(rule, 10.0, 1.0, gradients);
             assert!((stands - expected).abs() < 1e-5, "{gradients:?}: {stands}, not {expected}");
@@ -218,8 +220,8 @@ mod tests {
     #[test]
     fn adam_by_hand() {
         let rule = Rule::Adam { learning_rate: 0.1 };
-        // Down one and the same slope each step is the learning rate, however steep it is. After it
-        // turned round the mean gradient is -0.01 / 0.19, and the mean square still 1.
+        // With a constant gradient, each step equals the learning rate, however large the gradient is. After the
+        // gradient has changed sign, its mean is -0.01 / 0.19, and its mean square still 1.
         let turned = -0.1 + 0.1 * 0.01 / 0.19;
         for (gradients, expected) in
             [(&[1.0; 3][..], -0.3), (&[50.0; 3], -0.3), (&[0.02; 3], -0.3), (&[1.0, -1.0], turned)]
@@ -233,7 +235,7 @@ mod tests {
     fn steps_are_scaled_and_gradients_clipped() {
         let rule = Rule::Adam { learning_rate: 0.1 };
         assert!((descended(rule, 100.0, 0.5, &[1.0]) + 0.05).abs() < 1e-6);
-        // 3 cut to 1 is 1: what follows is as down two equal slopes.
+        // 3 is clipped to 1, so the two steps are as with two equal gradients.
         assert!((descended(rule, 1.0, 1.0, &[3.0, 1.0]) + 0.2).abs() < 1e-5);
         assert!((descended(rule, 100.0, 1.0, &[3.0, 1.0]) + 0.2).abs() > 1e-3);
     }

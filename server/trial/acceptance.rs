@@ -1,5 +1,5 @@
-//! What of a surgeon's comments and answers is accepted. Whatever is accepted is kept, whatever
-//! state the session is in.
+//! Decides which comments and answers of a surgeon are accepted. Everything accepted is kept, in every state of the
+//! session.
 
 use super::answers;
 use super::protocol::Protocol;
@@ -9,10 +9,10 @@ use super::remark::{NewAnswer, Said};
 use super::session::SessionState;
 use crate::ids::SegmentId;
 
-/// Whether a comment that says `said` is accepted.
+/// Checks the content of a comment.
 ///
 /// # Errors
-/// When it is empty or too long.
+/// If a text is empty or too long.
 pub fn check_comment(said: &Said) -> Result<(), Refusal> {
     let (Said::Text(text) | Said::Quick(text)) = said else { return Ok(()) };
     if text.trim().is_empty() {
@@ -21,11 +21,11 @@ pub fn check_comment(said: &Said) -> Result<(), Refusal> {
     check_length(text)
 }
 
-/// Whether a comment that says `said` is accepted in a session that asks for comments aloud, or (`voice` false) does
-/// not: speech is personal data, and nobody consented to its recording.
+/// Checks whether a spoken comment is allowed. `voice`: whether the session's protocol asks for voice comments. Without
+/// that they are refused, because speech is personal data and nobody has consented to its recording.
 ///
 /// # Errors
-/// When it was said aloud in a session that does not ask for that.
+/// If the comment is spoken and the session does not ask for voice.
 pub fn check_spoken(said: &Said, voice: bool) -> Result<(), Refusal> {
     if *said == Said::Voice && !voice {
         return Err(Refusal::conflict("this trial does not record voice; type the comment"));
@@ -33,10 +33,10 @@ pub fn check_spoken(said: &Said, voice: bool) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Whether `new` is accepted as an answer in a session of `protocol` that stands at `state`.
+/// Checks the answer `new` in a session of `protocol` in the state `state`.
 ///
 /// # Errors
-/// When the session does not ask this question, has not asked it yet, or the answer does not fit it.
+/// If the session does not ask this question, has not asked it yet, or the answer does not fit the question.
 pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) -> Result<(), Refusal> {
     let plan = state.plan();
     let has_segment = new.segment.is_none_or(|segment| plan.position(segment).is_some());
@@ -50,11 +50,11 @@ pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) 
     fits.map_err(|misfit| Refusal::Invalid(misfit.to_string()))
 }
 
-/// Whether `new` is accepted in a session of `segments` whose questions cannot be known any more,
-/// because its protocol cannot be read.
+/// Checks the answer `new` in a session of `segments` whose questions are unknown, because this version cannot read the
+/// session's protocol.
 ///
 /// # Errors
-/// When the session has no such segment, or the answer is too long.
+/// If the session has no such segment, or the answer is too long.
 pub fn check_unasked(new: &NewAnswer, segments: &[SegmentId]) -> Result<(), Refusal> {
     if let AnswerValue::Text(text) = &new.value {
         check_length(text)?;

@@ -9,23 +9,23 @@ use utoipa::ToSchema;
 use super::refusal::Refusal;
 use super::role::Role;
 
-/// Most characters of an account's name.
+/// Maximum number of characters in an account's name.
 const LONGEST_NAME: usize = 40;
 
-/// Most characters of a display name: as many as a person who signs for a study may have.
+/// Maximum number of characters in a display name: the same as in the signature of a study's event.
 const LONGEST_DISPLAY: usize = 200;
 
-/// Fewest characters of a passphrase. NIST SP 800-63B-4 wants 15 where a passphrase is the only proof; the pages
-/// recommend that, and refuse what is shorter than this.
+/// Minimum number of characters in a passphrase. NIST SP 800-63B-4 requires 15 if the passphrase is the only proof. The
+/// pages recommend 15, and refuse fewer than this.
 pub const SHORTEST_PASSPHRASE: usize = 10;
 
-/// Most characters of a passphrase: enough for any sentence, and hashed in bounded time.
+/// Maximum number of characters in a passphrase: enough for any sentence, and hashed in bounded time.
 pub const LONGEST_PASSPHRASE: usize = 256;
 
-/// A signed-in browser that asks for nothing for so long has to sign in again (NIST SP 800-63B-4, AAL2: 1 h at most).
+/// A browser that sends no request for this long has to sign in again (NIST SP 800-63B-4, AAL2: 1 h at most).
 pub const IDLE_LIMIT: Duration = Duration::from_hours(1);
 
-/// A browser has to sign in again after so long in any case: a long day in theatre.
+/// A browser has to sign in again after this long in any case: a long day in theatre.
 pub const SIGN_IN_LIMIT: Duration = Duration::from_hours(12);
 
 /// The name that a person signs in with: 1 to 40 lower-case letters, digits, dots and dashes.
@@ -34,10 +34,10 @@ pub const SIGN_IN_LIMIT: Duration = Duration::from_hours(12);
 pub struct AccountName(String);
 
 impl AccountName {
-    /// The name `text`.
+    /// Checks `text` and makes it an account's name.
     ///
     /// # Errors
-    /// When it has other characters, none, or too many.
+    /// If it is empty, too long, or has other characters.
     pub fn new(text: &str) -> Result<Self, Refusal> {
         let fits = |letter: char| matches!(letter, 'a'..='z' | '0'..='9' | '.' | '-');
         if (1..=LONGEST_NAME).contains(&text.len()) && text.chars().all(fits) {
@@ -61,17 +61,17 @@ impl fmt::Display for AccountName {
     }
 }
 
-/// What a person does in a study.
+/// The role of a personal account in studies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AccountRole {
-    /// Leads studies: everything that operator and researcher may, and locking and unblinding.
+    /// Leads studies: may do everything that operators and researchers may, and also lock and unblind studies.
     Lead,
-    /// Works at the device.
+    /// Runs sessions at the device.
     Operator,
-    /// Plans studies and looks at them.
+    /// Plans studies and examines their data.
     Researcher,
-    /// Reads what researchers read, and changes nothing.
+    /// May read everything that researchers may, but changes nothing.
     Monitor,
 }
 
@@ -79,7 +79,7 @@ impl AccountRole {
     /// All roles.
     pub const ALL: [Self; 4] = [Self::Lead, Self::Operator, Self::Researcher, Self::Monitor];
 
-    /// Its name, as in the database.
+    /// The role's name, as stored in the database.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -90,13 +90,13 @@ impl AccountRole {
         }
     }
 
-    /// The role called `name`.
+    /// The role with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|role| role.name() == name)
     }
 
-    /// Whether a person with this role may act as `role`; `changes`: whether the request may change something.
+    /// Whether a person with this role may act as `role`. `changes`: whether the request may change something.
     #[must_use]
     pub const fn may_act_as(self, role: Role, changes: bool) -> bool {
         match (self, role) {
@@ -126,18 +126,18 @@ impl fmt::Display for AccountRole {
 pub struct Account {
     /// The name that the person signs in with.
     pub account: AccountName,
-    /// The person's name, as signatures have it.
+    /// The person's name, as signatures show it.
     pub display: String,
-    /// What the person may do.
+    /// The role, which decides what the person may do.
     pub role: AccountRole,
-    /// Whether the person may not sign in.
+    /// Whether the account is disabled: nobody can sign in to it.
     pub disabled: bool,
 }
 
-/// Checks a display name; surrounding blanks do not count.
+/// Checks a display name, and returns it without surrounding blanks.
 ///
 /// # Errors
-/// When it is empty or too long.
+/// If it is empty, too long, or has control characters.
 pub fn check_display(text: &str) -> Result<String, Refusal> {
     let text = text.trim();
     if (1..=LONGEST_DISPLAY).contains(&text.chars().count()) && !text.chars().any(char::is_control) {
@@ -146,23 +146,23 @@ pub fn check_display(text: &str) -> Result<String, Refusal> {
     Err(Refusal::Invalid(format!("give the person's name in 1 to {LONGEST_DISPLAY} characters")))
 }
 
-/// What is done to an account.
+/// A change to an account.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AccountChange {
-    /// Another role.
+    /// Gives the account this role.
     Role(AccountRole),
-    /// May not sign in any more; all sign-ins end.
+    /// Forbids signing in, and ends all sign-ins.
     Disable,
-    /// May sign in again.
+    /// Allows signing in again.
     Enable,
-    /// All sign-ins end.
+    /// Ends all sign-ins.
     SignOut,
 }
 
-/// Checks that `change` of `account` leaves somebody who can lead. `all` are all accounts.
+/// Checks that at least one enabled lead is left after `change` of `account`. `all` are all accounts.
 ///
 /// # Errors
-/// When it would take the last lead away.
+/// If the change would remove the last lead.
 pub fn check_change(account: &Account, change: &AccountChange, all: &[Account]) -> Result<(), Refusal> {
     let takes_lead_away = match change {
         AccountChange::Role(role) => !role.leads(),
@@ -174,18 +174,18 @@ pub fn check_change(account: &Account, change: &AccountChange, all: &[Account]) 
 
     if takes_lead_away && leads(account) && others == 0 {
         return Err(Refusal::conflict(
-            "this is the last account that leads; make another lead first, so that somebody can lock and unblind",
+            "this is the last lead who can sign in; make another lead first, so that somebody can lock and unblind",
         ));
     }
     Ok(())
 }
 
-/// Who does something: in a role, and under a personal account where the person signed in.
+/// The author of an action: a role, and a personal account if the person is signed in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Actor {
-    /// The role.
+    /// The role in which the action is done.
     pub role: Role,
-    /// The account; none for whoever holds only a role's link, and for the server itself.
+    /// The personal account. None for people who only have a role's link, and for the server itself.
     pub account: Option<AccountName>,
 }
 
@@ -195,13 +195,13 @@ impl From<Role> for Actor {
     }
 }
 
-/// How long the next attempt to sign in waits after `failures` failed ones in a row: nothing after a slip of the
-/// finger, then twice as long each time.
+/// How long the next attempt to sign in has to wait after `failures` failed ones in a row: not at all after a typing
+/// mistake or two, then 1 s, and twice as long after each further failure.
 #[must_use]
 pub fn wait_after(failures: u32) -> Duration {
-    /// Failures without a wait.
+    /// Number of failures that cost no wait.
     const FREE: u32 = 2;
-    /// The longest wait: guessing then takes years, and whoever mistyped still gets in.
+    /// The longest wait. It makes guessing take years, but still lets in a person who mistyped.
     const LONGEST: Duration = Duration::from_secs(8);
 
     match failures.checked_sub(FREE + 1) {

@@ -1,77 +1,77 @@
-//! What people do: actions that move a session on, and, outside sessions, who is to focus.
+//! Actions of people: those that advance a session, and the choice of who focuses outside sessions.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::ids::SegmentId;
 
-/// Something that moves a session on. `segment` names the one that the page was showing, so that a
-/// stale tab or a double click moves nothing twice.
+/// An action that advances a session. `segment` is the segment that the page was showing, so that a stale tab or a
+/// double click does not advance the session twice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "action", rename_all = "kebab-case")]
 pub enum Action {
-    /// Operator: begin; the first notice is shown.
+    /// Operator: start the session. The first notice is shown.
     Start,
-    /// Surgeon: tapped the notice of `segment`; its clock starts.
+    /// Surgeon: the notice of `segment` was tapped. The segment's clock starts.
     Acknowledge {
-        /// The segment.
+        /// Segment whose notice was tapped.
         segment: SegmentId,
     },
-    /// Surgeon or operator: enough of `segment`; on to its questions, or the next notice.
+    /// Surgeon or operator: finish the inspection of `segment`. Its questions follow, or the next notice.
     FinishSegment {
-        /// The segment.
+        /// Segment to finish.
         segment: SegmentId,
     },
-    /// Surgeon: done with the questions of `segment`, or with the closing ones.
+    /// Surgeon: the questions of `segment`, or the closing questions, are done.
     FinishQuestions {
-        /// The segment; none for the closing questions.
+        /// Segment that the questions are about; none for the closing questions.
         segment: Option<SegmentId>,
     },
-    /// Operator: hold everything.
+    /// Operator: pause the session. The lens holds, and the segment's clock stops.
     Pause {
-        /// Why.
+        /// Reason for the pause.
         #[schema(pattern = r"\S")]
         reason: String,
     },
-    /// Operator, or surgeon after a restart of the server: go on.
+    /// Operator, or surgeon after a restart of the server: resume a paused session.
     Resume,
-    /// Operator: end now.
+    /// Operator: end the session early.
     Abort {
-        /// Why.
+        /// Reason for the abort.
         #[schema(pattern = r"\S")]
         reason: String,
     },
-    /// Operator or researcher: the participant has withdrawn; from now on the session's data stay out of exports.
+    /// Operator or researcher: the participant has withdrawn. From now on exports leave out the session's data.
     Withdraw {
-        /// Why.
+        /// Reason for the withdrawal.
         #[schema(pattern = r"\S")]
         reason: String,
     },
-    /// Researcher: tell which policies ran. On a session still under way this is emergency unblinding.
+    /// Researcher: reveal which policies ran. In a session that is still under way this is an emergency unblinding.
     Unblind {
-        /// Why.
+        /// Reason for the unblinding.
         #[schema(pattern = r"\S")]
         reason: String,
-        /// Whether to do it though what a surgeon's device still holds would then not count any more.
+        /// Whether to unblind even though comments and answers that a surgeon's device still holds will then not count.
         #[serde(default)]
         despite_outstanding: bool,
     },
 }
 
 impl Action {
-    /// Whether it stops the lens, and so is done before it is on the disk.
+    /// Whether the action stops the lens. If so, it takes effect before it is written to disk.
     #[must_use]
     pub const fn stops_the_lens(&self) -> bool {
         matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::Abort { .. })
     }
 }
 
-/// Who is to focus outside sessions.
+/// What focuses the lens outside sessions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Focus {
-    /// Nobody: the lens goes to this focal power, 0..=1, and stays.
+    /// No policy: the lens moves to this focal power (0..=1) and stays there.
     FocalPower(f64),
-    /// A policy.
+    /// The policy with this name.
     Policy(String),
 }

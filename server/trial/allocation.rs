@@ -1,10 +1,9 @@
-//! Allocation: which policy runs in which segment, drawn from a stored seed by a named algorithm whose every step is
-//! fixed here, so that no update of a library changes what an old seed meant.
+//! Allocation: which policy runs in which segment. It is drawn from a stored seed by a named algorithm. Every step of
+//! the algorithm is fixed here, so that no library update changes the meaning of an old seed.
 //!
-//! Words come from the `ChaCha20` key stream (RFC 8439; 256-bit key = seed, counter and nonce zero)
-//! as little-endian `u32`, one after another. A number below `n` is `word % n`, words from `2^32 -
-//! 2^32 % n` up being passed over. A shuffle walks `i` from the last place down to 1 and swaps
-//! places `i` and "number below `i + 1`" (Durstenfeld 1964).
+//! Words come from the `ChaCha20` key stream (RFC 8439; 256-bit key = seed, counter and nonce zero) as little-endian
+//! `u32`, one after another. A number below `n` is `word % n`; words of `2^32 - 2^32 % n` and above are skipped. A
+//! shuffle walks `i` from the last place down to 1 and swaps places `i` and "number below `i + 1`" (Durstenfeld 1964).
 
 use std::fmt;
 
@@ -19,8 +18,8 @@ use utoipa::ToSchema;
 pub enum Order {
     /// A plain shuffle, as in the paper.
     Shuffled,
-    /// No policy next to itself; over a set of sessions every policy stands equally often in every position and every
-    /// ordered pair of policies follows one another equally often.
+    /// No policy runs twice in a row. Over a set of sessions, every policy is equally often in every position, and
+    /// every ordered pair of policies occurs equally often in succession.
     Balanced,
 }
 
@@ -35,20 +34,20 @@ impl Order {
     }
 }
 
-/// A named, versioned way from a seed to an order. What a name means never changes.
+/// A named, versioned algorithm that draws an order from a seed. The meaning of a name never changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Algorithm {
-    /// The shuffle of all segments.
+    /// A shuffle of all segments.
     #[serde(rename = "parfocal-shuffle-1")]
     Shuffle1,
-    /// A base order: shuffles until no policy stands next to itself. Then a shuffle of all relabellings of the policies
-    /// (permutations in lexicographic order); session `index` of the set takes relabelling `index`.
+    /// Draws a base order by shuffling until no policy runs twice in a row. Then shuffles all relabellings of the
+    /// policies (permutations in lexicographic order). Session `index` of the set takes relabelling `index`.
     #[serde(rename = "parfocal-balanced-1")]
     Balanced1,
 }
 
 impl Algorithm {
-    /// The kind of order that it draws.
+    /// The kind of order that this algorithm draws.
     #[must_use]
     pub const fn order(self) -> Order {
         match self {
@@ -57,7 +56,7 @@ impl Algorithm {
         }
     }
 
-    /// Its name.
+    /// The algorithm's name, as in the database, in exports and in commitments.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -66,13 +65,13 @@ impl Algorithm {
         }
     }
 
-    /// The algorithm called `name`.
+    /// The algorithm with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Shuffle1, Self::Balanced1].into_iter().find(|algorithm| algorithm.name() == name)
     }
 
-    /// Sessions that share a seed: the size of a balanced set, else 1.
+    /// Number of sessions that share a seed: the size of a balanced set, otherwise 1.
     #[must_use]
     pub fn set_size(self, policies: usize) -> usize {
         match self {
@@ -81,8 +80,8 @@ impl Algorithm {
         }
     }
 
-    /// The order of session `index` (from 0) of the set that `seed` began: for each segment the policy, as its place in
-    /// the protocol's list (0..`policies`). Each stands `repeats` times.
+    /// The order of session `index` (from 0) of the set with this seed. For each segment it gives the policy as an
+    /// index into the protocol's list (0..`policies`). Each policy occurs `repeats` times.
     #[must_use]
     pub fn draw(self, seed: Seed, policies: usize, repeats: usize, index: usize) -> Vec<usize> {
         let mut words = Words(ChaCha20Rng::from_seed(seed.0));
@@ -107,25 +106,25 @@ impl fmt::Display for Algorithm {
     }
 }
 
-/// 256 random bits. Whoever knows them knows the order, so they are kept from everyone until unblinding.
+/// 256 random bits. They reveal the order, so nobody may see them before unblinding.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Seed(pub [u8; 32]);
 
 impl Seed {
-    /// A seed from `random`.
+    /// Draws a seed from `random`.
     pub fn random(random: &mut impl Rng) -> Self {
         let mut bytes = [0; 32];
         random.fill_bytes(&mut bytes);
         Self(bytes)
     }
 
-    /// 64 hexadecimal digits.
+    /// The seed as 64 hexadecimal digits.
     #[must_use]
     pub fn to_hex(self) -> String {
         hex::encode(self.0)
     }
 
-    /// The seed written as 64 hexadecimal digits.
+    /// Reads a seed from 64 hexadecimal digits; none if `text` is anything else.
     #[must_use]
     pub fn from_hex(text: &str) -> Option<Self> {
         let mut bytes = [0; 32];
@@ -197,8 +196,8 @@ mod tests {
         assert_eq!(first, [0xade0_b876, 0x903d_f1a0, 0xe56a_5d40, 0x28bd_8653]);
     }
 
-    /// Worked from the module's description with `openssl enc -chacha20` as the key stream and Python for the rest.
-    /// These values may never change: they are what recorded seeds mean.
+    /// Computed from the module's description, with `openssl enc -chacha20` for the key stream and Python for the rest.
+    /// These values must never change: they are the meaning of recorded seeds.
     #[test]
     fn old_seeds_keep_their_meaning() {
         let counting = Seed(std::array::from_fn(|i| u8::try_from(i).unwrap()));

@@ -1,34 +1,34 @@
-//! Answers: whether one fits its question, and how an answer in parts adds up.
+//! Answers: whether an answer fits its question, and how partial answers are combined.
 
 use super::instruments;
 use super::question::{AnswerValue, Question};
 
-/// Longest text of an answer or comment, bytes of UTF-8: some 2500 words.
+/// Maximum length of the text of an answer or comment, in bytes of UTF-8: about 2500 words.
 pub const LONGEST_TEXT: usize = 16 * 1024;
 
-/// Why an answer does not fit.
+/// Why an answer does not fit its question.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Misfit {
-    /// Another sort of answer was expected.
+    /// The question expects another kind of answer.
     #[error("question '{question}' takes {expected}")]
     Kind {
         /// The question's id.
         question: String,
-        /// What it takes.
+        /// The answers that the question takes, in words.
         expected: String,
     },
     /// The text is too long.
     #[error("the text is {length} bytes long; the limit is {LONGEST_TEXT}, so please split it")]
     TooLong {
-        /// Length in bytes.
+        /// Length of the text in bytes.
         length: usize,
     },
 }
 
-/// Checks that `value` answers `question` in a session of `settings` settings.
+/// Checks that `value` is an answer to `question` in a session of `settings` settings.
 ///
 /// # Errors
-/// When it does not; says what the question takes.
+/// If it is not. The error says which answers the question takes.
 pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Result<(), Misfit> {
     if !instruments::fits(&question.kind, value, settings) {
         let expected = instruments::expected(&question.kind, settings);
@@ -40,17 +40,16 @@ pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Resul
     }
 }
 
-/// Checks the length of what was written.
+/// Checks the length of a text.
 ///
 /// # Errors
-/// When it is longer than [`LONGEST_TEXT`].
+/// If it is longer than [`LONGEST_TEXT`].
 pub const fn check_length(text: &str) -> Result<(), Misfit> {
     if text.len() > LONGEST_TEXT { Err(Misfit::TooLong { length: text.len() }) } else { Ok(()) }
 }
 
-/// What stands once `given` has come on top of `earlier`: a 0 among points gives nothing and leaves
-/// what was there, so that each item of a questionnaire can be given by itself, from whatever
-/// device, and none takes another back.
+/// The answer after `given` was added to `earlier`. A 0 among the points keeps the earlier point. So each item of a
+/// questionnaire can be answered by itself, from any device, and no item removes another.
 #[must_use]
 pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerValue {
     match (earlier, given) {
@@ -64,7 +63,7 @@ pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerVal
     }
 }
 
-/// Whether nothing of `value` is still open.
+/// Whether every item of `value` is answered.
 #[must_use]
 pub fn is_whole(value: &AnswerValue) -> bool {
     !matches!(value, AnswerValue::Points(points) if points.contains(&0))

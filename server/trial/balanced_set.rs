@@ -1,8 +1,8 @@
-//! Balanced sets: sessions whose orders were drawn together, from one seed.
+//! Balanced sets: sessions whose orders were drawn together from one seed.
 //!
-//! Within a set every order is a relabelling of every other, and two sessions at the same place
-//! have the same order. So whoever knows one order knows something of the others, and whoever knows
-//! the seed knows them all. The rules here keep sessions blinded in spite of that.
+//! Within a set, every order is a relabelling of every other, and two sessions at the same place have the same order.
+//! So one known order reveals something about the others, and the seed reveals them all. The rules here keep sessions
+//! blinded in spite of that.
 
 use jiff::Timestamp;
 
@@ -14,60 +14,59 @@ use crate::ids::SessionId;
 /// The sessions that share a seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BalancedSet {
-    /// The seed.
+    /// Seed from which all orders of the set are drawn.
     pub seed: Seed,
-    /// The sessions, in the order in which they were made.
+    /// The set's sessions, in the order in which they were made.
     pub members: Vec<Member>,
 }
 
-/// A session of a set.
+/// A session of a balanced set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
-    /// The session.
+    /// Id of the session.
     pub session: SessionId,
-    /// Its participant's code.
+    /// Code of the session's participant.
     pub participant: String,
-    /// When it was made, by the server's wall clock.
+    /// When the session was made, by the server's wall clock.
     pub made: Timestamp,
-    /// Its place in the set, from 0.
+    /// The session's place in the set, from 0. Sessions at the same place have the same order.
     pub place: usize,
-    /// How far it came.
+    /// Whether the session is under way, completed or aborted.
     pub status: SessionStatus,
-    /// Whether it was unblinded.
+    /// Whether the session was unblinded.
     pub unblinded: bool,
 }
 
 impl BalancedSet {
-    /// The first place, of `size` in the set, that a new session may take. None where the set is
-    /// full or closed.
+    /// The first of the set's `size` places that a new session may take. None if the set is full or closed.
     #[must_use]
     pub fn free_place(&self, size: usize) -> Option<usize> {
-        // Unblinding one session closes the set: its order tells the others' apart.
+        // Unblinding one session closes the set, because its order would help to identify the policies of the others.
         if self.members.iter().any(|member| member.unblinded) {
             return None;
         }
 
-        // An aborted session gives its place back, so that completed sessions fill the set.
+        // An aborted session frees its place, so that completed sessions fill the set.
         let is_taken =
             |place| self.members.iter().any(|member| member.place == place && member.status != SessionStatus::Aborted);
         (0..size).find(|&place| !is_taken(place))
     }
 
-    /// Whether unblinding `session` leaves the other sessions of the set blinded.
+    /// Checks that the other sessions of the set stay blinded when `session` is unblinded.
     ///
     /// # Errors
-    /// When it would tell the order of a session under way, or of one that took its place.
+    /// If the unblinding would reveal the order of a session under way, or of a blinded session at the same place.
     pub fn check_unblinding(&self, session: SessionId) -> Result<(), Refusal> {
         let others = || self.members.iter().filter(|member| member.session != session);
 
         if others().any(|other| other.status == SessionStatus::UnderWay) {
             return Err(Refusal::conflict(
-                "a session of the same balanced set is under way, and this one's order would tell its own; \
-                 wait for its end",
+                "a session of the same balanced set is under way, and this one's order would reveal its order; \
+                 wait until it has ended",
             ));
         }
 
-        // Two sessions have the same place where the first was aborted and gave it back.
+        // Two sessions have the same place if the first was aborted and freed it.
         let place = self.members.iter().find(|member| member.session == session).map(|member| member.place);
         let blinded_twin = others()
             .find(|other| Some(other.place) == place && other.status != SessionStatus::Aborted && !other.unblinded);
@@ -81,7 +80,8 @@ impl BalancedSet {
         Ok(())
     }
 
-    /// Whether the seed may be told: it tells the order of every session of the set.
+    /// Whether the seed may be revealed. It gives away the order of every session of the set, so all of them must be
+    /// unblinded.
     #[must_use]
     pub fn may_tell_seed(&self) -> bool {
         self.members.iter().all(|member| member.unblinded)

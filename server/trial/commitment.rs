@@ -1,6 +1,5 @@
-//! The commitment: a hash, made public when a session is created, by which anyone can check after
-//! unblinding that the order was not changed since. The seed's 256 random bits keep the order from
-//! being guessed from it.
+//! The commitment: a hash that is published when a session is created. After unblinding, anyone can use it to check
+//! that the order was not changed since. It includes the seed's 256 random bits, so nobody can guess the order from it.
 
 use sha2::{Digest, Sha256};
 
@@ -9,26 +8,26 @@ use super::protocol::Protocol;
 use crate::autofocus::PolicyName;
 use crate::ids::SessionId;
 
-/// What a session's order was drawn from, and the order.
+/// A session's order, and everything that it was drawn from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Allocation {
-    /// The session.
+    /// Session that the order belongs to.
     pub session: SessionId,
-    /// The algorithm.
+    /// Algorithm that drew the order.
     pub algorithm: Algorithm,
-    /// The seed.
+    /// Seed of the draw.
     pub seed: Seed,
     /// Index of the session in the set that shares the seed, from 0.
     pub index: usize,
     /// SHA-256 of the protocol's text.
     pub protocol_sha256: [u8; 32],
-    /// The policy of each segment.
+    /// Policy of each segment, in order.
     pub schedule: Vec<PolicyName>,
 }
 
 impl Allocation {
-    /// Draws the order of a new `session` by `protocol`: that of place `index` among the sessions
-    /// that share `seed`.
+    /// Draws the order of the new session `session` with `protocol`, for place `index` among the sessions that share
+    /// `seed`.
     #[must_use]
     pub fn draw(session: SessionId, protocol: &Protocol, seed: Seed, index: usize) -> Self {
         let algorithm = protocol.order.algorithm();
@@ -37,7 +36,7 @@ impl Allocation {
         Self { session, algorithm, seed, index, protocol_sha256: protocol.sha256(), schedule }
     }
 
-    /// The text that is hashed: seven lines, each ended by a line feed.
+    /// The text that is hashed: seven lines, each ending with a line feed.
     #[must_use]
     pub fn statement(&self) -> String {
         let schedule: Vec<&str> = self.schedule.iter().map(PolicyName::as_str).collect();

@@ -1,4 +1,4 @@
-//! A participant's consent: to which version of the text, on which day, obtained by whom, on paper or on a screen. The
+//! A participant's consent: the version of the text, the day, who obtained it, and whether on paper or on a screen. The
 //! signed text itself stays with the institution.
 
 use jiff::civil::Date;
@@ -9,32 +9,32 @@ use super::refusal::Refusal;
 use super::role::Role;
 use crate::ids::SessionId;
 
-/// Longest version of a text and longest name of who obtained a consent, characters.
+/// Maximum number of characters in a consent text's version, and in the name of the person who obtained the consent.
 pub const LONGEST: usize = 80;
 
 /// A consent as the operator's page sends it.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct NewConsent {
-    /// The session that it is for.
+    /// Session that the consent is for.
     pub session: SessionId,
-    /// What was consented to.
+    /// The consent that was given.
     #[serde(flatten)]
     pub consent: Consent,
 }
 
-/// A consent.
+/// A recorded consent of a participant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Consent {
-    /// Version of the text.
+    /// Version of the consent text.
     #[schema(pattern = r"\S")]
     pub text_version: String,
-    /// The day on which it was given.
+    /// Day on which the consent was given.
     #[schema(value_type = String, format = Date)]
     pub given_on: Date,
-    /// Who obtained it: initials or a code.
+    /// Person who obtained the consent: initials or a code.
     #[schema(pattern = r"\S")]
     pub obtained_by: String,
-    /// On paper or on a screen.
+    /// Whether the consent was given on paper or on a screen.
     pub medium: Medium,
 }
 
@@ -42,14 +42,14 @@ pub struct Consent {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Medium {
-    /// On paper.
+    /// Signed on paper.
     Paper,
-    /// On a screen.
+    /// Given on a screen.
     Screen,
 }
 
 impl Medium {
-    /// Its name, as in the database and in exports.
+    /// The medium's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -58,18 +58,19 @@ impl Medium {
         }
     }
 
-    /// The medium called `name`.
+    /// The medium with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Paper, Self::Screen].into_iter().find(|medium| medium.name() == name)
     }
 }
 
-/// The consent that is recorded where `by` records `new` on the day `today`, in a session whose protocol requires the
-/// text version `required`, if any. Blanks around texts are taken away.
+/// Checks the consent `new` that `by` records on the day `today`, and returns it without blanks around its texts.
+/// `required` is the text version that the session's protocol requires, if any.
 ///
 /// # Errors
-/// When another role does this, a text is missing or too long, the day is yet to come, or the version is another one.
+/// If `by` is not the operator, a text is missing or too long, the consent is dated in the future, or its version is
+/// not the required one.
 pub fn check(by: Role, new: &Consent, required: Option<&str>, today: Date) -> Result<Consent, Refusal> {
     if by != Role::Operator {
         return Err(Refusal::only("the operator"));
@@ -78,7 +79,7 @@ pub fn check(by: Role, new: &Consent, required: Option<&str>, today: Date) -> Re
     let text_version = short(&new.text_version, "the version of the consent text")?;
     let obtained_by = short(&new.obtained_by, "who obtained the consent")?;
     if new.given_on > today {
-        return Err(Refusal::Invalid(format!("the consent was given on {}, which is yet to come", new.given_on)));
+        return Err(Refusal::Invalid(format!("the consent was given on {}, which is in the future", new.given_on)));
     }
     if let Some(required) = required.filter(|required| *required != text_version) {
         return Err(Refusal::Invalid(format!(
@@ -88,7 +89,7 @@ pub fn check(by: Role, new: &Consent, required: Option<&str>, today: Date) -> Re
     Ok(Consent { text_version, given_on: new.given_on, obtained_by, medium: new.medium })
 }
 
-/// `text` without blanks around it; `what` names it.
+/// Returns `text` without surrounding blanks, if its length is allowed. `what` names it in the error.
 fn short(text: &str, what: &str) -> Result<String, Refusal> {
     let text = text.trim();
     let length = text.chars().count();
@@ -131,7 +132,7 @@ mod tests {
         refused(Consent { text_version: "2.0".to_owned(), ..consent() }, "requires version '2.1'");
         refused(Consent { text_version: " ".to_owned(), ..consent() }, "the version of the consent text");
         refused(Consent { obtained_by: "x".repeat(81), ..consent() }, "who obtained the consent");
-        refused(Consent { given_on: date(2026, 3, 2), ..consent() }, "yet to come");
+        refused(Consent { given_on: date(2026, 3, 2), ..consent() }, "in the future");
         for by in [Role::Surgeon, Role::Researcher, Role::System] {
             assert_eq!(check(by, &consent(), None, TODAY), Err(Refusal::only("the operator")), "{by:?}");
         }

@@ -1,5 +1,5 @@
-//! Corrections: what a researcher may put right of what was recorded. The original stays; what is right stands beside
-//! it, with the reason. A surgeon's own words are never corrected: a note can be added to them.
+//! Corrections: which records a researcher may correct. The original stays. The correct value is kept beside it, with
+//! the reason. A surgeon's own words are never corrected, but a note can be added to them.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -16,46 +16,47 @@ use crate::ids::{IdempotencyKey, SegmentId};
 /// A correction as the researcher's page sends it.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 pub struct NewCorrection {
-    /// What is put right.
+    /// Field to correct, with its old and new value.
     #[serde(flatten)]
     pub change: FieldChange,
-    /// Why; kept with the correction.
+    /// Reason for the correction; kept with it.
     #[schema(pattern = r"\S")]
     pub reason: String,
 }
 
-/// What is put right. `old` is what the page showed, so that nobody corrects what somebody else corrected meanwhile.
+/// The corrected field. `old` is the value that the page showed, so that nobody overwrites another person's correction
+/// without seeing it.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(tag = "field", rename_all = "kebab-case")]
 pub enum FieldChange {
-    /// The session was another participant's.
+    /// The session belonged to another participant.
     Participant {
-        /// The code so far.
+        /// Participant code that the page showed.
         old: String,
-        /// The right code.
+        /// Correct participant code.
         new: String,
     },
-    /// An answer should have been another one. Not for answers in words.
+    /// The value of an answer was wrong. Not for answers in words.
     Value {
-        /// The answer's key.
+        /// Key of the answer.
         record: IdempotencyKey,
-        /// The answer so far.
+        /// Answer that the page showed.
         old: AnswerValue,
-        /// The right answer.
+        /// Correct answer.
         new: AnswerValue,
     },
     /// A note on a comment or on an answer.
     Note {
         /// The key of the comment or answer.
         record: IdempotencyKey,
-        /// The note so far; empty where there is none.
+        /// Note that the page showed; empty if there was none.
         old: String,
-        /// The note.
+        /// New note.
         new: String,
     },
 }
 
-/// What a correction is about.
+/// The kind of record that a correction changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
@@ -68,7 +69,7 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// Its name, as in the database and in exports.
+    /// The subject's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -78,27 +79,27 @@ impl Subject {
         }
     }
 
-    /// The subject called `name`.
+    /// The subject with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Session, Self::Answer, Self::Comment].into_iter().find(|subject| subject.name() == name)
     }
 }
 
-/// What of a record is put right.
+/// The corrected part of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Field {
-    /// The participant of a session.
+    /// Participant of a session.
     Participant,
-    /// The value of an answer, as JSON.
+    /// Value of an answer, as JSON.
     Value,
-    /// A note on an answer or a comment.
+    /// Note on an answer or a comment.
     Note,
 }
 
 impl Field {
-    /// Its name, as in the database and in exports.
+    /// The field's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -108,17 +109,18 @@ impl Field {
         }
     }
 
-    /// The field called `name`.
+    /// The field with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Participant, Self::Value, Self::Note].into_iter().find(|field| field.name() == name)
     }
 }
 
-/// Whether `by` may correct a session that has `ended`, for `reason`. The reason comes back without blanks around it.
+/// Checks whether `by` may correct a session for `reason`. `ended`: whether the session has ended. Returns the reason
+/// without surrounding blanks.
 ///
 /// # Errors
-/// When another role does this, the session is under way, or the reason is missing or too long.
+/// If `by` is not the researcher, the session is under way, or the reason is missing or too long.
 pub fn check(by: Role, ended: bool, reason: &str) -> Result<String, Refusal> {
     if by != Role::Researcher {
         return Err(Refusal::only("the researcher"));
@@ -129,11 +131,11 @@ pub fn check(by: Role, ended: bool, reason: &str) -> Result<String, Refusal> {
     reason::needed(reason)
 }
 
-/// Whether the session's participant may be corrected from `old` to `new`. `current` is the code so far, `known` are
-/// the participants there are.
+/// Checks whether the session's participant may be corrected from `old` to `new`. `current` is the present code;
+/// `known` are the codes of all participants.
 ///
 /// # Errors
-/// When `new` is no participant's code, or the code was corrected meanwhile.
+/// If `new` is not the code of a participant, the code was corrected in the meantime, or nothing would change.
 pub fn check_participant<'a>(
     current: &str,
     old: &str,
@@ -147,21 +149,22 @@ pub fn check_participant<'a>(
     check_change(current, old, new)
 }
 
-/// An answer that is to be corrected.
+/// An answer to be corrected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Corrected<'a> {
-    /// Its segment; none for a closing question.
+    /// Segment that the answer is about; none for a closing question.
     pub segment: Option<SegmentId>,
-    /// The question's id.
+    /// Id of the question.
     pub question: &'a str,
-    /// The value so far.
+    /// Present value, with earlier corrections.
     pub current: &'a AnswerValue,
 }
 
-/// Whether an answer in a session of `settings` settings by `protocol` may be corrected from `old` to `new`.
+/// Checks whether an answer in a session of `settings` settings with `protocol` may be corrected from `old` to `new`.
 ///
 /// # Errors
-/// When the answer is in words, `new` does not answer the question, or the answer was corrected meanwhile.
+/// If the answer is in words, `new` is not a complete answer to the question, the answer was corrected in the meantime,
+/// or nothing would change.
 pub fn check_value(
     answer: &Corrected<'_>,
     old: &AnswerValue,
@@ -171,20 +174,20 @@ pub fn check_value(
 ) -> Result<(), Refusal> {
     let question = protocol.question(answer.question, answer.segment.is_some()).ok_or(Refusal::UnknownQuestion)?;
     if question.kind == QuestionKind::Text {
-        return Err(Refusal::conflict("what a surgeon wrote stays as it was written; add a note instead"));
+        return Err(Refusal::conflict("a surgeon's words are never corrected; add a note instead"));
     }
 
     answers::check(question, new, settings).map_err(|misfit| Refusal::Invalid(misfit.to_string()))?;
     if !answers::is_whole(new) {
-        return Err(Refusal::Invalid("a corrected answer leaves nothing open; give every item".to_owned()));
+        return Err(Refusal::Invalid("a corrected answer must be complete; give every item".to_owned()));
     }
     check_change(answer.current, old, new)
 }
 
-/// Whether a note may be changed from `old` to `new`. `current` is the note so far.
+/// Checks whether a note may be changed from `old` to `new`. `current` is the present note.
 ///
 /// # Errors
-/// When it is too long, or was changed meanwhile.
+/// If `new` is too long, the note was changed in the meantime, or nothing would change.
 pub fn check_note(current: &str, old: &str, new: &str) -> Result<(), Refusal> {
     answers::check_length(new).map_err(|misfit| Refusal::Invalid(misfit.to_string()))?;
     check_change(current, old, new)
@@ -192,10 +195,12 @@ pub fn check_note(current: &str, old: &str, new: &str) -> Result<(), Refusal> {
 
 fn check_change<T: PartialEq + ?Sized>(current: &T, old: &T, new: &T) -> Result<(), Refusal> {
     if current != old {
-        return Err(Refusal::conflict("somebody has corrected this meanwhile; reload the page and look again"));
+        return Err(Refusal::conflict(
+            "somebody else has corrected this in the meantime; reload the page and check again",
+        ));
     }
     if current == new {
-        return Err(Refusal::conflict("this is what stands there already; nothing was corrected"));
+        return Err(Refusal::conflict("the new value is the present one; nothing was corrected"));
     }
     Ok(())
 }
@@ -229,9 +234,9 @@ mod tests {
     fn what_was_corrected_meanwhile_or_stands_there_already_is_not_corrected() {
         let known = ["S-01", "S-02"];
         let meanwhile = check_participant("S-02", "S-01", "S-02", known);
-        assert!(matches!(meanwhile, Err(Refusal::Conflict(text)) if text.contains("meanwhile")));
+        assert!(matches!(meanwhile, Err(Refusal::Conflict(text)) if text.contains("in the meantime")));
         let same = check_note("as it is", "as it is", "as it is");
-        assert!(matches!(same, Err(Refusal::Conflict(text)) if text.contains("already")));
+        assert!(matches!(same, Err(Refusal::Conflict(text)) if text.contains("is the present one")));
         assert_eq!(check_note("", "", "said of the monitor, not the focus"), Ok(()));
     }
 }

@@ -1,4 +1,4 @@
-//! Erasure of words: the text goes for good, its record and its hash stay.
+//! Erasure of words: the text is removed permanently. Its record and its hash stay.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,11 +10,11 @@ use super::role::Role;
 /// An erasure as the researcher's page sends it.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct NewErasure {
-    /// What sort of record.
+    /// Kind of record whose words are erased.
     pub subject: Erasable,
-    /// Its key; of a correction or an event its number.
+    /// Key of the record; for a correction or an event, its number.
     pub record: String,
-    /// Why; kept with the erasure. It must not repeat the words.
+    /// Reason for the erasure; kept with it. It must not repeat the erased words.
     #[schema(pattern = r"\S")]
     pub reason: String,
 }
@@ -23,20 +23,20 @@ pub struct NewErasure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Erasable {
-    /// An answer in words.
+    /// An answer given in words.
     Answer,
     /// A comment.
     Comment,
     /// A correction, with its note and its reason.
     Correction,
-    /// An event of the session: its reason.
+    /// The reason of an event of the session.
     Event,
-    /// An event of the session's study that is about the session: its reason. Erased with that of the session's event.
+    /// The reason of a study's event about the session. It is erased together with the reason of the session's event.
     StudyEvent,
 }
 
 impl Erasable {
-    /// Its name, as in the database and in exports.
+    /// The kind's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -48,7 +48,7 @@ impl Erasable {
         }
     }
 
-    /// The sort called `name`.
+    /// The kind with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         const ALL: [Erasable; 5] =
@@ -57,16 +57,16 @@ impl Erasable {
     }
 }
 
-/// Whether `by` may erase words for `reason`, while a session is `under_way` or not. The reason comes back without
-/// blanks around it.
+/// Checks whether `by` may erase words for `reason`. `under_way`: whether any session is under way. Returns the reason
+/// without surrounding blanks.
 ///
 /// # Errors
-/// When another role does this, a session is under way, or the reason is missing or too long.
+/// If `by` is not the researcher, a session is under way, or the reason is missing or too long.
 pub fn check(by: Role, under_way: bool, reason: &str) -> Result<String, Refusal> {
     if by != Role::Researcher {
         return Err(Refusal::only("the researcher"));
     }
-    // Erasing writes the whole database anew, for which what a surgeon says would have to wait.
+    // Erasing rewrites the whole database. A surgeon's comments and answers would have to wait for it.
     if under_way {
         return Err(Refusal::conflict("a session is under way; erase once it has ended"));
     }

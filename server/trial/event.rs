@@ -1,5 +1,5 @@
-//! Events: everything that happens to a session, in order. They are the one truth; its state
-//! follows from them.
+//! Events: everything that happens to a session, in order. They are the only source of truth: the session's state is
+//! computed from them.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -9,88 +9,87 @@ use super::role::Role;
 use crate::clock::Moment;
 use crate::ids::SegmentId;
 
-/// Something that happened.
+/// Something that happened to a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
-    /// Counts up from 1 in the session, without gaps.
+    /// Number of the event in its session: from 1, without gaps.
     pub number: u32,
-    /// Who.
+    /// Role that caused the event.
     pub by: Role,
-    /// The personal account under which it was done, where somebody was signed in.
+    /// Personal account of the person who caused the event, if signed in.
     pub account: Option<AccountName>,
-    /// When, by the monotonic clock of the server's run.
+    /// Time by the monotonic clock of the server's run.
     pub at: Moment,
-    /// When, by the server's wall clock.
+    /// Time by the server's wall clock.
     pub wall: Timestamp,
-    /// What.
+    /// What happened, with its details.
     pub kind: EventKind,
 }
 
-/// What happened. `inspected_ms`: time inspected in the segment so far, without pauses,
-/// milliseconds.
+/// What happened. `inspected_ms`: time inspected in the segment so far, without pauses, in milliseconds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum EventKind {
-    /// The session was made and its order drawn.
+    /// The session was made, and its order was drawn.
     Created,
     /// The first notice was shown.
     Started,
     /// The notice was tapped; inspection began.
     SegmentStarted {
-        /// The segment.
+        /// Segment that started.
         segment: SegmentId,
     },
-    /// Inspection ended: by whoever the event names, the system at the time limit.
+    /// Inspection ended. At the time limit it is the system that ends it.
     SegmentFinished {
-        /// The segment.
+        /// Segment that finished.
         segment: SegmentId,
-        /// Time inspected.
+        /// Total time inspected, milliseconds.
         inspected_ms: u64,
     },
-    /// The questions after a segment, or (none) at the end, were done with.
+    /// The questions after a segment, or the closing questions, were done.
     QuestionsFinished {
-        /// The segment.
+        /// Segment that the questions are about; none for the closing questions.
         segment: Option<SegmentId>,
     },
-    /// Everything was held.
+    /// The session was paused.
     Paused {
-        /// Why.
+        /// Reason for the pause; may be empty.
         reason: String,
-        /// Time inspected.
+        /// Time inspected so far, milliseconds.
         inspected_ms: u64,
     },
-    /// It went on.
+    /// The session was resumed.
     Resumed,
-    /// The server ended during the session and came back: it is paused where it was.
+    /// The server stopped during the session and was started again. The session is paused where it was.
     ServerRestarted {
-        /// Time inspected as far as is known: up to a second less than it was.
+        /// Known time inspected, milliseconds: up to a second less than the true time.
         inspected_ms: u64,
     },
-    /// The last answer was in.
+    /// The session ran to its end, with all required answers.
     Completed,
-    /// Ended early.
+    /// The session was ended early.
     Aborted {
-        /// Why.
+        /// Reason for the abort.
         reason: String,
-        /// Time inspected in the segment under way.
+        /// Time inspected in the current segment, milliseconds.
         inspected_ms: u64,
     },
-    /// The participant withdrew: its data stay out of exports.
+    /// The participant withdrew. Exports leave out the session's data.
     Withdrawn {
-        /// Why.
+        /// Reason for the withdrawal.
         reason: String,
     },
-    /// It was told which policies ran.
+    /// The policies that ran were revealed.
     Unblinded {
-        /// Why.
+        /// Reason for the unblinding.
         reason: String,
-        /// Whether the session was still under way.
+        /// Whether it was an emergency: the session was still under way, or its study was still blinded.
         emergency: bool,
     },
 }
 
 impl EventKind {
-    /// Name of the kind, as in the database and in exports.
+    /// The kind's name, as in the database and in exports.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -109,7 +108,7 @@ impl EventKind {
         }
     }
 
-    /// The segment that it is about.
+    /// The segment that the event is about, if any.
     #[must_use]
     pub const fn segment(&self) -> Option<SegmentId> {
         match self {
@@ -119,7 +118,7 @@ impl EventKind {
         }
     }
 
-    /// Time inspected in the segment by then, milliseconds, where it says.
+    /// Time inspected in the segment up to the event, milliseconds; none if the event does not record it.
     #[must_use]
     pub const fn inspected_ms(&self) -> Option<u64> {
         match self {
@@ -131,7 +130,7 @@ impl EventKind {
         }
     }
 
-    /// The reason that somebody gave; it may be empty. None for what nobody gives a reason for.
+    /// The reason that was given, which may be empty. None for events that have no reason.
     #[must_use]
     pub fn reason(&self) -> Option<&str> {
         match self {
@@ -143,7 +142,7 @@ impl EventKind {
         }
     }
 
-    /// The same without its reason.
+    /// A copy without the reason.
     #[must_use]
     pub fn without_reason(&self) -> Self {
         let mut kind = self.clone();
@@ -157,8 +156,7 @@ impl EventKind {
         kind
     }
 
-    /// The same without what only the researcher may read: a reason for unblinding may name a
-    /// policy.
+    /// A copy without what only the researcher may read: the reason for unblinding, which may name a policy.
     #[must_use]
     pub fn for_the_blinded(&self) -> Self {
         match self {
@@ -167,7 +165,7 @@ impl EventKind {
         }
     }
 
-    /// What happened, in words; `setting` tells the number of a segment, from 1.
+    /// A description in words. `setting` returns the number of a segment, from 1.
     #[must_use]
     pub fn in_words(&self, setting: impl Fn(SegmentId) -> usize) -> String {
         match self {
@@ -194,7 +192,7 @@ impl EventKind {
     }
 }
 
-/// `what` with its reason, if there is one: it may be left out, or have been erased.
+/// `what` with its reason. The reason may be empty, because none was given or because it was erased.
 fn because(what: &str, reason: &str) -> String {
     if reason.is_empty() { what.to_owned() } else { format!("{what}: {reason}") }
 }

@@ -1,5 +1,5 @@
-//! The time after a session's end in which what a surgeon's device still holds counts. After it
-//! nothing changes any more.
+//! The grace period after a session's end: comments and answers that a surgeon's device still holds count if they
+//! arrive in it. After it, nothing changes any more.
 
 use std::fmt;
 use std::time::Duration;
@@ -10,10 +10,11 @@ use utoipa::ToSchema;
 
 use super::event::EventKind;
 
-/// How long that time is where the protocol says nothing.
+/// Length of the grace period if the protocol gives none.
 pub const DEFAULT_GRACE: Duration = Duration::from_mins(30);
 
-/// Whether what arrives for a session still counts. Times are by the server's clocks, and go on over its restarts.
+/// Decides whether comments and answers that arrive for a session still count. Times are by the server's clocks, and
+/// continue over its restarts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grace {
     length: Duration,
@@ -23,13 +24,13 @@ pub struct Grace {
 }
 
 impl Grace {
-    /// For a session just made, by a protocol that gives `length`.
+    /// The grace of a new session whose protocol gives `length`.
     #[must_use]
     pub const fn new(length: Duration) -> Self {
         Self { length, ended: None, unblinded: None, locked: None }
     }
 
-    /// Takes in what happened at `at`.
+    /// Applies an event that happened at `at`.
     pub fn apply(&mut self, kind: &EventKind, at: Timestamp) {
         match kind {
             EventKind::Completed | EventKind::Aborted { .. } => self.ended = Some(at),
@@ -38,14 +39,14 @@ impl Grace {
         }
     }
 
-    /// Notes that the session's study was locked at `at`.
+    /// The same grace, with the time at which the session's study was locked; none if it was not.
     #[must_use]
     pub const fn locked(self, at: Option<Timestamp>) -> Self {
         Self { locked: at, ..self }
     }
 
-    /// Until when what arrives counts: none while the session is under way. Unblinding ends that time, and so does
-    /// locking the session's study; for a session that was unblinded while under way it ends with the session.
+    /// The end of the grace period; none while the session is under way. Unblinding the session or locking its study
+    /// ends the period at once. If the session was unblinded while under way, the period ends with the session.
     #[must_use]
     pub fn until(&self) -> Option<Timestamp> {
         let ended = self.ended?;
@@ -54,16 +55,16 @@ impl Grace {
         Some(ends.into_iter().flatten().fold(over, |over, end| over.min(end.max(ended))))
     }
 
-    /// Whether what arrives at `at` is too late to count.
+    /// Whether a comment or answer that arrives at `at` is too late to count.
     #[must_use]
     pub fn is_late(&self, at: Timestamp) -> bool {
         let closed = self.unblinded.is_some() || self.locked.is_some();
         self.until().is_some_and(|until| closed || at > until)
     }
 
-    /// What unblinding at `now` would keep from counting, if anything: `None` also while the session is
-    /// under way, where unblinding ends nothing. `devices` are the surgeons' devices: how much each held
-    /// when it last told, and when.
+    /// What unblinding at `now` could prevent from counting. `None` if there is nothing, and also while the session is
+    /// under way, because unblinding then ends no grace period. `devices` are the surgeons' devices: how many comments
+    /// and answers each held when it last reported, and when that was.
     pub fn outstanding(
         &self,
         now: Timestamp,
@@ -80,13 +81,13 @@ impl Grace {
     }
 }
 
-/// What may still come in for a session that has ended.
+/// What may still arrive for a session that has ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Outstanding {
-    /// Until when, by the server's clock, it counts; none once that time is over.
+    /// Until when, by the server's clock, arrivals count; none once that time is over.
     #[schema(value_type = Option<String>)]
     pub counts_until: Option<Timestamp>,
-    /// Surgeons' devices that have not said since the end that they hold nothing more.
+    /// Number of surgeons' devices that have not reported since the end that they hold nothing more.
     pub devices: usize,
 }
 
@@ -99,7 +100,7 @@ impl fmt::Display for Outstanding {
             let and = if self.counts_until.is_some() { ", and " } else { "" };
             let devices = if self.devices == 1 { "device has" } else { "devices have" };
             let count = self.devices;
-            write!(f, "{and}{count} surgeon's {devices} not said since the end that nothing is left on it")?;
+            write!(f, "{and}{count} surgeon's {devices} not reported since the end that nothing is left on it")?;
         }
 
         f.write_str("; what arrives after unblinding is kept, but marked late, and never counts")

@@ -1,5 +1,5 @@
-//! Trials: protocol, allocation, the session's state machine, instruments. Pure: clock and
-//! random source are handed in.
+//! Trials: protocol, allocation, the session's state machine, instruments. Pure code: callers pass in the time and the
+//! random source.
 
 pub mod acceptance;
 pub mod account;

@@ -1,4 +1,4 @@
-//! Participants are codes, never names.
+//! Participants are known by codes, never by names.
 
 use std::fmt;
 
@@ -9,16 +9,16 @@ use serde::Serialize;
 #[serde(transparent)]
 pub struct ParticipantCode(String);
 
-/// A text that is no participant's code.
+/// A text that is not a valid participant code.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a participant code: use 2 to 16 capital letters, digits and dashes, such as S-01; never a name")]
 pub struct BadCode(String);
 
 impl ParticipantCode {
-    /// `text` as a code.
+    /// Checks `text` and makes it a participant's code.
     ///
     /// # Errors
-    /// When it is none.
+    /// If it is not a valid code.
     pub fn new(text: &str) -> Result<Self, BadCode> {
         let fits = (2..=16).contains(&text.len())
             && text.bytes().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'-');

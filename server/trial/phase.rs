@@ -1,43 +1,43 @@
-//! Where a session stands: its phases, and how far it came.
+//! A session's phase and its status.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Where a session stands.
+/// The phase of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// Made, not started.
+    /// The session is made, but not started.
     Ready,
     /// The full-screen notice "setting k of n" waits for the surgeon's tap.
     Notice,
-    /// The surgeon inspects; the segment's clock runs.
+    /// The surgeon inspects, and the segment's clock runs.
     Inspecting,
-    /// The questions after a segment.
+    /// The surgeon answers the questions after a segment.
     Questions,
-    /// The questions at the end.
+    /// The surgeon answers the closing questions.
     Closing,
-    /// Every answer is in.
+    /// The session ran to its end, with all required answers.
     Completed,
-    /// Ended early, with a reason.
+    /// The session was ended early, with a reason.
     Aborted,
 }
 
 impl Phase {
-    /// Whether the session has ended: nothing more happens in it but late comments and unblinding.
+    /// Whether the session has ended. After that, only late comments and answers, withdrawal and unblinding can follow.
     #[must_use]
     pub const fn has_ended(self) -> bool {
         matches!(self, Self::Completed | Self::Aborted)
     }
 }
 
-/// How far a session came.
+/// Whether a session is under way, completed or aborted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SessionStatus {
-    /// Neither completed nor aborted.
+    /// Neither completed nor aborted. It may not have started yet.
     UnderWay,
-    /// Every answer is in.
+    /// The session ran to its end, with all required answers.
     Completed,
     /// Ended early.
     Aborted,

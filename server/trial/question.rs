@@ -1,4 +1,4 @@
-//! Questions, and what an answer to one can be. Whether an answer fits its question and what it scores is in
+//! Questions and answers. Whether an answer fits its question, and how it is scored, is in
 //! [`instruments`](super::instruments).
 
 use serde::{Deserialize, Serialize};
@@ -7,19 +7,19 @@ use utoipa::ToSchema;
 /// A question of the protocol.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Question {
-    /// Id, unique in the protocol.
+    /// Id of the question, unique in the protocol.
     pub id: String,
-    /// The question as read by the surgeon.
+    /// The question as the surgeon reads it.
     pub text: String,
-    /// What sort of answer it takes.
+    /// The kind of answer that the question takes.
     #[serde(flatten)]
     pub kind: QuestionKind,
-    /// Whether it can be left out.
+    /// Whether the question can be left unanswered.
     #[serde(default)]
     pub optional: bool,
 }
 
-/// Sorts of answer.
+/// The kinds of question, by the answers that they take.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum QuestionKind {
@@ -29,22 +29,22 @@ pub enum QuestionKind {
     Likert {
         /// 5 or 7; with labels, as many as there are.
         points: u8,
-        /// What 1 means.
+        /// Meaning of point 1.
         low: String,
-        /// What the highest point means.
+        /// Meaning of the highest point.
         high: String,
-        /// What each point means, in order; empty where only the ends are named.
+        /// Meaning of each point, in order; empty if only the ends are named.
         #[serde(default)]
         labels: Vec<String>,
     },
     /// A place on a line, from 0 to 100.
     VisualAnalogue {
-        /// What 0 means.
+        /// Meaning of 0, the lower end.
         low: String,
-        /// What 100 means.
+        /// Meaning of 100, the upper end.
         high: String,
     },
-    /// All settings of the session put in order.
+    /// A ranking of all settings of the session.
     Ranking {
         /// Whether settings may share a place.
         #[serde(default)]
@@ -54,46 +54,46 @@ pub enum QuestionKind {
     Sus,
     /// The NASA Task Load Index without weights.
     NasaTlx {
-        /// Its six scales.
+        /// The six scales.
         scales: Vec<Scale>,
     },
     /// The Surgery Task Load Index.
     SurgTlx {
-        /// Its six scales.
+        /// The six scales.
         scales: Vec<Scale>,
-        /// The pairs of scales to be compared; empty where it is asked without weights.
+        /// The pairs of scales to compare; empty if the index is asked without weights.
         pairs: Vec<Pair>,
     },
-    /// Whether the surgeon thinks to have recognised settings: no, not sure, yes.
+    /// Whether the surgeon thinks they recognised settings: no, not sure, yes.
     Recognition,
 }
 
 /// A scale of a questionnaire.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Scale {
-    /// Its name in exports: lower case letters and dashes.
+    /// Name of the scale in exports: lower-case letters and dashes.
     pub name: String,
-    /// Its name as the surgeon reads it.
+    /// Name of the scale as the surgeon reads it.
     pub title: String,
-    /// What is asked.
+    /// The question about this scale.
     pub text: String,
-    /// What its lower end means.
+    /// Meaning of the lower end.
     pub low: String,
-    /// What its upper end means.
+    /// Meaning of the upper end.
     pub high: String,
 }
 
-/// Two scales of a questionnaire, by their places from 0, of which the surgeon chooses one.
+/// Two scales of a questionnaire, of which the surgeon chooses one. Scales are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Pair {
-    /// The one offered first.
+    /// Scale that is offered first.
     pub first: u8,
-    /// The other.
+    /// Scale that is offered second.
     pub second: u8,
 }
 
 impl QuestionKind {
-    /// Name of the kind, as in protocols and exports.
+    /// The kind's name, as in protocols and exports.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -109,15 +109,15 @@ impl QuestionKind {
     }
 }
 
-/// An answer.
+/// The value of an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(untagged)]
 pub enum AnswerValue {
-    /// A Likert point, a place on a line, or what was recognised.
+    /// A Likert point, a place on a line, or an answer to a recognition question.
     Point(u8),
-    /// A ranking of settings (from 1), best first; or the items of a questionnaire, 0 for those that this answer
+    /// A ranking of settings (from 1), best first; or the items of a questionnaire, with 0 for items that this answer
     /// leaves as they were.
     Points(Vec<u8>),
-    /// Text.
+    /// An answer in words.
     Text(String),
 }

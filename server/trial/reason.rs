@@ -1,14 +1,14 @@
-//! Reasons that people give for what they do. They are kept in the audit trail.
+//! Reasons that people give for their actions. They are kept in the audit trail.
 
 use super::refusal::Refusal;
 
-/// Longest reason, characters.
+/// Maximum length of a reason, in characters.
 const LONGEST: usize = 1000;
 
-/// `reason` without blanks around it; it may be empty.
+/// Checks a reason that may be empty, and returns it without surrounding blanks.
 ///
 /// # Errors
-/// When it is too long.
+/// If it is too long.
 pub fn optional(reason: &str) -> Result<String, Refusal> {
     let reason = reason.trim();
     if reason.chars().count() > LONGEST {
@@ -17,10 +17,10 @@ pub fn optional(reason: &str) -> Result<String, Refusal> {
     Ok(reason.to_owned())
 }
 
-/// `reason` without blanks around it.
+/// Checks a reason that is required, and returns it without surrounding blanks.
 ///
 /// # Errors
-/// When it is empty or too long.
+/// If it is empty or too long.
 pub fn needed(reason: &str) -> Result<String, Refusal> {
     let reason = optional(reason)?;
     if reason.is_empty() {

@@ -1,21 +1,21 @@
-//! Why something was not done.
+//! Why a request was refused.
 
-/// Why something was not done. Nothing was changed.
+/// Why a request was refused. Nothing was changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// Another role does this.
+    /// Only another role may do this.
     #[error("{0}")]
     NotAllowed(String),
     /// The session has no such segment.
     #[error("this session has no such setting; reload the page")]
     UnknownSegment,
-    /// The session does not ask this question of this segment.
-    #[error("this session asks no such question of this setting; reload the page")]
+    /// The session does not ask this question about this segment.
+    #[error("this session does not ask this question about this setting; reload the page")]
     UnknownQuestion,
-    /// It does not fit the present state.
+    /// The request does not fit the present state.
     #[error("{0}")]
     Conflict(String),
-    /// What was sent makes no sense.
+    /// The request is not valid.
     #[error("{0}")]
     Invalid(String),
 }
@@ -27,7 +27,7 @@ impl Refusal {
         Self::NotAllowed(format!("only {who} can do this"))
     }
 
-    /// A refusal because of the present state, which `text` describes.
+    /// A refusal because of the present state. `text` describes it.
     #[must_use]
     pub fn conflict(text: &str) -> Self {
         Self::Conflict(text.to_owned())

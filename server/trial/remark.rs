@@ -1,4 +1,4 @@
-//! What a surgeon says, as the page sends it: comments and answers, each with where and when it was said.
+//! A surgeon's comments and answers as the page sends them, each with the device and the time of its origin.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -9,48 +9,48 @@ use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 /// A comment as a surgeon's browser sends it.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 pub struct NewComment {
-    /// Idempotency key, made by the browser: the same key again is the same comment.
+    /// Idempotency key, made by the browser. The same key again means the same comment.
     pub key: IdempotencyKey,
-    /// Session that the surgeon's page was showing.
+    /// Session that the surgeon's page was showing when the comment was made.
     pub session: SessionId,
-    /// Segment that the page was showing.
+    /// Segment that the page was showing, if any.
     pub segment: Option<SegmentId>,
-    /// Number of the frame that was on screen.
+    /// Number of the frame that was on the screen.
     pub frame: Option<u64>,
-    /// The run that counted it, as its header told.
+    /// Run of the server that counted the frame, as given in the frame's header.
     #[serde(default)]
     pub run: Option<i64>,
-    /// Where and when it was said.
+    /// Device and time of the comment.
     #[serde(flatten)]
     pub origin: Origin,
-    /// What was said.
+    /// Content of the comment.
     #[serde(flatten)]
     pub said: Said,
 }
 
-/// Where and when something was said, as the surgeon's page tells.
+/// Device and time of a comment or answer, as the surgeon's page reports them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct Origin {
-    /// The device.
+    /// Device on which it was given.
     #[serde(default)]
     pub device: Option<DeviceId>,
-    /// Counts up with everything that is said on the device, in whatever tab; gaps mean nothing.
+    /// Number that grows with every comment or answer on the device, in all its tabs. Gaps have no meaning.
     #[serde(default)]
     pub sequence: Option<i64>,
-    /// When it was said: milliseconds since 1970 by the browser's clock.
+    /// When it was given: milliseconds since 1970 by the browser's clock.
     #[serde(default)]
     pub client_millis: Option<i64>,
-    /// Milliseconds that it waited on the device before it was sent this time.
+    /// Milliseconds that it waited on the device before this attempt to send it.
     #[serde(default)]
     pub waited_millis: Option<i64>,
-    /// The clock that measured this wait.
+    /// Clock that measured the wait.
     #[serde(default)]
     pub waited_by: Option<WaitClock>,
 }
 
 impl Origin {
-    /// The same without a wait below zero. A wait of which the page does not tell the clock is by the wall clock, as
-    /// older pages measured it.
+    /// A copy without a negative wait. If the page does not name the clock of a wait, it is the wall clock, which older
+    /// pages used.
     #[must_use]
     pub fn plausible(self) -> Self {
         let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);
@@ -59,18 +59,18 @@ impl Origin {
     }
 }
 
-/// The clock by which a page measured how long something waited.
+/// The clock with which a page measured how long a comment or answer waited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum WaitClock {
-    /// The page's monotonic clock: nobody can set it.
+    /// The page's monotonic clock, which nobody can set.
     PageClock,
-    /// The device's wall clock: the page was loaded anew meanwhile, or the device slept.
+    /// The device's wall clock. It is used if the page was reloaded or the device slept in the meantime.
     WallClock,
 }
 
 impl WaitClock {
-    /// Its name, as in the database and in exports.
+    /// The clock's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -79,53 +79,53 @@ impl WaitClock {
         }
     }
 
-    /// The clock called `name`.
+    /// The clock with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::PageClock, Self::WallClock].into_iter().find(|clock| clock.name() == name)
     }
 }
 
-/// What was said.
+/// The content of a comment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", content = "text", rename_all = "kebab-case")]
 pub enum Said {
-    /// Typed.
+    /// A typed text.
     Text(String),
     /// One of the protocol's quick comments.
     Quick(String),
-    /// "Mark this moment".
+    /// A mark without words ("Mark this moment").
     Mark,
-    /// Said aloud: the recording follows in pieces.
+    /// A spoken comment. Its recording follows in pieces.
     Voice,
 }
 
-/// An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it
-/// gives an answer, in whatever order they arrive; the others stay in the log.
+/// An answer as a surgeon's browser sends it. If there are several answers to a question, the one given last counts, in
+/// whatever order they arrive. Items that it leaves open keep their earlier values. The other answers stay in the log.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 pub struct NewAnswer {
-    /// Idempotency key.
+    /// Idempotency key, made by the browser. The same key again means the same answer.
     pub key: IdempotencyKey,
-    /// Session.
+    /// Session in which the answer was given.
     pub session: SessionId,
-    /// Segment; none for the questions at the end.
+    /// Segment that the question is about; none for the closing questions.
     pub segment: Option<SegmentId>,
-    /// Question id.
+    /// Id of the question.
     pub question: String,
-    /// The answer.
+    /// Value of the answer.
     pub value: AnswerValue,
-    /// Where and when it was given.
+    /// Device and time of the answer.
     #[serde(flatten)]
     pub origin: Origin,
 }
 
-/// How much a surgeon's device still holds.
+/// The number of comments and answers that a surgeon's device still holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct Holding {
-    /// The session that it was said in.
+    /// Session in which they were given.
     pub session: SessionId,
-    /// The device.
+    /// Device that holds them.
     pub device: DeviceId,
-    /// Comments and answers that it has not seen saved, half-written ones included.
+    /// Number of comments and answers whose saving the device has not seen confirmed, half-written ones included.
     pub holding: u32,
 }

@@ -3,22 +3,22 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Who acts; kept with every event.
+/// The role in which somebody acts; kept with every event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// In the trial.
+    /// The participant, who inspects and answers questions.
     Surgeon,
-    /// At the device.
+    /// Runs sessions at the device.
     Operator,
-    /// Runs the study.
+    /// Plans studies and examines their data.
     Researcher,
-    /// The server itself: a time limit, a restart.
+    /// The server itself, for example at a time limit or a restart.
     System,
 }
 
 impl Role {
-    /// Its name, as in the database and in exports.
+    /// The role's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -29,7 +29,7 @@ impl Role {
         }
     }
 
-    /// The role called `name`.
+    /// The role with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Surgeon, Self::Operator, Self::Researcher, Self::System].into_iter().find(|role| role.name() == name)

@@ -1,4 +1,4 @@
-//! Which answer to a question counts: the one that was given last, in whatever order they arrived.
+//! Decides which answer to a question counts: the one that was given last, in whatever order the answers arrived.
 
 use std::collections::BTreeMap;
 
@@ -8,36 +8,35 @@ use super::answers::on_top_of;
 use super::question::AnswerValue;
 use crate::ids::DeviceId;
 
-/// An answer as it was given.
+/// An answer, with its origin and its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Given {
-    /// The device that it was given on, where its page told.
+    /// Device on which the answer was given; none if its page did not say.
     pub device: Option<DeviceId>,
-    /// Its place in the order in which things were said on that device.
+    /// Number that grows with every comment or answer on that device; none if its page did not say.
     pub sequence: Option<i64>,
-    /// When it was given, by the server's clocks: when it arrived, less its wait on the device.
+    /// When the answer was given, by the server's clocks: the time of arrival minus the wait on the device.
     pub at: Timestamp,
-    /// Whether it arrived too late to count.
+    /// Whether the answer arrived too late to count.
     pub late: bool,
-    /// The answer, or the part of it that was given.
+    /// The answer, or the part of it that was given: unanswered items are 0.
     pub value: AnswerValue,
 }
 
-/// What became of one of the answers to a question.
+/// The standing of one of the answers to a question: its place among them, and whether it counts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Its place in the order in which they were given, from 1.
+    /// Place of the answer in the order in which the answers were given, from 1.
     pub revision: usize,
-    /// The answer as it stood once this one was given; of one that is late, as it was given.
+    /// The combined answer after this one was given. For a late answer, only its own value.
     pub value: AnswerValue,
-    /// Whether it is the one that counts.
+    /// Whether this is the answer that counts.
     pub counts: bool,
-    /// Whether it is what its device said last, and another device's last word differs.
+    /// Whether this is the last answer of its device, and the last answer of another device differs from it.
     pub disagrees: bool,
 }
 
-/// What became of each of `answers`, which are all to one question, in the order in which they
-/// arrived.
+/// The standing of each of `answers`. All must be answers to the same question, in the order of their arrival.
 #[must_use]
 pub fn standings(answers: &[Given]) -> Vec<Standing> {
     let order = in_order(answers);
@@ -67,7 +66,7 @@ pub fn standings(answers: &[Given]) -> Vec<Standing> {
     standings
 }
 
-/// What became of each of `answers`, each with its question, in the order in which they arrived.
+/// The standing of each of `answers`. Each comes with its question; they are in the order of their arrival.
 #[must_use]
 pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, Given)>) -> Vec<Standing> {
     let mut questions: BTreeMap<Q, (Vec<usize>, Vec<Given>)> = BTreeMap::new();
@@ -83,18 +82,19 @@ pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, Given)>) -> Vec
     found.into_iter().map(|(_, standing)| standing).collect()
 }
 
-/// What counts of `answers`, which are all to one question, in the order in which they arrived.
+/// The combined answer that counts. `answers` must all answer the same question, in the order of their arrival. None if
+/// no answer counts.
 #[must_use]
 pub fn counted(answers: &[Given]) -> Option<AnswerValue> {
     standings(answers).into_iter().find(|standing| standing.counts).map(|standing| standing.value)
 }
 
-/// The places of `answers` in the order in which they were given.
+/// The indices of `answers`, sorted by the order in which the answers were given.
 fn in_order(answers: &[Given]) -> Vec<usize> {
     let mut at: Vec<Timestamp> = answers.iter().map(|given| given.at).collect();
 
-    // The order on one device is certain. Times are not: a wait may have been measured by a clock
-    // that was set meanwhile.
+    // The order on one device is certain. Times are not: a wait may have been measured by a clock that was set in the
+    // meantime.
     let place_on_device = |(place, given): (usize, &Given)| Some((given.device?, given.sequence?, place));
     let mut on_devices: Vec<_> = answers.iter().enumerate().filter_map(place_on_device).collect();
     on_devices.sort_unstable();
@@ -110,7 +110,7 @@ fn in_order(answers: &[Given]) -> Vec<usize> {
     order
 }
 
-/// The places of what each device said last, where another device said something else last.
+/// The indices of each device's last answer, if the last answer of another device differs from it.
 fn disagreeing(answers: &[Given], order: &[usize]) -> Vec<usize> {
     let mut last_words: BTreeMap<DeviceId, (usize, AnswerValue)> = BTreeMap::new();
     for &place in order {
@@ -124,7 +124,7 @@ fn disagreeing(answers: &[Given], order: &[usize]) -> Vec<usize> {
     last_words.values().filter(|(_, value)| differs_from_another(value)).map(|(place, _)| *place).collect()
 }
 
-/// Whether two answers say different things; an item that one of them leaves open does not.
+/// Whether two answers differ. An item that one of them leaves open is no difference.
 fn differ(one: &AnswerValue, other: &AnswerValue) -> bool {
     match (one, other) {
         (AnswerValue::Points(one), AnswerValue::Points(other)) if one.len() == other.len() => {
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn an_answer_that_arrives_late_does_not_replace_a_newer_one() {
-        // "3" was held by a tablet without a network while "5" was given on another.
+        // A tablet without a network held the "3" while the "5" was given on another tablet.
         let answers = [given(2, 1, 60, 5), given(1, 1, 10, 3)];
         let standings = standings(&answers);
         assert_eq!(counts(&answers), Some(AnswerValue::Point(5)));
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn on_one_device_its_own_order_counts_whatever_its_clock_did() {
-        // Two tabs; the second answer's wait was measured across a clock that was set, so it looks
+        // Two tabs. While the second answer waited, the clock that measured the wait was set, so the answer looks
         // older.
         let answers = [given(1, 7, 100, 3), given(1, 8, 40, 5)];
         assert_eq!(counts(&answers), Some(AnswerValue::Point(5)));

@@ -1,4 +1,4 @@
-//! When a session may be unblinded.
+//! The rules for unblinding a session.
 
 use super::action::Action;
 use super::balanced_set::BalancedSet;
@@ -13,35 +13,33 @@ use crate::autofocus::PolicyName;
 use crate::clock::Moment;
 use crate::ids::SessionId;
 
-/// What bears on an action besides the session's own state. Only unblinding asks for any of it.
+/// Facts besides the session's own state that an action depends on. Only unblinding needs any of them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Circumstances {
-    /// The sessions that share the session's seed, the session included.
+    /// Sessions that share the session's seed, including the session itself; none if the action is not unblinding.
     pub set: Option<BalancedSet>,
-    /// What may still come in for the session, and would not count after unblinding.
+    /// What may still arrive for the session and would not count after unblinding; none if there is nothing.
     pub outstanding: Option<Outstanding>,
-    /// The session's study, if it belongs to one that is not unblinded.
+    /// The session's study, if it belongs to one that is not unblinded yet.
     pub study: Option<BlindedStudy>,
 }
 
-/// A study of which one session is to be unblinded, and the others not.
+/// A blinded study in which a single session is to be unblinded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BlindedStudy {
-    /// Its name.
+    /// Name of the study.
     pub name: StudyName,
-    /// The policies that it compares.
+    /// Policies that the study compares.
     pub policies: Vec<PolicyName>,
-    /// Whether somebody signed for an emergency.
+    /// Whether a person signed for the emergency.
     pub signed: bool,
 }
 
 impl Circumstances {
-    /// The events that `action` by `by` on `session` brings about at `now`. None where it was done
-    /// before.
+    /// The events that `action` by `by` on `session` causes at `now`. Empty if the action was done before.
     ///
     /// # Errors
-    /// When `by` may not, the action does not fit where the session stands, or it does not fit
-    /// these circumstances.
+    /// If `by` may not do this, or the action does not fit the state of the session or these circumstances.
     pub fn decide(
         &self,
         session: SessionId,
@@ -50,7 +48,7 @@ impl Circumstances {
         action: &Action,
         now: Moment,
     ) -> Result<Vec<EventKind>, Refusal> {
-        // Whoever may not is told so first, and nothing of other sessions.
+        // Checks the role first: a person who may not unblind learns nothing about other sessions.
         let mut events = decide(state, by, action, now)?;
 
         if let Action::Unblind { despite_outstanding, reason } = action
@@ -60,7 +58,7 @@ impl Circumstances {
             self.check_unblinding(session, *despite_outstanding)?;
         }
 
-        // In a study one session is unblinded only in an emergency, also after its end.
+        // In a study, unblinding a single session is always an emergency, even after the session's end.
         for event in &mut events {
             if let EventKind::Unblinded { emergency, .. } = event {
                 *emergency |= self.study.is_some();
@@ -73,7 +71,7 @@ impl Circumstances {
         let Some(study) = &self.study else { return Ok(()) };
         if !study.signed {
             return Err(Refusal::Invalid(format!(
-                "the session belongs to study {}; to unblind it alone is an emergency: say who does it (person)",
+                "the session belongs to study {}; unblinding it alone is an emergency: say who does it (person)",
                 study.name
             )));
         }
@@ -115,7 +113,7 @@ mod tests {
         Moment::from_nanos(1)
     }
 
-    /// A session that ended with the last of `kinds`.
+    /// The state of a session after the events `kinds`.
     fn state(kinds: impl IntoIterator<Item = EventKind>) -> SessionState {
         let plan = Plan {
             segments: Vec::new(),
@@ -152,13 +150,13 @@ mod tests {
         Member { session, participant: "S-01".to_owned(), made, place, status, unblinded: false }
     }
 
-    /// Another session of the set is under way.
+    /// Circumstances in which another session of the set is under way.
     fn other_under_way() -> Circumstances {
         let members = vec![member(SESSION, 0, SessionStatus::Completed), member(OTHER, 1, SessionStatus::UnderWay)];
         Circumstances { set: Some(BalancedSet { seed: Seed([7; 32]), members }), outstanding: None, study: None }
     }
 
-    /// A surgeon's device has not said that it is empty.
+    /// Circumstances in which a surgeon's device has not reported that it holds nothing more.
     fn device_silent() -> Circumstances {
         Circumstances { outstanding: Some(Outstanding { counts_until: None, devices: 1 }), ..Circumstances::default() }
     }

@@ -1,5 +1,5 @@
-//! What each role may see of a session. [`SurgeonView`] has no field for a policy, its order, its
-//! timing, its metric or its focal power, and the code that serves surgeons sees no other view.
+//! Views: what each role may see of a session. [`SurgeonView`] has no field for a policy, its order, its timing, its
+//! metric or its focal power, and the code that serves surgeons has access to no other view.
 
 use std::collections::BTreeMap;
 
@@ -13,65 +13,67 @@ use super::remark::Said;
 use super::role::Role;
 use crate::ids::{SegmentId, SessionId};
 
-/// A session as the surgeon's browser gets it. Everything in it is the same whatever the policy.
+/// A session as the surgeon's browser gets it. Nothing in it depends on the policy.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[allow(clippy::struct_excessive_bools, reason = "facts that the page shows each by itself")]
 pub struct SurgeonView {
-    /// The session; random.
+    /// Random id of the session.
     pub session: SessionId,
-    /// Where it stands.
+    /// Phase of the session.
     pub phase: Phase,
-    /// Whether it is paused in that phase (by the operator, or by a restart of the server).
+    /// Whether the session is paused in that phase (by the operator, or by a restart of the server).
     pub paused: bool,
-    /// Whether the surgeon may let it go on: after a restart of the server, not after a pause by the operator.
+    /// Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
+    /// operator.
     pub may_resume: bool,
-    /// Whether what stopped the session or its setting last (a pause, an end) is not on the disk yet.
+    /// Whether the event that last stopped the session or its setting (a pause, an end) is not written to disk yet.
     pub unrecorded: bool,
-    /// Whether this is practice.
+    /// Whether this is a practice session.
     pub practice: bool,
     /// The protocol's title for surgeons.
     pub title: String,
-    /// The segment in progress: random, never shared by two segments.
+    /// Random id of the current segment; none if no segment is under way. No two segments share an id.
     pub segment: Option<SegmentId>,
-    /// Setting in progress, from 1; 0 before the first.
+    /// Number of the current setting, from 1; 0 before the first.
     pub setting: usize,
-    /// Settings in all.
+    /// Number of settings in the session.
     pub settings: usize,
-    /// Seconds of inspection left in the segment at the time of sending.
+    /// Seconds of inspection left in the segment when the view was sent; none outside inspection.
     pub remaining_seconds: Option<f64>,
-    /// The prompt to show now, if one is due ("How does the focus feel now?").
+    /// Prompt to show now, for example "How does the focus feel now?"; none if none is due.
     pub prompt: Option<String>,
-    /// One-tap comments.
+    /// Comments that the surgeon can give with one tap.
     pub quick_comments: Vec<String>,
     /// Whether the surgeon may comment aloud.
     pub voice: bool,
-    /// The questions to show in `Questions` and `Closing`.
+    /// Questions to show in the phases `Questions` and `Closing`.
     pub questions: Vec<Question>,
-    /// Answers already kept for those questions, by question id.
+    /// Saved answers to those questions, by question id.
     pub answers: BTreeMap<String, AnswerValue>,
-    /// Comments kept so far in this session.
+    /// Number of comments saved so far in this session.
     pub comments: usize,
 }
 
-/// The session under way as the operator sees it. No policy either: the operator stands beside the surgeon.
+/// The current session as the operator sees it. It has no policy either, because the operator stands beside the
+/// surgeon.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct OperatorView {
     /// What the surgeon sees.
     #[serde(flatten)]
     pub surgeon: SurgeonView,
-    /// Participant's code.
+    /// Code of the participant.
     pub participant: String,
-    /// The study that it belongs to; none outside any study.
+    /// Name of the session's study; none outside studies.
     pub study: Option<String>,
-    /// Protocol's name.
+    /// Name of the protocol.
     pub protocol: String,
-    /// The version of the consent text without which the session does not start; none where none is required.
+    /// Version of the consent text that the session requires before its start; none if no consent is required.
     pub consent_required: Option<String>,
-    /// What the participant consented to, if that is recorded.
+    /// The participant's consent; none if none is recorded.
     pub consent: Option<Consent>,
     /// Whether the participant withdrew.
     pub withdrawn: bool,
-    /// Why the disk has not taken what is `unrecorded`, as far as it has said.
+    /// Why the disk has not taken the `unrecorded` event; none if that is not known.
     pub unrecorded_because: Option<String>,
     /// The latest comments, newest first.
     pub latest_comments: Vec<CommentLine>,
@@ -79,15 +81,15 @@ pub struct OperatorView {
     pub log: Vec<LogLine>,
 }
 
-/// A comment for reading.
+/// A comment, as it is shown.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CommentLine {
-    /// When, by the server's wall clock.
+    /// Time of the comment, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: jiff::Timestamp,
-    /// Setting, from 1.
+    /// Number of the setting, from 1; none outside settings.
     pub setting: Option<usize>,
-    /// What was said.
+    /// Content of the comment.
     #[serde(flatten)]
     pub said: Said,
 }
@@ -95,15 +97,15 @@ pub struct CommentLine {
 /// An event in words.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LogLine {
-    /// When, by the server's wall clock.
+    /// Time of the event, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: jiff::Timestamp,
-    /// Who.
+    /// Role that caused the event.
     pub by: Role,
-    /// The account of whoever it was, where the person was signed in.
+    /// Account of the person who caused the event, if signed in.
     pub account: Option<String>,
-    /// What happened.
+    /// Description of the event.
     pub text: String,
-    /// The number of the session's event that it tells, where the event has a reason that a researcher can erase.
+    /// Number of the session's event that this line shows, if the event has a reason that a researcher can erase.
     pub erasable_event: Option<u32>,
 }

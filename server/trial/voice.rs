@@ -1,5 +1,5 @@
-//! Voice: what a surgeon says aloud, sent in pieces while it is spoken. What of it is accepted is kept, whatever state
-//! the session is in.
+//! Voice comments: a surgeon's speech, sent in pieces while the surgeon speaks. Accepted pieces are kept, whatever
+//! state the session is in.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -7,33 +7,34 @@ use utoipa::ToSchema;
 use super::refusal::Refusal;
 use crate::ids::{IdempotencyKey, SessionId};
 
-/// Most bytes of a piece. A second of speech has about 4,000 in Opus, and 16,000 in AAC.
+/// Maximum size of a piece, in bytes. A second of speech takes about 4,000 in Opus, and 16,000 in AAC.
 pub const LARGEST_PIECE: usize = 128 * 1024;
 
-/// Most bytes of a recording. The page ends one after two minutes, which is less than 1 MiB of speech.
+/// Maximum size of a recording, in bytes. The page ends a recording after two minutes, which is less than 1 MiB of
+/// speech.
 pub const LARGEST_RECORDING: usize = 8 * 1024 * 1024;
 
-/// Most pieces of a recording. The page sends one a second.
+/// Maximum number of pieces in a recording. The page sends one piece a second.
 pub const MOST_PIECES: u32 = 600;
 
-/// Longest recording that a page may tell of, milliseconds.
+/// Longest recording that a page may report, milliseconds.
 const LONGEST_MS: i64 = 60 * 60 * 1000;
 
-/// A kind of sound file that browsers record and play.
+/// A type of sound file that browsers record and play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MediaType {
     /// Opus in `WebM`: Chromium, Firefox, Safari from 18.4.
     WebmOpus,
-    /// AAC in MP4: Safari before.
+    /// AAC in MP4: Safari before 18.4.
     Mp4,
-    /// Opus in Ogg: Firefox, where it has no `WebM`.
+    /// Opus in Ogg: Firefox, if it has no `WebM`.
     OggOpus,
 }
 
 impl MediaType {
     const ALL: [Self; 3] = [Self::WebmOpus, Self::Mp4, Self::OggOpus];
 
-    /// Its name, as in the database, in exports and over HTTP.
+    /// The type's name, as in the database, in exports and over HTTP.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -43,7 +44,7 @@ impl MediaType {
         }
     }
 
-    /// The ending of its files' names.
+    /// File name extension, without a dot.
     #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
@@ -53,7 +54,8 @@ impl MediaType {
         }
     }
 
-    /// The type that `text` names. Browsers write blanks and letters differently, and Safari adds its codec.
+    /// The type that `text` names; none if it is another type. Browsers differ in blanks and in upper and lower case,
+    /// and Safari adds its codec.
     #[must_use]
     pub fn named(text: &str) -> Option<Self> {
         let plain: String = text.chars().filter(|letter| !matches!(letter, ' ' | '"')).collect();
@@ -67,18 +69,18 @@ impl MediaType {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
-    /// The surgeon let go.
+    /// The surgeon released the button.
     Released,
-    /// It had lasted as long as the page lets one last.
+    /// The recording reached the longest time that the page allows.
     Limit,
-    /// The microphone was taken away.
+    /// The browser lost the microphone.
     MicrophoneLost,
-    /// The page went out of sight.
+    /// The page was hidden or left.
     Left,
 }
 
 impl Ending {
-    /// Its name, as in the database and in exports.
+    /// The ending's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -89,7 +91,7 @@ impl Ending {
         }
     }
 
-    /// The ending called `name`.
+    /// The ending with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Released, Self::Limit, Self::MicrophoneLost, Self::Left].into_iter().find(|ending| ending.name() == name)
@@ -99,26 +101,26 @@ impl Ending {
 /// A piece of a recording as a surgeon's browser sends it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewPiece {
-    /// The comment that it belongs to, by its key.
+    /// Key of the comment that the piece belongs to.
     pub comment: IdempotencyKey,
-    /// The session that the comment was said in.
+    /// Session of the comment.
     pub session: SessionId,
-    /// Its place in the recording, from 1.
+    /// Number of the piece in the recording, from 1.
     pub piece: u32,
-    /// What it is, as the browser says.
+    /// Media type of the recording, as the browser names it.
     pub media_type: String,
-    /// How far the recording had come at its end, milliseconds.
+    /// Length of the recording up to the end of this piece, milliseconds.
     pub through_ms: i64,
-    /// Why the recording ended, on its last piece.
+    /// Why the recording ended, if this is its last piece.
     pub ended: Option<Ending>,
-    /// The sound.
+    /// Bytes of the sound; may be empty in the last piece.
     pub audio: Vec<u8>,
 }
 
-/// Whether `new` is accepted: what it is.
+/// Checks the piece `new`, and returns its media type.
 ///
 /// # Errors
-/// When it is of another type than browsers record, too large, or has an impossible place.
+/// If its type is not one that browsers record, it is too large, or its number or its time is out of range.
 pub fn check_piece(new: &NewPiece) -> Result<MediaType, Refusal> {
     let NewPiece { piece, media_type, through_ms, audio, .. } = new;
     let known = MediaType::named(media_type).ok_or_else(|| {
@@ -141,7 +143,7 @@ pub fn check_piece(new: &NewPiece) -> Result<MediaType, Refusal> {
     Ok(known)
 }
 
-/// The refusal of a piece with which the recording would be too large.
+/// The refusal of a piece that would make its recording too large.
 #[must_use]
 pub fn too_large() -> Refusal {
     Refusal::Invalid(format!("a recording may have {LARGEST_RECORDING} bytes in all; begin another one"))

@@ -1,5 +1,4 @@
-//! `parfocal calibrate`: references taken with the phantom, what is refused, and what the rest of
-//! the program makes of it.
+//! `parfocal calibrate`: references taken with the phantom, what is refused, and how the rest of the program uses them.
 
 use std::fs;
 use std::path::Path;
@@ -32,7 +31,7 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
     let calibration = out.to_str().unwrap();
     assert!(refused(&capture("white", "phantom:white", &out)).contains("run `parfocal calibrate dark` first"));
     done(&[&capture("dark", "phantom:dark", &out)[..], &["--unit", "7", "--name", "theatre 2"]].concat());
-    // Each mistaken for the other, and colour where bands are needed.
+    // Each reference is refused if it is mistaken for the other.
     let said = refused(&capture("white", "phantom:dark", &out));
     assert!(said.contains("nothing was saved: nothing is seen") && said.contains("`calibrate dark`"), "{said}");
     assert!(refused(&capture("dark", "phantom:white", &out)).contains("`calibrate white`"));
@@ -43,7 +42,7 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
     assert!(toml.contains("dark = \"dark-1.tiff\"") && toml.contains("white = \"white-2.tiff\""), "{toml}");
     assert!(out.join("calibration-1.toml").exists(), "the version before is kept");
 
-    // The white reference itself, seen by its calibration, is even: its focus metric is that of nothing.
+    // The white reference itself, developed with its calibration, is even: its focus metric is almost 0.
     let white = out.join("white-2.tiff");
     let inspect = |extra: &[&str]| -> serde_json::Value {
         let line = done(&[&["inspect", "--json", white.to_str().unwrap()][..], extra].concat());
@@ -65,7 +64,7 @@ fn a_calibration_that_cannot_be_kept_leaves_the_one_before_and_its_history() {
     let current = out.join("calibration.toml");
     done(&capture("dark", "phantom:dark", &out));
     let before = fs::read(&current).unwrap();
-    // What is written aside has no place, as on a full disk.
+    // The file's temporary copy cannot be written, as on a full disk.
     let aside = out.join(".calibration.toml.partial");
     fs::create_dir(&aside).unwrap();
     assert!(refused(&capture("white", "phantom:white", &out)).contains("cannot write to"));
@@ -73,7 +72,7 @@ fn a_calibration_that_cannot_be_kept_leaves_the_one_before_and_its_history() {
     fs::remove_dir(&aside).unwrap();
     assert!(done(&capture("white", "phantom:white", &out)).contains("version 2 of 20"));
 
-    // A folder that holds versions and no current one is not begun anew: its names are taken.
+    // A folder with earlier versions but no current one is not used: their names are taken.
     fs::remove_file(&current).unwrap();
     let dark = fs::read(out.join("dark-1.tiff")).unwrap();
     let said = refused(&capture("dark", "phantom:dark", &out));

@@ -1,5 +1,4 @@
-//! Cameras from outside: what the simulated ones show, what they claim to know, and what they say
-//! of bad sources.
+//! Cameras from outside: what the simulated ones show, what they claim to know, and how they report bad sources.
 
 mod calibrate;
 
@@ -15,7 +14,7 @@ use parfocal::imaging::{GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbIma
 use parfocal::lens::{FocalPower, Optics};
 use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 
-/// A clock on which each frame takes no time and each wait exactly as long as asked.
+/// A clock that stands still until a test sets it, so that frames take no time.
 #[derive(Default)]
 struct StepClock(AtomicU64);
 
@@ -29,7 +28,7 @@ impl Clock for StepClock {
     }
 }
 
-/// Glass that follows a table: another focal power every frame.
+/// A lens whose focal power rises from 0 to 1 in each second.
 struct Sweep;
 
 impl Optics for Sweep {
@@ -47,7 +46,7 @@ fn open(spec: &str, seed: u64) -> (Result<Box<dyn Camera>, CameraError>, Arc<Ste
     (camera::open(spec, settings), clock)
 }
 
-/// The frames at these milliseconds.
+/// The frames of camera `spec` at `times`, in milliseconds.
 fn frames(spec: &str, seed: u64, times: &[u64]) -> Vec<Frame> {
     let (camera, clock) = open(spec, seed);
     let mut camera = camera.unwrap();
@@ -152,7 +151,7 @@ fn the_phantoms_picture_is_exposed_well_and_its_content_area_can_be_found() {
     assert!(red > 1.05 * green && red > 1.05 * blue, "brain is pink: {red} {green} {blue}");
 }
 
-/// A picture of stripes 4 pixels wide.
+/// Saves a checkerboard with squares of 4 pixels.
 fn stripes(file: &Path, width: u32, height: u32) {
     let picture = image::RgbImage::from_fn(width, height, |x, y| {
         image::Rgb([if (x / 4 + y / 4) % 2 == 0 { 220 } else { 60 }; 3])
@@ -160,7 +159,7 @@ fn stripes(file: &Path, width: u32, height: u32) {
     picture.save(file).unwrap();
 }
 
-/// Mean gradient magnitude in the middle of a frame, and how far it is out of focus.
+/// How far a frame is out of focus, and the mean gradient magnitude in its middle.
 fn sharpness(frame: &Frame) -> (f64, f64) {
     let rgb = colours(frame);
     let area = PatchArea::central(rgb.width, rgb.height, None).unwrap();
@@ -195,14 +194,14 @@ fn a_video_is_played() {
 
     let shown = frames(&format!("footage:{}", file.display()), 5, &[0, 500]);
     for frame in &shown {
-        // 1280x720 scaled to 384 lines is 683x384; three quarters of that.
+        // 1280x720 scaled to 384 lines is 683x384. The window has three quarters of that.
         assert_eq!((colours(frame).width, colours(frame).height), (512, 288));
         let mean = colours(frame).data.iter().map(|value| f64::from(*value)).sum::<f64>() / (512.0 * 288.0 * 3.0);
         assert!((40.0..200.0).contains(&mean), "{mean}");
     }
 }
 
-/// What opening a camera that cannot be opened says.
+/// The error from a camera that cannot be opened.
 fn refusal(spec: &str) -> String {
     match open(spec, 1).0 {
         Err(error @ CameraError::BadSource(_)) => error.to_string(),

@@ -1,4 +1,4 @@
-//! A camera, a lens and a policy that do as the test says.
+//! A camera, a lens and a policy that do what the test says.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -34,11 +34,11 @@ pub enum Deed {
     GoTo(f64),
     Panic,
     Hang,
-    /// As [`Deed::Hang`], but on a processor.
+    /// Like [`Deed::Hang`], but keeps a processor busy.
     Spin,
 }
 
-/// The script, and what came of it.
+/// Sets what the policy `scripted` does, and records its instances, threads and observations.
 #[derive(Clone)]
 pub struct Script(Arc<ScriptState>);
 
@@ -61,18 +61,18 @@ impl Script {
         }))
     }
 
-    /// From now on the policy does `deed`; one that hangs comes back.
+    /// From now on the policy does `deed`. An instance that hangs returns.
     pub fn set(&self, deed: Deed) {
         *self.0.deed.lock().unwrap() = deed;
         self.0.changed.notify_all();
     }
 
-    /// Instances made so far.
+    /// Number of instances built so far.
     pub fn instances(&self) -> usize {
         self.0.instances.load(Ordering::SeqCst)
     }
 
-    /// The threads that its instances ran on, the latest last.
+    /// The threads on which instances ran, latest last.
     pub fn threads(&self) -> Vec<Pid> {
         self.0.threads.lock().unwrap().clone()
     }
@@ -129,7 +129,7 @@ pub fn drive(name: &str, segment: Option<SegmentId>) -> Command {
     Command::Drive { drive: Drive::Policy { name: PolicyName::new(name), start: None }, segment }
 }
 
-/// A lens that obeys at once, remembers, and fails on request.
+/// A lens that obeys at once, remembers its focal power, and fails on request.
 #[derive(Clone)]
 pub struct FakeLens(Arc<Mutex<LensState>>);
 
@@ -159,7 +159,7 @@ impl FakeLens {
         self.0.lock().unwrap().panics = panics;
     }
 
-    /// Where the lens was last sent and went.
+    /// The last focal power that the lens accepted.
     pub fn position(&self) -> FocalPower {
         self.0.lock().unwrap().at
     }
@@ -207,7 +207,7 @@ impl Lens for FakeLens {
     }
 }
 
-/// What a fake camera hands over next.
+/// What a fake camera does next: a frame of this many pixels a side, a failure, or a panic.
 pub enum Shot {
     Frame(usize),
     Failure,

@@ -1,4 +1,4 @@
-//! How well the classical policies keep the phantom in focus, through the whole step of the loop; faster than time.
+//! How well the classical policies keep the phantom in focus, through whole steps of the loop, faster than real time.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,13 +12,13 @@ use parfocal::imaging::{MosaicFrame, Reconstructor};
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 
-/// A frame every 40 ms, exposed for 10 ms of them: the lens has come to rest before the next one.
+/// A frame every 40 ms, exposed for 10 ms. The lens comes to rest before the next exposure.
 const EXPOSURE: Duration = Duration::from_millis(10);
 const FROM_COMMAND_TO_MIDDLE: Duration = Duration::from_millis(35);
 const SEEDS: [u64; 2] = [1, 2];
 const FRAMES: u64 = 75;
 
-/// Mean of |f - f*| at the middle of each exposure, and the share of frames where it is below 0.1.
+/// Mean of |f - f*| at the middle of each exposure, and share of frames in which it is below 0.1.
 #[derive(Debug, Clone, Copy)]
 struct FocalError {
     mean: f64,

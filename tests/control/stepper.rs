@@ -1,4 +1,4 @@
-//! Single steps, on a clock that the test moves: 20 ms a frame.
+//! Single steps of the loop, on a clock that the test advances by 20 ms per frame.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -18,7 +18,7 @@ use super::fakes::{Deed, FakeLens, Script, drive, frame, power, sized_frame};
 const FRAME: Duration = Duration::from_millis(20);
 /// Far longer than a sound policy's thread needs to be scheduled on a busy machine.
 const PATIENT: Duration = Duration::from_secs(20);
-/// Frames in a second: the longest a recovery may take.
+/// Frames in a second, the longest time that a recovery may take.
 const SECOND: usize = 50;
 
 struct Fixture {
@@ -43,7 +43,7 @@ impl Fixture {
         Self { clock, lens, script, stepper, number: 0 }
     }
 
-    /// Takes a step a frame after the last.
+    /// Takes a step one frame period after the last one.
     fn step(&mut self) -> StepRecord {
         self.step_after(FRAME)
     }
@@ -54,13 +54,13 @@ impl Fixture {
         self.stepper.step(frame(self.number, self.clock.now())).unwrap().record
     }
 
-    /// Steps until one is not held; how many it took.
+    /// Takes steps until one is not held. Returns their number.
     fn recover(&mut self) -> usize {
         (1..=SECOND).find(|_| self.step().held.is_none()).expect("recovers within a second of the fault's end")
     }
 
-    /// Steps until one is not held, the clock moving on by `pace`: for hung threads, which come
-    /// back in the machine's time and not in the test's.
+    /// Takes steps, `pace` apart, until one is not held. For hung threads, which return in real time, not in the test's
+    /// time.
     fn recover_in_time(&mut self, pace: Duration) {
         while self.step_after(pace).held.is_some() {
             std::thread::yield_now();
@@ -86,7 +86,7 @@ fn a_policy_is_followed() {
     assert_eq!(fixture.script.seen(), [0.5, 0.6], "each frame is attributed to where the lens was");
 }
 
-/// Stays where it is, and notes how many wider patches each frame showed it.
+/// A policy that stays where it is, and records how many wider patches it got with each frame.
 struct Spectator {
     field_of_view: FieldOfView,
     shown: Arc<Mutex<Vec<usize>>>,
@@ -123,7 +123,7 @@ fn a_policy_is_shown_wider_patches_only_if_it_uses_them() {
             assert_eq!(record.held, None);
         }
 
-        // The first frame may come before the policy is made, and is then shown as a whole.
+        // The first frame may come before the policy is built. It then gets all wider patches.
         assert_eq!(shown.lock().unwrap()[1..], [expected; 2], "{field_of_view:?}");
     }
 }
@@ -299,8 +299,9 @@ fn drive_and_segment_change_together_between_two_frames() {
     assert_eq!((record.policy, record.segment, record.asked), (None, None, power(0.2)));
 }
 
-/// From 0.9 to 0.5 the lens needs 2 ms of dead time and 21 ms until it is within 0.006 of its destination: the frames
-/// exposed 0 and 20 ms after the command show it on the way, the one after 40 ms at its start.
+/// From 0.9 to 0.5 the lens needs 2 ms of dead time, and 21 ms until it is within 0.006 of its destination. So the
+/// frames exposed 0 and 20 ms after the command show it still moving; the one after 40 ms shows it at the policy's
+/// start.
 #[test]
 fn a_policy_begins_once_the_lens_is_at_its_start() {
     let lens = FakeLens::at(power(0.9)).slow(Duration::from_millis(2), Duration::from_millis(15));
@@ -318,8 +319,8 @@ fn a_policy_begins_once_the_lens_is_at_its_start() {
     assert_eq!(fixture.script.seen(), [0.5]);
 }
 
-/// Half a step of 0.4 is left after 15 ln 2 / ln 20 = 3.47 ms: a frame whose exposure of 20 ms ended 15.47 ms after the
-/// command (2 ms of which were dead time) has its middle there.
+/// Half of a step of 0.4 is left after 15 ln 2 / ln 20 = 3.47 ms of movement. An exposure of 20 ms that ends 15.47 ms
+/// after the command has its middle there, since the first 2 ms are dead time.
 #[test]
 fn a_long_exposure_is_attributed_to_its_middle() {
     let lens = FakeLens::at(power(0.5)).slow(Duration::from_millis(2), Duration::from_millis(15));
@@ -335,7 +336,7 @@ fn a_long_exposure_is_attributed_to_its_middle() {
     assert!((seen[1] - 0.7).abs() < 1e-3, "{seen:?}");
 }
 
-/// The same, of a lens whose driver takes it to move at once and that was measured to move so.
+/// The same for a lens whose driver assumes that it moves at once, but whose dynamics were measured.
 #[test]
 fn measured_dynamics_replace_the_drivers_and_stand_in_the_telemetry() {
     let mut fixture = Fixture::new(PATIENT);
@@ -378,8 +379,8 @@ fn a_picture_without_room_for_a_patch_is_a_fault_of_the_camera() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever the policy answers and whenever the lens fails: the lens is only ever sent to a focal power that the
-    /// policy asked for and that is one, and is otherwise held where it was.
+    /// Whatever the policy answers and whenever the lens fails, the lens is sent only to valid focal powers that the
+    /// policy asked for. Otherwise it is held where it was.
     #[test]
     fn the_lens_only_ever_gets_a_focal_power(
         answers in prop::collection::vec((prop_oneof![any::<f64>(), -0.5..1.5_f64], any::<bool>()), 1..20)
@@ -391,7 +392,7 @@ proptest! {
         for (answer, lens_fails) in answers {
             fixture.script.set(Deed::GoTo(answer));
             fixture.lens.fail(lens_fails.then(|| LensError::Stalled("as the test asked".into())));
-            // Longer than the pause before a fresh instance, so that each answer gets its chance.
+            // Longer than the pause before a new instance, so that each answer is used.
             fixture.clock.advance(Duration::from_secs(1));
             let record = fixture.step();
             if (0.0..=1.0).contains(&answer) && !lens_fails && !lens_failed {

@@ -1,5 +1,5 @@
-//! The whole loop on its threads, with the machine's clock. What is awaited are events; the long limits only end a test
-//! that would otherwise hang.
+//! The whole loop on its threads, with the system's clock. Tests wait for events; the long limits only end a test that
+//! would otherwise hang.
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -46,13 +46,13 @@ impl Stage {
         Self { control, handle, telemetry, camera, lens, script }
     }
 
-    /// Has the camera deliver a frame, and waits until the loop is done with it.
+    /// Lets the camera deliver a frame, and waits until the loop has processed it.
     fn shoot(&self) -> ControlledFrame {
         self.camera.send(Shot::Frame(SIDE)).unwrap();
         self.handle.frames.take(LIMIT).expect("the frame comes through")
     }
 
-    /// Shoots until a frame satisfies `wanted`.
+    /// Takes frames until the record of one satisfies `wanted`.
     fn shoot_until(&self, wanted: impl Fn(&StepRecord) -> bool) -> StepRecord {
         std::iter::repeat_with(|| self.shoot().record).find(wanted).expect("endless")
     }
@@ -106,7 +106,7 @@ fn a_hanging_policy_does_not_stop_the_view() {
     stage.control.stop();
 }
 
-/// A thread's scheduling policy, as the kernel counts them, and its niceness.
+/// A thread's scheduling policy, by the kernel's number, and its niceness.
 fn scheduling(thread: Pid) -> (i32, i32) {
     let stat = std::fs::read_to_string(format!("/proc/self/task/{}/stat", thread.as_raw_pid())).unwrap();
     let after_name = stat.rsplit_once(')').unwrap().1;

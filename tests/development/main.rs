@@ -1,5 +1,5 @@
-//! Development at half and full size: how near the picture comes to scenes that are known exactly,
-//! and that it neither invents patterns nor remembers other frames.
+//! Development at half and full size: how close the picture is to scenes that are known exactly. It must neither invent
+//! patterns nor depend on earlier frames.
 
 mod measures;
 mod scenes;
@@ -32,7 +32,7 @@ fn luminance(mosaic: &MosaicFrame, size: Size) -> Vec<f32> {
     gray.data.iter().map(|value| value / 255.0).collect()
 }
 
-/// `picture`, one value a cell, enlarged `scale` times by cubic interpolation (Catmull and Rom).
+/// `picture`, with one value per cell, enlarged `scale` times by cubic interpolation (Catmull and Rom).
 fn enlarged(picture: &[f32], scale: usize) -> Vec<f32> {
     let side = scale * CELLS;
     let weights = |index: usize| {
@@ -58,8 +58,8 @@ fn enlarged(picture: &[f32], scale: usize) -> Vec<f32> {
     (0..side * side).map(value).collect()
 }
 
-/// How luminance at full size compares with the truth: dB above the enlarged cell picture, and the
-/// share of amplitude kept at 0.12 to 0.2 and at 0.2 to 0.35 cycles a sample.
+/// How luminance at full size compares with the truth: dB above the enlarged cell picture, and the share of amplitude
+/// kept at 0.12 to 0.2 and at 0.2 to 0.35 cycles per sample.
 fn luminance_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 3] {
     let truth = scene.mean();
     let mosaic = scene.mosaic(seed);
@@ -73,7 +73,7 @@ fn luminance_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 3] {
     [gain, middle, fine]
 }
 
-/// The colours that the sensor would show if it sensed every band at every place.
+/// The colours of the picture if the sensor measured every band at every place.
 fn true_colours(scene: &Scene) -> Vec<[u8; 3]> {
     let mut reconstructor = Reconstructor::default();
     let mut rgb = RgbImage::default();
@@ -90,8 +90,9 @@ fn true_colours(scene: &Scene) -> Vec<[u8; 3]> {
     colours
 }
 
-/// Colour differences: the median to the enlarged cell picture, of the developed picture and of the truth; and of hue
-/// and chroma to the truth, which 1 place in 20 exceeds, of the enlarged cell picture and of the developed one.
+/// Four colour differences. The median difference to the enlarged cell picture: of the developed picture, and of the
+/// truth. Then the difference to the truth, in hue and chroma only, that 1 place in 20 exceeds: of the enlarged cell
+/// picture, and of the developed picture.
 fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
     let mosaic = scene.mosaic(seed);
     let cells = developed(&mosaic, Size::Cell).0.data;
@@ -110,7 +111,7 @@ fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
     let to_cells =
         |of: &[[f64; 3]]| quantile(of.iter().zip(&enlarged).map(|(one, other)| ciede2000(*one, *other)).collect(), 0.5);
     let fringe = |of: &[[f64; 3]]| {
-        // Of the truth's lightness, so that only hue and chroma differ.
+        // With the truth's lightness, so that only hue and chroma differ.
         let differences = of.iter().zip(&truth).map(|(one, truth)| ciede2000([truth[0], one[1], one[2]], *truth));
         quantile(differences.collect(), 0.95)
     };
@@ -123,7 +124,7 @@ fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
 
 #[test]
 fn luminance_at_full_size_is_near_the_truth() {
-    // The method was chosen on leaves 11 to 16; these scenes were not looked at.
+    // The method was chosen on leaves 11 to 16. These scenes were not used for that.
     for seed in [101, 102, 103] {
         let [gain, middle, fine] = luminance_quality(&format!("leaves {seed}"), &Scene::leaves(seed), seed);
         assert!(gain >= 5.0 && middle >= 0.75 && fine >= 0.45, "leaves {seed}: {gain} {middle} {fine}");
@@ -168,7 +169,7 @@ fn colours_are_those_of_the_cells_without_fringes_at_edges() {
     ];
     for (name, scene) in scenes {
         let [to_cells, of_truth, before, after] = colour_quality(name, &scene, 7);
-        // The leaves have strong detail nearly everywhere, which the cell picture lacks.
+        // The leaves have strong detail nearly everywhere, which the cell picture does not show.
         let limit = if name.starts_with("brain") { 2.0 } else { 3.0 };
         assert!(to_cells < limit, "{name}: {to_cells}");
         assert!(to_cells < of_truth, "{name}: {to_cells}, and the truth itself {of_truth}");
@@ -176,7 +177,7 @@ fn colours_are_those_of_the_cells_without_fringes_at_edges() {
     }
 }
 
-/// A mosaic of `width` x `height` whose samples are given by band, column and row.
+/// A mosaic of `width` x `height` samples, each given by `count` from band, column and row.
 fn mosaic(width: usize, height: usize, count: impl Fn(usize, usize, usize) -> f32) -> MosaicFrame {
     let samples = (0..width * height).map(|place| {
         let x = place % width;
@@ -186,7 +187,7 @@ fn mosaic(width: usize, height: usize, count: impl Fn(usize, usize, usize) -> f3
     MosaicFrame::new(width, height, samples.collect()).unwrap()
 }
 
-/// Very unequal bands, as of a deep red surface.
+/// Very unequal bands, like those of a deep red surface.
 fn reflectance(band: usize) -> f32 {
     [0.9, 0.8, 0.95, 1.0, 0.35, 0.3, 0.4, 0.5, 0.2, 0.25, 0.3, 0.3, 0.1, 0.12, 0.15, 0.2][band]
 }
@@ -212,7 +213,7 @@ fn an_even_surface_has_no_pattern_up_to_the_edges() {
 
 #[test]
 fn light_that_changes_from_sample_to_sample_is_kept() {
-    // Stripes of 7 samples, in all bands alike: a cell sees about half of one.
+    // Stripes of 7 samples, the same in all bands. A cell covers about half of one.
     let light = |x: usize| 1.0 + 0.25 * (std::f32::consts::TAU * x as f32 / 7.0).cos();
     let seen = mosaic(160, 80, |band, x, _| 500.0 * reflectance(band) * light(x));
     let mean = (0..BANDS).map(reflectance).sum::<f32>() / 16.0 * 500.0 / 1023.0;
@@ -231,7 +232,7 @@ fn light_that_changes_from_sample_to_sample_is_kept() {
 
 #[test]
 fn highlights_are_white_and_darken_nothing_beside_them() {
-    // Bands that reach white at different counts, so that they saturate at different levels.
+    // Each band reaches white at another count, so the bands saturate at different levels.
     let white: [f32; BANDS] = std::array::from_fn(|band| 500.0 + 30.0 * band as f32);
     let calibration = Calibration { white: Reference::PerBand(white), ..Calibration::default() };
     let inside = |x: usize, y: usize| (x as f32 - 80.3).hypot(y as f32 - 40.8) < 14.0;
@@ -283,7 +284,7 @@ fn references_per_pixel_even_out_the_pixels() {
         let (expected, expected_gray) = developed(&even, size);
         let differences = found.data.iter().zip(&expected.data).map(|(one, other)| f64::from(one.abs_diff(*other)));
         let largest = quantile(differences.collect(), 0.999);
-        // Counts are whole numbers, which the dark bands feel.
+        // Counts are whole numbers, so dark bands have rounding errors.
         assert!(largest <= 6.0, "{size:?}: {largest}");
         assert!(gray.data.iter().zip(&expected_gray.data).all(|(one, other)| (one - other).abs() < 0.5));
     }

@@ -1,12 +1,12 @@
-//! How near a picture comes to the truth: error, amplitude kept, and colour difference.
+//! Measures of a picture against the truth: error, amplitude kept, and colour difference.
 
 use std::f64::consts::PI;
 
 use super::scenes::SIDE;
 
-/// Side of the square in the middle of a scene that spectra are taken of: a power of two.
+/// Side of the square in the middle of a scene of which spectra are computed: a power of two.
 const SQUARE: usize = 256;
-/// Samples beside the edge that are not judged.
+/// Width of the border, in samples, that is not measured.
 const EDGE: usize = 8;
 
 /// Peak signal-to-noise ratio in dB of values from 0 to 1.
@@ -20,8 +20,7 @@ pub fn psnr(found: &[f32], truth: &[f32]) -> f64 {
     -10.0 * (squares.sum::<f64>() / places.len() as f64).log10()
 }
 
-/// The share of the truth's amplitude that `found` has, in phase, at spatial frequencies within
-/// `cycles` (a sample).
+/// The share of the truth's amplitude that `found` has, in phase, at spatial frequencies within `cycles` (per sample).
 pub fn amplitude_kept(found: &[f32], truth: &[f32], cycles: std::ops::Range<f64>) -> f64 {
     let found = spectrum(found);
     let truth = spectrum(truth);
@@ -38,7 +37,7 @@ pub fn amplitude_kept(found: &[f32], truth: &[f32], cycles: std::ops::Range<f64>
     common / whole
 }
 
-/// The Fourier transform of the middle of a picture under a Hann window.
+/// The Fourier transform of the square in the middle of a picture, under a Hann window.
 fn spectrum(picture: &[f32]) -> Vec<[f64; 2]> {
     let first = (SIDE - SQUARE) / 2;
     let value = |i: usize| f64::from(picture[(first + i / SQUARE) * SIDE + first + i % SQUARE]);
@@ -54,7 +53,7 @@ fn spectrum(picture: &[f32]) -> Vec<[f64; 2]> {
     values
 }
 
-/// The discrete Fourier transform of a power of two of values, in place.
+/// The discrete Fourier transform, in place. The number of values must be a power of two.
 fn transform(values: &mut [[f64; 2]]) {
     let count = values.len();
     if count == 1 {
@@ -74,7 +73,7 @@ fn transform(values: &mut [[f64; 2]]) {
     }
 }
 
-/// CIE L*a*b* under D65 of an 8-bit sRGB pixel.
+/// Converts an 8-bit sRGB pixel to CIE L*a*b* under D65.
 pub fn lab(pixel: [u8; 3]) -> [f64; 3] {
     let [red, green, blue] = pixel.map(|value| {
         let encoded = f64::from(value) / 255.0;
@@ -131,7 +130,7 @@ pub fn ciede2000(one: [f64; 3], other: [f64; 3]) -> f64 {
     (by_lightness.powi(2) + by_chroma.powi(2) + by_hue.powi(2) + rotation * by_chroma * by_hue).max(0.0).sqrt()
 }
 
-/// The value that `share` of all values lie below.
+/// The value below which the share `share` of all values lies.
 pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[((values.len() - 1) as f64 * share) as usize]

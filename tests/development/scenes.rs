@@ -1,42 +1,41 @@
-//! Multispectral scenes whose every band is known at every place, and the mosaics that a sensor
-//! would take of them.
+//! Multispectral scenes with every band known at every place, and the mosaics that a sensor would take of them.
 
 use parfocal::imaging::{BANDS, CELL, Calibration, MosaicFrame};
 use parfocal::simulation::phantom::Scene as Brain;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Columns and rows of a scene.
+/// Width and height of a scene, in samples.
 pub const SIDE: usize = 288;
 
-/// Electrons at full scale, and the sensor's read noise in electrons.
+/// Electrons at full scale.
 const FULL_WELL: f32 = 12_800.0;
+/// The sensor's read noise, in electrons.
 const READ_NOISE: f32 = 13.0;
 /// The largest count.
 const FULL_SCALE: f32 = 1023.0;
 
-/// Leaves of a scene, and the ground below them.
+/// Number of leaves of a scene, the ground below them included.
 const LEAVES: usize = 400;
 
 /// Wavelengths at which spectra are sampled, in nm.
 const WAVELENGTHS: std::ops::Range<u32> = 400..701;
 
-/// What each band sees of each place, 0 for black and 1 for white.
+/// The value of each band at each place, 0 for black and 1 for white.
 pub struct Scene {
     pub bands: [Vec<f32>; BANDS],
 }
 
 impl Scene {
-    /// Overlapping coloured leaves, each with a spectrum of its own, a pattern of a second spectrum
-    /// on it, and uneven light over all: sharp edges between colours, and detail down to the
-    /// sample.
+    /// Overlapping coloured leaves under uneven light. Each has its own spectrum and a pattern of a second spectrum. So
+    /// there are sharp edges between colours, and detail down to a sample.
     pub fn leaves(seed: u64) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let spectra = |rng: &mut ChaCha8Rng| (0..LEAVES).map(|_| in_bands(&spectrum(rng))).collect::<Vec<_>>();
         let ground = spectra(rng);
         let pattern = spectra(rng);
 
-        // Twice as fine, for soft edges.
+        // Twice the resolution, for soft edges.
         let fine = 2 * SIDE;
         let labels = leaves(fine, ground.len(), rng);
         let share = noise(&[3.0, 7.0, 19.0], rng);
@@ -60,9 +59,8 @@ impl Scene {
         Self { bands: std::array::from_fn(band) }
     }
 
-    /// The surface of a phantom's brain with two samples on each of its texels, as bright as the
-    /// camera exposes it. Nearer than its camera ever goes, so there is finer detail than it ever
-    /// shows.
+    /// The surface of a phantom's brain with two samples per texel, as bright as the camera exposes it. This is nearer
+    /// than the phantom's camera ever is, so there is finer detail than it ever shows.
     pub fn brain(seed: u64) -> Self {
         const TEXELS: usize = SIDE / 2 + 1;
         let brain = Brain::new(seed);
@@ -84,12 +82,12 @@ impl Scene {
         Self { bands: bands.map(|band| band.iter().map(|value| 0.8 * value / bright).collect()) }
     }
 
-    /// The mean of all bands, of what the sensor can count.
+    /// The mean of all bands, each limited to the sensor's full scale.
     pub fn mean(&self) -> Vec<f32> {
         (0..SIDE * SIDE).map(|place| self.bands.iter().map(|band| band[place].min(1.0)).sum::<f32>() / 16.0).collect()
     }
 
-    /// The mosaic that a 10-bit sensor takes of it, with shot noise and read noise.
+    /// The mosaic that a 10-bit sensor takes of the scene, with shot noise and read noise.
     pub fn mosaic(&self, seed: u64) -> MosaicFrame {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let samples = (0..SIDE * SIDE).map(|place| {
@@ -102,9 +100,8 @@ impl Scene {
         MosaicFrame::new(SIDE, SIDE, samples.collect()).unwrap()
     }
 
-    /// A mosaic in which every sample of a cell has the same place's light for all bands: its
-    /// picture at the size of a cell is this scene's own at that place. `place` is the cell's first
-    /// sample.
+    /// A mosaic in which all samples of a cell show the same place, each in its own band. So its picture at the size of
+    /// cells has the scene's true colour at that place. The place is `x`, `y` samples from the cell's first sample.
     pub fn mosaic_of_places(&self, x: usize, y: usize) -> MosaicFrame {
         let samples = (0..SIDE * SIDE).map(|place| {
             let column = (place % SIDE / CELL * CELL + x).min(SIDE - 1);
@@ -134,7 +131,7 @@ fn spectrum(rng: &mut ChaCha8Rng) -> Vec<f32> {
     WAVELENGTHS.map(at).collect()
 }
 
-/// What each band of the default sensor sees of a spectrum.
+/// The value of each band of the default sensor for a spectrum.
 fn in_bands(spectrum: &[f32]) -> [f32; BANDS] {
     Calibration::default().bands.map(|band| {
         let weight = |nm: u32| (-2.772_589 * ((f64::from(nm) - band.centre_nm) / band.fwhm_nm).powi(2)).exp() as f32;
@@ -143,7 +140,7 @@ fn in_bands(spectrum: &[f32]) -> [f32; BANDS] {
     })
 }
 
-/// Which of `count` leaves lies uppermost at each place of a square.
+/// Index of the uppermost of `count` leaves at each place of a square.
 fn leaves(side: usize, count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let mut labels = vec![count - 1; side * side];
 
@@ -170,8 +167,7 @@ fn leaves(side: usize, count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     labels
 }
 
-/// Smooth noise with bumps of each of `sizes`, the larger ones higher as in nature, of standard
-/// deviation about 1.
+/// Smooth noise with bumps of each of `sizes`, of standard deviation about 1. Larger bumps are higher, as in nature.
 fn noise(sizes: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
     let mut sum = vec![0.0; SIDE * SIDE];
     let squares: f32 = sizes.iter().sum();
@@ -191,7 +187,7 @@ fn noise(sizes: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
     sum
 }
 
-/// A picture through a lens that spreads a point a little: Gaussian, half a sample.
+/// A picture as blurred slightly by a lens: Gaussian of half a sample.
 fn softened(values: &[f32]) -> Vec<f32> {
     const WEIGHTS: [f32; 3] = [0.107, 0.786, 0.107];
     let across: Vec<f32> = (0..values.len()).map(|place| weighted(values, place, place % SIDE, 1, WEIGHTS)).collect();

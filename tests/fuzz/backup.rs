@@ -1,5 +1,5 @@
-//! A backup or a database, which is verified before it is used. An input is a place in the file, four bytes, and what
-//! is written over the file's content there: so the file stays a database, and what its rows say is wrong.
+//! A backup or a database, which is verified before it is used. An input is a place in the file (four bytes) and the
+//! bytes that are written there. So the file stays a database, but the content of its rows is wrong.
 
 use std::fs;
 use std::time::Duration;
@@ -16,10 +16,10 @@ use super::fixture::Trial;
 /// Bytes of the file that a seed holds.
 const PIECE: usize = 64;
 
-/// A verification that takes longer hangs: most take a few milliseconds.
+/// A verification that takes longer counts as hanging. Most take a few milliseconds.
 const LONGEST: Duration = Duration::from_mins(1);
 
-/// A thread's own copy of the database, and what waits for it.
+/// A thread's own copy of the database, and the runtime that verifies it.
 struct Database {
     folder: TempDir,
     whole: Vec<u8>,
@@ -53,7 +53,7 @@ pub fn backup(bytes: &[u8]) {
 pub fn pieces() -> Vec<Vec<u8>> {
     DATABASE.with(|database| {
         let pieces = database.whole.chunks(PIECE).enumerate();
-        // Most of a small database's pages is room for more.
+        // Most of a small database's pages is free space.
         let filled = pieces.filter(|(_, piece)| piece.iter().any(|byte| *byte != 0));
         filled.map(|(number, piece)| [&((number * PIECE) as u32).to_le_bytes(), piece].concat()).collect()
     })

@@ -1,5 +1,5 @@
-//! Parsers that read files and folders: a thread has a folder of its own, in which one file at a time is replaced by
-//! the input. The first byte of an input for a folder of several files says which.
+//! Parsers that read files and folders: each thread has its own folder, in which the input replaces one file at a time.
+//! For a folder of several files, the input's first byte says which.
 
 use std::cell::LazyCell;
 use std::fs;
@@ -24,15 +24,15 @@ use tempfile::TempDir;
 
 use super::ROOT;
 
-/// A folder with files of which one at a time is replaced.
+/// A folder in which one file at a time is replaced.
 pub struct Folder {
     root: TempDir,
-    /// The files below it, in order, and what they hold.
+    /// The files below it, in order, and their contents.
     files: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl Folder {
-    /// A folder as `fill` makes it.
+    /// A folder with the files that `fill` writes.
     pub fn made_by(fill: impl FnOnce(&Path)) -> Self {
         let root = tempfile::tempdir().unwrap();
         fill(root.path());
@@ -42,12 +42,12 @@ impl Folder {
         Self { root, files }
     }
 
-    /// The file that an input replaces whose first byte is `which`.
+    /// The file that is replaced by an input whose first byte is `which`.
     pub fn file(&self, which: u8) -> &Path {
         &self.files[usize::from(which) % self.files.len()].0
     }
 
-    /// Looks at the folder with `input` in the place of one file.
+    /// Calls `look` on the folder while `input` replaces one of its files.
     pub fn with(&self, input: &[u8], look: impl FnOnce(&Path)) {
         let Some((&which, content)) = input.split_first() else { return };
         let (file, before) = &self.files[usize::from(which) % self.files.len()];
@@ -135,7 +135,7 @@ pub fn view_files() -> Vec<Vec<u8>> {
     VIEW.with(|view| view.seeds())
 }
 
-/// The local authority as it is kept, in any state.
+/// The stored local authority, with one of its files replaced.
 pub fn authority(bytes: &[u8]) {
     AUTHORITY.with(|authority| {
         authority.with(bytes, |folder| {
@@ -144,12 +144,12 @@ pub fn authority(bytes: &[u8]) {
     });
 }
 
-/// Its files.
+/// The stored files of a local authority.
 pub fn authorities() -> Vec<Vec<u8>> {
     AUTHORITY.with(|authority| authority.seeds())
 }
 
-/// A certificate and its key, one of them replaced.
+/// A certificate and its key, with one of the two replaced.
 pub fn certificate(bytes: &[u8]) {
     CERTIFICATE.with(|certificate| {
         certificate.with(bytes, |folder| {
@@ -158,7 +158,7 @@ pub fn certificate(bytes: &[u8]) {
     });
 }
 
-/// The two files.
+/// The files of the certificate and of its key.
 pub fn certificates() -> Vec<Vec<u8>> {
     CERTIFICATE.with(|certificate| certificate.seeds())
 }

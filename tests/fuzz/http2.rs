@@ -1,4 +1,4 @@
-//! What a client says in HTTP/2, frame by frame, and the statuses that it is answered with.
+//! A client's HTTP/2 frames, and the statuses of the answers.
 
 // Kinds of frames and their flags (RFC 9113, 6).
 const DATA: u8 = 0;
@@ -11,12 +11,12 @@ const WINDOW_UPDATE: u8 = 8;
 const END_STREAM: u8 = 1;
 const END_HEADERS: u8 = 4;
 
-/// A status of 200 as an answer's head begins with it (RFC 7541, appendix A).
+/// First byte of an answer's head with status 200 (RFC 7541, appendix A).
 pub const STATUS_200: u8 = 0x88;
-/// A status of 500, likewise.
+/// First byte of an answer's head with status 500.
 pub const STATUS_500: u8 = 0x8E;
 
-/// What every connection opens with (RFC 9113, 3.4).
+/// The bytes with which every connection begins (RFC 9113, 3.4).
 pub fn opening() -> Vec<u8> {
     [b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", frame(SETTINGS, 0, 0, b"").as_slice()].concat()
 }
@@ -30,7 +30,7 @@ pub fn request(stream: u32, method: &str, path: &str, key: &str, body: &[u8]) ->
     [frame(HEADERS, END_HEADERS, stream, &head), frame(DATA, END_STREAM, stream, body)].concat()
 }
 
-/// What is no request: a setting, more room for answers, a sign of life, an answer not wanted, a farewell.
+/// Frames that are not requests: `SETTINGS`, `WINDOW_UPDATE`, `PING`, `RST_STREAM` and `GOAWAY`.
 pub fn asides() -> Vec<u8> {
     let frames = [
         frame(SETTINGS, 0, 0, &[0, 4, 0, 0, 255, 255]),
@@ -42,7 +42,7 @@ pub fn asides() -> Vec<u8> {
     frames.concat()
 }
 
-/// What the head of each answer in `frames` begins with, which tells its status where that is a common one.
+/// First byte of the head of each answer in `frames`. It tells the status if that is a common one.
 pub fn statuses(mut frames: &[u8]) -> Vec<Option<u8>> {
     let mut statuses = Vec::new();
     while let Some((&[high, middle, low, kind, _, _, _, _, _], rest)) = frames.split_first_chunk() {
@@ -62,7 +62,7 @@ fn frame(kind: u8, flags: u8, stream: u32, payload: &[u8]) -> Vec<u8> {
     [length, &[kind, flags], &stream.to_be_bytes(), payload].concat()
 }
 
-/// A request's head: each field as a literal that is not remembered (RFC 7541, 6.2.2).
+/// A request's head: each field as a literal without indexing (RFC 7541, 6.2.2).
 fn head(method: &str, path: &str, key: &str) -> Vec<u8> {
     let key = format!("Bearer {key}");
     let fields = [

@@ -1,4 +1,5 @@
-//! What training and evaluation read: weights of a network, recorded scans, focal stacks, and parts of an evaluation.
+//! Files that training and evaluation read: weights of a network, recorded scans, focal stacks, and parts of an
+//! evaluation.
 
 use std::fmt::Write;
 use std::fs;
@@ -17,11 +18,11 @@ use tch::{Device, nn};
 
 use super::folders::Folder;
 
-/// Sides of the pictures, pixels: the least of a scan.
+/// Side of the pictures in pixels: the least for a scan.
 const SIDE: usize = 64;
-/// Pictures of a pose and of a stack: the fewest that a stack has.
+/// Number of pictures of a pose and of a stack: the least for a stack.
 const PICTURES: usize = 5;
-/// Positions of the stack's pictures.
+/// Name of the file with the positions of the stack's pictures.
 const LIST: &str = "positions.csv";
 
 thread_local! {
@@ -45,7 +46,8 @@ pub fn whole_weights() -> Vec<Vec<u8>> {
     vec![weights::save(&network(), "a test").unwrap()]
 }
 
-/// The findings of an evaluation on a part of its scans, as another machine sends them, alone and with the other part.
+/// The results of an evaluation on a part of its scans, as another machine sends them. They are merged alone and with
+/// the other part.
 pub fn shard(bytes: &[u8]) {
     let Ok(shard) = serde_json::from_slice::<Shard>(bytes) else { return };
     let seed = serde_json::from_slice::<Shard>(include_bytes!("../../fuzz/corpus/shard/seed-2-of-2.json")).unwrap();
@@ -104,12 +106,12 @@ pub fn import(bytes: &[u8]) {
     });
 }
 
-/// Those pictures.
+/// The files of such pictures.
 pub fn import_files() -> Vec<Vec<u8>> {
     IMPORTED.with(Folder::seeds)
 }
 
-/// What a training goes on from.
+/// A checkpoint, from which a training resumes.
 pub fn checkpoint(bytes: &[u8]) {
     CHECKPOINT.with(|checkpoint| {
         checkpoint.with(bytes, |folder| {
@@ -124,7 +126,7 @@ pub fn checkpoint(bytes: &[u8]) {
     });
 }
 
-/// A whole one.
+/// The file of an intact checkpoint.
 pub fn checkpoints() -> Vec<Vec<u8>> {
     CHECKPOINT.with(Folder::seeds)
 }
@@ -135,7 +137,7 @@ fn network() -> nn::VarStore {
     store
 }
 
-/// Stripes, the less contrast the farther `focal_power` is from the middle.
+/// Stripes. Their contrast falls with the distance of `focal_power` from the middle.
 fn picture(focal_power: FocalPower) -> GrayImage {
     let contrast = 100.0 * (1.0 - (focal_power.get() - FocalPower::MIDDLE.get()).abs());
     let is_bright = |place: usize| (place / 4).is_multiple_of(2);
@@ -167,7 +169,7 @@ fn make_scan(folder: &Path) {
     recording.store(&Shot { pose: 1, images, patch, optimum: FocalPower::MIDDLE, truth: None }).unwrap();
 }
 
-/// The pictures of one pose, named as `scan import` wants them.
+/// The pictures of one pose, named as `scan import` expects them.
 fn make_pictures(folder: &Path) {
     for power in evenly_spread(PICTURES) {
         save(&picture(power), &folder.join(format!("pose001_f{:.3}.png", power.get())));
@@ -188,7 +190,7 @@ fn save(picture: &GrayImage, path: &Path) {
     image::GrayImage::from_raw(SIDE as u32, SIDE as u32, gray).unwrap().save(path).unwrap();
 }
 
-/// A stack's pictures, and a list that says where each was taken.
+/// A stack's pictures, and a list with the position of each.
 fn make_stack(folder: &Path) {
     let pictures = folder.join("pictures");
     fs::create_dir(&pictures).unwrap();

@@ -1,7 +1,7 @@
-//! Every parser of bytes from outside takes whatever comes: it reads it or refuses it, and never panics.
+//! Every parser of bytes from outside must cope with any input: it reads or refuses it, and never panics.
 //!
-//! The inputs are the seeds of `fuzz/corpus/`, mutated. Each run takes some of them. A million each:
-//! `make fuzz`, or `cargo test --release --test fuzz -- --ignored --nocapture`.
+//! The inputs are the seeds of `fuzz/corpus/`, mutated. An ordinary run of the tests takes some of them. To run a
+//! million each: `make fuzz`, or `cargo test --release --test fuzz -- --ignored --nocapture`.
 //!
 //! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
 
@@ -37,7 +37,7 @@ const MANY: u64 = 1_000_000;
 /// Inputs that one thread makes at a time.
 const PART: u64 = 1000;
 
-/// The seeds of `target`, oldest name first.
+/// The seeds of `target`, in order of their files' names.
 fn seeds(target: &Target) -> Vec<Vec<u8>> {
     let folder = Path::new(ROOT).join("fuzz/corpus").join(target.name);
     let mut files: Vec<_> = fs::read_dir(&folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
@@ -49,8 +49,8 @@ fn seeds(target: &Target) -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Gives `target` the seeds themselves and the mutated inputs of these `numbers`, of which the first is a part's first;
-/// each input that it panics on, first come first.
+/// Gives `target` the seeds themselves and the mutated inputs with these `numbers`. The first number must be the first
+/// of a part. Returns a message for each input on which the target panics, in order.
 fn run(target: &Target, numbers: &Range<u64>) -> Vec<String> {
     let seeds = seeds(target);
     let mut failures: Vec<_> = seeds.iter().filter_map(|seed| failure(target, seed)).collect();
@@ -65,7 +65,7 @@ fn run(target: &Target, numbers: &Range<u64>) -> Vec<String> {
     failures
 }
 
-/// What is wrong where `target` panics on `input`.
+/// A message if `target` panics on `input`.
 fn failure(target: &Target, input: &[u8]) -> Option<String> {
     let panic = catch_unwind(AssertUnwindSafe(|| (target.take)(input))).err()?;
     let words = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
@@ -73,7 +73,7 @@ fn failure(target: &Target, input: &[u8]) -> Option<String> {
 }
 
 fn run_all(numbers: &Range<u64>) {
-    // One target, or all: the name stands in the variable.
+    // The variable names the one target to run. Without it, all run.
     let only = std::env::var("PARFOCAL_FUZZ").ok();
     let mut failures = Vec::new();
     for target in TARGETS.iter().filter(|target| only.as_deref().is_none_or(|only| only == target.name)) {

@@ -7,10 +7,10 @@ use rand_chacha::ChaCha12Rng;
 
 /// Most changes to one seed.
 const MOST_CHANGES: usize = 6;
-/// Longest input, bytes: none grows without end.
+/// Longest input in bytes, so that none grows without end.
 const LONGEST: usize = 64 * 1024;
 
-/// What breaks parsers: limits of numbers, signs, separators, invalid UTF-8, deep nesting.
+/// Tokens that often break parsers: limits of numbers, signs, separators, invalid UTF-8, deep nesting.
 const TOKENS: [&[u8]; 26] = [
     b"0",
     b"-1",
@@ -47,7 +47,7 @@ pub struct Mutator<'a> {
 }
 
 impl<'a> Mutator<'a> {
-    /// The inputs of number `number`.
+    /// A mutator that makes the inputs of number `number`: it seeds the random source.
     pub fn new(number: u64, seeds: &'a [Vec<u8>]) -> Self {
         Self { random: ChaCha12Rng::seed_from_u64(number), seeds }
     }

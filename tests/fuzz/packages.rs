@@ -1,6 +1,6 @@
 //! The exports of a study's sessions, as one site gives them to another: verified and joined by `parfocal study merge`.
-//! One file at a time is replaced, and the checksums of its export are made anew, as somebody would who wants it to be
-//! accepted; without that nothing behind the checksums would ever be read.
+//! One file at a time is replaced, and the checksums of its export are made anew, as a forger would do. Without that,
+//! nothing behind the checksums would ever be read.
 
 use std::cell::LazyCell;
 use std::fs;
@@ -39,8 +39,8 @@ segment_seconds = 60
 voice = true
 "#;
 
-/// What a package has for `study merge` to read: the exports, and what it says of itself. Made once, since a study's end
-/// takes a while.
+/// The parts of a package that `study merge` reads: the exports, and the package's own description. Made once, because
+/// ending a study takes a while.
 static MADE: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let runtime = Builder::new_current_thread().enable_all().build().unwrap();
@@ -72,7 +72,7 @@ pub fn package(bytes: &[u8]) {
         let replaced = package.file(*which);
         package.with(bytes, |folder| {
             let resealed = reseal(replaced);
-            // Either takes as long as all other targets together.
+            // Each input takes only one of the two, because either takes as long as all other targets together.
             if bytes.len().is_multiple_of(2) {
                 assert_eq!(check(folder, None).len(), 3);
             } else {
@@ -85,12 +85,12 @@ pub fn package(bytes: &[u8]) {
     });
 }
 
-/// Its files.
+/// The files of a package.
 pub fn packages() -> Vec<Vec<u8>> {
     PACKAGE.with(|package| package.seeds())
 }
 
-/// What `study merge` does with the package in `folder`.
+/// Joins the package in `folder`, as `study merge` does.
 fn joined(folder: &Path) -> Result<(), parfocal::package::PackageError> {
     let left_out = left_out(folder)?;
     let sources = exports_of(folder)?.iter().map(|export| Source::open(export)).collect::<Result<Vec<_>, _>>()?;
@@ -99,7 +99,7 @@ fn joined(folder: &Path) -> Result<(), parfocal::package::PackageError> {
     Ok(())
 }
 
-/// Writes the checksum of `file` into those of its export: where they stand, and what they were before.
+/// Writes the checksum of `file` into the checksums of its export. Returns the file of those and its previous content.
 fn reseal(file: &Path) -> Option<(std::path::PathBuf, String)> {
     let sums = file.ancestors().skip(1).map(|folder| folder.join(SUMS)).find(|sums| sums.exists())?;
     if sums == file {
@@ -188,7 +188,7 @@ async fn change(trial: &Trial, change: Change) {
     trial.conductor.change_study(Role::Researcher, STUDY.to_owned(), change, signature()).await.unwrap();
 }
 
-/// A session of `participant`, with a comment in words and one aloud.
+/// A session of `participant`, with a written comment and a spoken one.
 async fn session(trial: &mut Trial, participant: &str) {
     let place = StudySite { study: STUDY.to_owned(), site: "leeds".to_owned() };
     let session = trial.conductor.create_in_study(Role::Operator, participant, "pair", place).await.unwrap();

@@ -1,6 +1,7 @@
 //! A whole server, as bytes from the network reach it: requests, messages of the live view, pieces of voice, and what
-//! comes to the port of an encrypted server, before TLS and inside it. Each thread has its own, on a folder of its own,
-//! in a session that asks for voice. It is made anew now and then, so that what earlier inputs changed does not add up.
+//! comes to the port of an encrypted server, before TLS and inside it. Each thread has its own server with its own
+//! folder, in a session that asks for voice. The server is replaced from time to time, so that changes by earlier
+//! inputs do not add up.
 
 use std::cell::{Cell, RefCell};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -36,13 +37,13 @@ use super::trust::Trust;
 /// Inputs that one server takes.
 const LIFE: u32 = 2000;
 
-/// An answer that has not ended by then waits for more of the request, which is then ended.
+/// If an answer has not ended by then, the server waits for more of the request. The request is then ended.
 const PATIENCE: Duration = Duration::from_millis(5);
 
-/// No connection lasts longer once the other end has said that nothing more comes.
+/// Longest that a connection may last after the client has said that nothing more comes.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// The roles' keys, the same in every server, so that seeds are let in.
+/// The roles' keys. They are the same in every server, so that the requests in the seeds are let in.
 const KEYS: &str = include_str!("../../fuzz/corpus/keys/seed.toml");
 const SURGEON: &str = "0123456789abcdef0123456789abcdef";
 const OPERATOR: &str = "123456789abcdef0123456789abcdef0";
@@ -52,23 +53,23 @@ const PROTOCOL: &str = include_str!("../system/browser/spoken.toml");
 
 thread_local! {
     static SERVER: RefCell<Option<Server>> = const { RefCell::new(None) };
-    /// Panics on this thread, those included that the server catches.
+    /// Number of panics on this thread, including those that the server catches.
     static PANICS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// A server, and where it is reached.
+/// A server and its addresses.
 struct Server {
     runtime: Runtime,
-    /// In the clear, every page.
+    /// Address at which every page is served without encryption.
     open: SocketAddr,
-    /// Encrypted; in the clear, what leads there.
+    /// Address of the encrypted pages. Without encryption, it leads to them.
     encrypted: SocketAddr,
-    /// What a client of the encrypted pages trusts; it speaks HTTP/2.
+    /// What a client of the encrypted pages trusts. The client speaks HTTP/2.
     trust: Trust,
     /// Inputs that it has taken.
     taken: u32,
     trial: Trial,
-    /// Ends it when dropped.
+    /// Ends the server when dropped.
     _end: watch::Sender<bool>,
     _folder: TempDir,
 }
@@ -80,7 +81,7 @@ impl Drop for Server {
     }
 }
 
-/// What seeds name: the same in every server.
+/// Identifiers in the seeds. They are the same in every server.
 #[derive(Clone, Copy)]
 struct Names {
     session: SessionId,
@@ -88,12 +89,12 @@ struct Names {
     comment: IdempotencyKey,
 }
 
-/// Bytes to the port of an encrypted server: a handshake, or a request in the clear.
+/// Bytes to the port of an encrypted server: a handshake, or a request without encryption.
 pub fn door(bytes: &[u8]) {
     ask(at_the_door, bytes);
 }
 
-/// Requests that are led to the encrypted pages or refused. A handshake of TLS is in the folder of seeds.
+/// Requests that are redirected to the encrypted pages or refused. The folder of seeds holds a TLS handshake.
 pub fn knocks() -> Vec<Vec<u8>> {
     let requests = [
         "GET / HTTP/1.1\r\nHost: 10.0.0.5:8080\r\n\r\n",
@@ -108,20 +109,20 @@ pub fn knocks() -> Vec<Vec<u8>> {
     requests.map(|request| request.as_bytes().to_vec()).to_vec()
 }
 
-/// What a client says in HTTP/2, inside TLS.
+/// Bytes of a client in HTTP/2, inside TLS.
 pub fn in_http2(bytes: &[u8]) {
     let statuses = http2::statuses(&ask(inside_tls, bytes));
     assert!(!statuses.contains(&Some(http2::STATUS_500)), "the server failed");
 }
 
-/// Requests in HTTP/2, with a body and without, and what else a client says there.
+/// Requests in HTTP/2, with a body and without, and a client's other frames.
 pub fn http2_requests() -> Vec<Vec<u8>> {
     let page = http2::request(1, "GET", "/surgeon", SURGEON, b"");
     let focus = http2::request(3, "POST", "/api/operator/focus", OPERATOR, br#"{"focal_power":0.5}"#);
     [page, focus, http2::asides()].map(|frames| [http2::opening(), frames].concat()).to_vec()
 }
 
-/// Bytes to a server's port in the clear: requests to every page, by everyone.
+/// Bytes to a server's port without encryption: requests to every page, by every role.
 pub fn request(bytes: &[u8]) {
     ask(in_the_clear, bytes);
 }
@@ -205,12 +206,12 @@ pub fn voices() -> Vec<Vec<u8>> {
     ]
 }
 
-/// Messages of a page to the live view, one a line: the line's first byte says of what kind.
+/// Messages of a page to the live view, one a line. The line's first byte says which kind.
 pub fn live(bytes: &[u8]) {
     let mut sent = upgrade();
     for line in bytes.split(|byte| *byte == b'\n') {
         let Some((kind, message)) = line.split_first() else { continue };
-        // Text, binary, ping, pong, and now and then whatever the byte says.
+        // Text, binary, ping or pong. Any other byte is the opcode itself.
         let opcode = match kind {
             b't' => 0x81,
             b'b' => 0x82,
@@ -224,7 +225,7 @@ pub fn live(bytes: &[u8]) {
     ask(in_the_clear, &sent);
 }
 
-/// What pages say.
+/// Messages that pages send to the live view.
 pub fn messages() -> Vec<Vec<u8>> {
     let all = [
         r#"t{"type":"drawn","frame":1}"#,
@@ -245,7 +246,7 @@ fn upgrade() -> Vec<u8> {
     format!("GET /live?role=surgeon HTTP/1.1\r\nHost: localhost\r\n{key}{what}\r\n").into_bytes()
 }
 
-/// A frame of a WebSocket (RFC 6455, 5.2) from a client, whose mask changes nothing.
+/// A frame of a WebSocket (RFC 6455, 5.2) from a client. Its mask changes nothing.
 fn frame(opcode: u8, message: &[u8]) -> Vec<u8> {
     let mut frame = vec![opcode];
     match u16::try_from(message.len()) {
@@ -278,7 +279,7 @@ fn post(key: &str, path: &str, media_type: &str, body: impl AsRef<[u8]>) -> Vec<
     [head.as_bytes(), body].concat()
 }
 
-/// The request that sends a piece of a recording, of three lines.
+/// The request that sends a piece of a recording, made from its three lines.
 fn piece(bytes: &[u8]) -> Vec<u8> {
     let mut lines = bytes.splitn(3, |byte| *byte == b'\n');
     let [address, media_type, sound] = [(); 3].map(|()| lines.next().unwrap_or_default());
@@ -286,14 +287,14 @@ fn piece(bytes: &[u8]) -> Vec<u8> {
     post(SURGEON, &format!("surgeon/voice/{address}"), &media_type, sound)
 }
 
-/// What the seeds name, as every server has it.
+/// The identifiers in the seeds, as every server has them.
 fn names() -> Names {
     let folder = tempfile::tempdir().unwrap();
     runtime().block_on(async { begin(&folder).await.1 })
 }
 
-/// What the server of this thread answers to `bytes`, once `connect` has reached it. Panics where that made anything in
-/// the server panic, or the server says that it failed.
+/// Connects to the server of this thread with `connect`, sends `bytes` and returns the answer. Panics if anything in
+/// the server panicked, or if the server answers that it failed.
 fn ask<S>(connect: impl AsyncFnOnce(&Server) -> S, bytes: &[u8]) -> Vec<u8>
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -304,7 +305,7 @@ where
     let answer = kept.runtime.block_on(async { exchange(connect(&kept).await, bytes).await });
 
     let panics = PANICS.get() - before;
-    // Dropped where the input did harm: the next one meets a new server.
+    // If this fails, the server is dropped, and the next input gets a new one.
     assert!(panics == 0, "the server panicked");
     let failed = b"HTTP/1.1 500";
     assert!(!answer.windows(failed.len()).any(|part| part == failed), "{}", String::from_utf8_lossy(&answer));
@@ -322,7 +323,7 @@ async fn at_the_door(server: &Server) -> TcpStream {
     connection(server.encrypted).await
 }
 
-/// Shakes hands, as a client that will speak HTTP/2.
+/// Makes the TLS handshake, as a client that will speak HTTP/2.
 async fn inside_tls(server: &Server) -> TlsStream<TcpStream> {
     let stream = server.trust.connect(server.encrypted, "127.0.0.1").await.unwrap();
     free_port_at_once(stream.get_ref().0);
@@ -336,16 +337,17 @@ async fn connection(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// A million connections would otherwise use up the ports of this machine, which stay taken for a while.
+/// Frees the connection's port at once. Ports otherwise stay taken for a while, and a million connections would use up
+/// those of this machine.
 fn free_port_at_once(stream: &TcpStream) {
     stream.set_zero_linger().unwrap();
 }
 
-/// Sends `bytes` on a connection of their own, and reads what comes back until its end.
+/// Sends `bytes` on `stream`, and reads the answer until its end.
 async fn exchange(mut stream: impl AsyncRead + AsyncWrite + Unpin, bytes: &[u8]) -> Vec<u8> {
     // A server may end the connection before it has read everything.
     let _ = stream.write_all(bytes).await;
-    // TLS may keep the last of it back until then.
+    // TLS may hold back the last bytes until then.
     let _ = stream.flush().await;
     let mut answer = Vec::new();
     if timeout(PATIENCE, stream.read_to_end(&mut answer)).await.is_err() {
@@ -360,7 +362,7 @@ fn runtime() -> Runtime {
     Builder::new_current_thread().enable_all().build().unwrap()
 }
 
-/// A trial on `folder` in its first setting, of which the surgeon has begun to speak.
+/// A trial in `folder`, in its first setting, about which the surgeon has begun to speak.
 async fn begin(folder: &TempDir) -> (Trial, Names) {
     let protocols = folder.path().join("protocols");
     std::fs::create_dir(&protocols).unwrap();
@@ -392,9 +394,9 @@ fn start() -> Server {
     Server { runtime, open, encrypted, trust, taken: 0, trial, _end: end, _folder: folder }
 }
 
-/// Serves `trial` in the clear and encrypted: where.
+/// Serves `trial` without encryption and with it. Returns the two addresses.
 async fn serve(trial: &Trial, folder: &TempDir, shutdown: &watch::Receiver<bool>) -> [SocketAddr; 2] {
-    // Clients look at certificates by the real time.
+    // Clients check certificates against the real time.
     let now = SystemClock.wall();
     let local = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let certificates = Arc::new(Certificates::local(folder.path(), local, now).unwrap());
@@ -458,7 +460,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
     })
 }
 
-/// Counts panics from now on: the server catches those of its handlers.
+/// Counts panics from now on, because the server catches those of its handlers.
 fn count_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -484,9 +486,9 @@ fn seeds_are_let_in_and_understood() {
     let refused = ["400", "401", "403", "413", "415", "422", "500"];
     for seed in requests() {
         let answer = ask(in_the_clear, &seed);
-        // A page that takes long is not waited for.
+        // A page that takes long has no status yet.
         let status = answer.get(9..12).map(String::from_utf8_lossy).unwrap_or_default();
-        // Only who is signed in plans a study.
+        // Only a person who is signed in may plan a study.
         let is_plan = seed.starts_with(b"POST /api/researcher/studies");
         assert!(is_plan || !refused.contains(&&*status), "{status} to {}", String::from_utf8_lossy(&seed));
     }
@@ -496,7 +498,7 @@ fn seeds_are_let_in_and_understood() {
 fn requests_in_http2_are_let_in_and_understood() {
     let answered = |seed: &Vec<u8>| http2::statuses(&ask(inside_tls, seed)).first().copied().flatten();
     let statuses: Vec<_> = http2_requests().iter().map(answered).collect();
-    // A page, a wish that a session under way does not allow, and no request.
+    // A page, a request that is not allowed during a session, and frames that are not a request.
     assert_eq!(statuses[0], Some(http2::STATUS_200));
     assert!(statuses[1].is_some() && statuses[2].is_none(), "{statuses:?}");
 }

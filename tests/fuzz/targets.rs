@@ -1,4 +1,5 @@
-//! What takes bytes from outside, each as a function of them. The fuzzers of `fuzz/targets/` call the same ones.
+//! Everything that takes bytes from outside, each as a function of those bytes. The fuzzers of `fuzz/targets/` call the
+//! same functions.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -26,13 +27,13 @@ use super::{ROOT, backup, folders, lessons, packages, server};
 pub struct Target {
     /// Its name, and that of its folder of seeds.
     pub name: &'static str,
-    /// Takes an input. Panics where something is wrong.
+    /// Takes an input. Panics if something is wrong.
     pub take: fn(&[u8]),
-    /// Seeds beside those of its folder.
+    /// Seeds in addition to those of its folder.
     pub more_seeds: fn() -> Vec<Vec<u8>>,
 }
 
-/// All of them.
+/// All targets.
 pub static TARGETS: [Target; 30] = [
     Target { name: "authority", take: folders::authority, more_seeds: folders::authorities },
     Target { name: "backup", take: backup::backup, more_seeds: backup::pieces },
@@ -96,8 +97,8 @@ pub fn calibration(bytes: &[u8]) {
     assert!(patch.0.iter().all(|value| (0.0..=255.0).contains(value)), "gray is on its scale");
 }
 
-/// Any bytes from a lens driver's line are a reply, an error or too few; and a reply stays what it is, whatever
-/// follows.
+/// Any bytes from a lens driver's serial line are a reply, an error, or too few to tell. A reply stays the same,
+/// whatever follows.
 pub fn optotune(bytes: &[u8]) {
     let _ = error_reply(bytes);
     for request in REQUESTS {
@@ -111,7 +112,7 @@ pub fn optotune(bytes: &[u8]) {
     }
 }
 
-/// A picture or mosaic from any bytes is read or refused, and its content area looked for.
+/// A picture or mosaic from any bytes is read or refused, and its content area is searched for.
 pub fn picture(bytes: &[u8]) {
     let _ = decode_raw(bytes);
     for mosaic in [false, true] {
@@ -182,7 +183,7 @@ pub fn recipe(bytes: &[u8]) {
     }
 }
 
-/// How a lens was measured to move, from any text.
+/// Measured lens dynamics, from any text.
 pub fn lens_dynamics(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     if let Ok(measured) = MeasuredDynamics::from_toml(text) {
@@ -218,7 +219,7 @@ fn shipped_recipes() -> Vec<Vec<u8>> {
     shipped("policies")
 }
 
-/// The TOML files of a folder that ships.
+/// The TOML files of a folder that is shipped.
 fn shipped(folder: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(ROOT).join(folder);
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -1,5 +1,5 @@
-//! Which file of server/ uses which other one, read from the paths in its source. Tests within the
-//! files are left out: they may use whatever they like.
+//! Which file of server/ uses which other one, read from the paths in its source. Tests within the files are left out:
+//! they may use anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -15,21 +15,21 @@ type Name = Vec<String>;
 /// One file's use of another; both by their path below server/.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Import {
-    /// The file that uses.
+    /// The file that uses the item.
     pub from: String,
-    /// The file that is used.
+    /// The file that defines the item.
     pub to: String,
-    /// What is used, as a path from the crate's root.
+    /// The item that is used, as a path from the crate's root.
     pub item: String,
 }
 
 impl Import {
-    /// The room that uses.
+    /// The room of the file that uses the item.
     pub fn user_room(&self) -> &str {
         room(&self.from)
     }
 
-    /// The room that is used.
+    /// The room of the file that defines the item.
     pub fn used_room(&self) -> &str {
         room(&self.to)
     }
@@ -45,7 +45,7 @@ fn room(file: &str) -> &str {
     file.split('/').next().unwrap_or(file).trim_end_matches(".rs")
 }
 
-/// Names of all rooms: folders and files of server/, but for the crate's own two.
+/// Names of all rooms: folders and files of server/, except `lib.rs` and `main.rs`.
 pub fn rooms(root: &Path) -> BTreeSet<String> {
     let entries = fs::read_dir(root.join("server")).expect("server/ is there");
     let names = entries.map(|entry| entry.expect("server/ can be read").file_name().to_string_lossy().into_owned());
@@ -130,7 +130,7 @@ impl Paths {
         Self { module, brought_in: BTreeMap::new(), used: BTreeSet::new() }
     }
 
-    /// `parts` from the crate's root; `None` for what begins outside the crate.
+    /// The path `parts` from the crate's root; `None` if it begins outside the crate.
     fn absolute(&self, parts: &[String]) -> Option<Name> {
         let supers = parts.iter().take_while(|part| *part == "super").count();
         if supers > 0 {
@@ -141,8 +141,8 @@ impl Paths {
         match parts.first().map(String::as_str) {
             Some("crate") => Some(parts[1..].to_vec()),
             Some("self") => Some([&self.module[..], &parts[1..]].concat()),
-            // A path that begins with one of the module's own children; anything else is no file's
-            // and falls away later.
+            // A path that begins with one of the module's own children; anything else belongs to no file and is dropped
+            // later.
             Some(_) => Some([&self.module[..], parts].concat()),
             None => None,
         }
@@ -210,7 +210,7 @@ struct House<'a> {
 }
 
 impl<'a> House<'a> {
-    /// The file that defines `item`, through any `use`; `None` for what is in no file of server/.
+    /// The file that defines `item`, through any `use`; `None` if it is in no file of server/.
     fn file_of(&self, item: &[String]) -> Option<&'a String> {
         let depth = (1..=item.len()).rev().find(|&depth| self.files.contains_key(&item[..depth]))?;
         let module = &item[..depth];

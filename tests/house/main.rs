@@ -1,6 +1,5 @@
-//! Holds server/ to the floors of ARCHITECTURE.md: a room uses only rooms of lower floors, and no
-//! files of a room use one another in a circle. Reads the source and the document, so that the two
-//! cannot drift apart.
+//! Checks server/ against the floors of ARCHITECTURE.md: a room uses only rooms of lower floors, and no files of a room
+//! use one another in a circle. Reads the source and the document, so that the two cannot drift apart.
 
 mod circles;
 mod document;
@@ -11,7 +10,7 @@ use std::path::Path;
 
 use imports::{Import, SourceTree};
 
-/// Circles that stay, each with the reason why.
+/// Circles that are allowed, each with its reason.
 const ALLOWED_CIRCLES: [(&[&str], &str); 0] = [];
 
 fn root() -> &'static Path {

@@ -27,7 +27,7 @@ fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// A disc on black, 400x300, centre (210, 140), radius 120; a step of 100 gray levels along its column 210.
+/// A disc on black: 400x300 pixels, centre (210, 140), radius 120, with a step of 100 gray levels at column 210.
 fn disc() -> image::GrayImage {
     image::GrayImage::from_fn(400, 300, |x, y| {
         let inside = (f64::from(x) - 210.0).hypot(f64::from(y) - 140.0) < 120.0;
@@ -275,7 +275,7 @@ fn the_content_area_of_real_footage_is_where_others_find_it() {
     let paths: Vec<_> = (1..=4).map(|number| folder.path().join(format!("{number}.png"))).collect();
     let output = inspect(&["--json"], &paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     assert!(output.status.success(), "{}", complaint(&output));
-    // By torch-content-area's classical method.
+    // Values by torch-content-area's classical method.
     let expected = [[627.6, 399.2, 567.6], [615.2, 386.0, 567.4], [615.6, 395.5, 567.2], [614.5, 399.5, 567.2]];
     for (object, expected) in objects(&output).iter().zip(expected) {
         let area = &object["content_area"];

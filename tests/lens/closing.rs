@@ -1,4 +1,4 @@
-//! Whatever ends the driver, the last that the lens is told is to go without current.
+//! However the driver ends, the last command to the lens removes its current.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -15,7 +15,7 @@ use sqlx::{Connection, SqliteConnection};
 
 use super::{emulator, last_command, open, quick, refused, until};
 
-/// Where the lens rests: under control by current, and none.
+/// Mode and current of a lens at rest: control by current, and zero current.
 const AT_REST: (u8, i16) = (1, 0);
 
 /// Opens the lens and sends it to the end of its range.
@@ -28,7 +28,7 @@ fn driven(emulator: &Emulator) -> Box<dyn lens::Lens> {
 
 #[test]
 fn a_reply_that_is_outstanding_does_not_keep_the_lens_under_current() {
-    // Nearly as long as the driver waits, so that its readings find every end with a reply on the way.
+    // Nearly as long as the driver waits, so that a reply is outstanding whenever the lens is closed.
     let emulator = emulator(Model { latency: Duration::from_millis(120), ..Model::default() });
     for round in 0..4 {
         let lens = driven(&emulator);
@@ -73,7 +73,7 @@ fn a_lens_that_is_refused_once_its_driver_answered_is_let_go() {
     assert_eq!(emulator.mode_and_current(), AT_REST);
 }
 
-/// A clock that fails in the lens's thread when it is told to.
+/// A clock that panics once in the lens's thread when the test asks for it.
 #[derive(Default)]
 struct FailingClock(AtomicBool);
 
@@ -106,7 +106,7 @@ fn a_panic_of_the_driver_ends_neither_its_work_nor_its_duty() {
     assert_eq!(emulator.mode_and_current(), AT_REST);
 }
 
-/// `parfocal` with these arguments, on the emulated lens.
+/// Starts `parfocal` with these arguments on the emulated lens.
 fn parfocal(emulator: &Emulator, arguments: &[&str]) -> Child {
     let lens = format!("optotune:{}", emulator.path().display());
     Command::new(env!("CARGO_BIN_EXE_parfocal"))
@@ -145,7 +145,7 @@ fn a_signal_in_the_middle_of_a_command_lets_the_lens_go() {
     }
 }
 
-/// A server on `data`, once it drives the lens.
+/// Starts a server with data folder `data`, and waits until it drives the lens.
 fn server(emulator: &Emulator, data: &std::path::Path) -> Child {
     let mut process = parfocal(emulator, &["serve", "--bind", "127.0.0.1:0", "--data-dir", data.to_str().unwrap()]);
     let mut lines = BufReader::new(process.stdout.as_mut().unwrap()).lines();
@@ -186,7 +186,7 @@ fn after_a_kill_the_next_start_begins_without_current() {
 
 #[test]
 fn a_server_that_fails_with_its_loop_running_lets_the_lens_go() {
-    // The closing dialogue takes a while.
+    // A slow unit, so that the exchange at the end takes a while.
     let emulator = emulator(Model { latency: Duration::from_millis(30), ..Model::default() });
     let data = tempfile::tempdir().unwrap();
     end(server(&emulator, data.path()), Signal::KILL);
@@ -201,7 +201,7 @@ fn a_server_that_fails_with_its_loop_running_lets_the_lens_go() {
     assert_eq!(emulator.orders().last(), Some(&Order::Current(0)));
 }
 
-/// Leaves a session under way that no version can read.
+/// Adds a running session to the database that no version can read.
 fn break_sessions(data: &std::path::Path) {
     let change = "INSERT INTO participants VALUES ('P1', '2026-01-01T00:00:00Z');
         INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml, protocol_sha256,

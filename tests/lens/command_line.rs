@@ -52,7 +52,7 @@ fn the_command_line_fails_with_one_sentence() {
     assert_eq!(errors, "parfocal: the lens does not answer: /dev/null: this is not a serial port\n");
 }
 
-/// `parfocal lens emulate`, with a person at its keyboard.
+/// A running `parfocal lens emulate`, into which the test types commands.
 struct Emulated {
     process: Child,
     port: String,
@@ -77,13 +77,13 @@ impl Emulated {
         Self { process, port: port.trim_end().to_owned(), answers }
     }
 
-    /// What it answers to `line`.
+    /// Types `line` and returns the answer.
     fn types(&mut self, line: &str) -> String {
         writeln!(self.process.stdin.as_ref().unwrap(), "{line}").unwrap();
         self.answers.next().unwrap().unwrap()
     }
 
-    /// Focal power of the glass, which no driver can read.
+    /// The true focal power of the lens, which no driver can read.
     fn glass(&mut self) -> f64 {
         let answer = self.types("glass");
         answer.strip_prefix("glass at ").unwrap().split(',').next().unwrap().parse().unwrap()
@@ -128,18 +128,19 @@ fn an_emulated_driver_can_be_started_from_the_command_line() {
 
 #[test]
 fn its_glass_waits_out_the_delay_settles_and_has_hysteresis() {
-    // At once, but for a hysteresis of 1 of 5 dioptres: up and down stand 0.1 below and above what was asked.
+    // Moves at once, with a hysteresis of 1 of 5 dioptres: on the way up the lens stops 0.1 below the command, on the
+    // way down 0.1 above it.
     let mut quick = Emulated::start(&["--delay", "0", "--settling", "0", "--hysteresis", "1"]);
     for (focal_power, glass) in [("0.5", 0.4), ("1", 0.9), ("0.5", 0.6)] {
         quick.set(focal_power);
         assert!((quick.glass() - glass).abs() < 1e-3, "sent to {focal_power} it stands at {}", quick.glass());
     }
 
-    // Ten seconds of dead time: the command has arrived, and nothing has moved.
+    // Ten seconds of dead time: the command has arrived, but the lens has not moved.
     let mut late = Emulated::start(&["--delay", "10000", "--settling", "0"]);
     late.set("1");
     assert!(late.glass() < 1e-3, "{}", late.glass());
-    // Ten seconds to come within 5 %: on its way, and long not there.
+    // Ten seconds until 5 % of the step remain: the lens is moving and far from its destination.
     let mut slow = Emulated::start(&["--delay", "0", "--settling", "10000", "--hysteresis", "0"]);
     slow.set("1");
     let seen = slow.glass();
@@ -171,7 +172,7 @@ fn its_temperature_faults_and_latency_can_be_chosen_and_changed() {
 
 #[test]
 fn an_emulated_lens_is_measured_through_its_driver() {
-    // Far from the 2 ms and 15 ms that the driver supposes: what is measured is the emulated glass.
+    // Far from the 2 ms and 15 ms that the driver assumes, to show that the emulated lens is measured.
     let lens = "emulated?delay=40&settling=120&hysteresis=0.2";
     let camera = "phantom:still";
     let (success, output, errors) =

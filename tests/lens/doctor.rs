@@ -1,4 +1,4 @@
-//! `parfocal doctor` as whoever sets a machine up uses it.
+//! `parfocal doctor`, as a person uses it who sets up a machine.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::{emulator, quick};
 
-/// Whether it was content, what it found by subject, and its last words.
+/// Runs `parfocal doctor`. Returns whether it succeeded, its findings, and its standard error.
 fn doctor(data: &Path, more: &[&str]) -> (bool, Vec<Value>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     let output = command.args(["doctor", "--json", "--data-dir"]).arg(data).args(more).output().unwrap();
@@ -46,7 +46,7 @@ fn a_lens_without_its_head_and_a_file_for_a_folder_must_be_put_right() {
         doctor(file.path(), &["--lens", &format!("optotune:{}", emulator.path().display())]);
 
     assert!(!content);
-    assert!(errors.contains("put 2 things right before a trial"), "{errors}");
+    assert!(errors.contains("fix 2 things before a trial"), "{errors}");
     assert_eq!(about(&findings, "data folder")["verdict"], "wrong");
     assert_eq!(about(&findings, "lens")["verdict"], "wrong");
 }
@@ -57,7 +57,7 @@ fn a_database_that_is_none_must_be_put_right() {
     std::fs::write(data.path().join("parfocal.db"), "not a database").unwrap();
     let (content, findings, errors) = doctor(data.path(), &[]);
 
-    assert!(!content && errors.contains("put one thing right"), "{errors}");
+    assert!(!content && errors.contains("fix one thing"), "{errors}");
     let database = about(&findings, "database");
     assert_eq!(database["verdict"], "wrong");
     assert!(database["advice"].as_str().unwrap().contains("parfocal restore"), "{database}");
@@ -91,6 +91,6 @@ fn a_calibrations_age_is_told_and_one_that_cannot_be_read_must_be_put_right() {
     );
 
     let (content, findings, errors) = doctor(data.path(), &["--calibration", "/nowhere/at/all.toml"]);
-    assert!(!content && errors.contains("put one thing right"), "{errors}");
+    assert!(!content && errors.contains("fix one thing"), "{errors}");
     assert_eq!(about(&findings, "calibration")["verdict"], "wrong");
 }

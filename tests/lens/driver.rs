@@ -1,4 +1,4 @@
-//! What the driver does while all is well.
+//! The Optotune driver without faults.
 
 use std::time::Duration;
 
@@ -69,7 +69,7 @@ fn a_configured_part_of_the_range_is_kept_to() {
 fn wider_temperature_limits_narrow_the_range_that_the_device_reports() {
     let emulator = emulator(quick());
     let info = open(&emulator, "?low=10&high=50").unwrap().info().unwrap();
-    // The emulated lens gives up 0.02 dpt at each end for each degree beyond a span of 20.
+    // The emulated lens loses 0.02 dpt at each end for each degree beyond a span of 20.
     assert!((info.min_dioptre - 5.4).abs() < 1e-9 && (info.max_dioptre - 9.6).abs() < 1e-9, "{info:?}");
 }
 
@@ -99,7 +99,7 @@ fn the_modelled_glass_follows_the_true_one() {
     let glass = emulator.glass();
     let moments = || (0..200).map(|millis| begun + Duration::from_millis(millis));
     let apart = moments().map(|at| model.focal_power_at(at).distance(glass.focal_power_at(at))).sum::<f64>() / 200.0;
-    // A model that stood still would be 0.3 away on average; a busy machine may delay either side by some milliseconds.
+    // A model that stood still would be 0.3 away on average. A busy machine may delay either side by some milliseconds.
     assert!(apart < 0.15, "{apart} away on average");
     let later = SystemClock.now() + Duration::from_secs(1);
     assert!(model.focal_power_at(later).distance(glass.focal_power_at(later)) < 0.005, "the play of the emulated lens");
@@ -116,9 +116,8 @@ fn on_closing_the_lens_is_left_without_current() {
     assert_eq!(emulator.mode_and_current(), (1, 0));
 }
 
-/// Prints the time from `set` to the emulated driver's end of the wire at 50 commands a second,
-/// with everything else that the driver's thread does going on. A measurement, not a test: `cargo
-/// test --test lens -- --ignored --nocapture`.
+/// Prints the time from `set` to the emulated unit's end of the wire, at 50 commands per second and with all other work
+/// of the driver's thread. A measurement, not a test: `cargo test --test lens -- --ignored --nocapture`.
 #[test]
 #[ignore = "measures"]
 fn measure_set_to_wire() {

@@ -1,4 +1,4 @@
-//! A lens's dynamics, measured with a camera.
+//! The dynamics of a lens, measured with a camera.
 
 use std::process::Command;
 use std::sync::Arc;
@@ -17,10 +17,10 @@ use super::{emulator, open};
 
 const SIDE: usize = 32;
 
-/// Lets a camera wait for its next frame: in real time, or by moving the clock.
+/// Waits for a camera's next frame, in real time or by advancing the clock.
 type Pause = Arc<dyn Fn(Duration) + Send + Sync>;
 
-/// A camera before stripes whose contrast is a Gaussian of the focal power about 0.6; a frame every `period`.
+/// A camera that sees stripes, with a frame every `period`. Their contrast is a Gaussian of the focal power around 0.6.
 struct Stripes {
     clock: Arc<dyn Clock>,
     optics: Arc<dyn Optics>,
@@ -81,10 +81,10 @@ fn a_simulated_lens_is_measured_as_it_was_made() {
         let found = simulated(delay.into(), settling.into(), 1.0, Plan::default()).unwrap();
         let seen_delay = 1000.0 * found.both.delay;
         let seen_settling = 1000.0 * found.both.settling;
-        // To a millisecond, and to a tenth of the settling time; the camera sees a frame every 20 ms.
+        // Within a millisecond, plus a tenth of the settling time, although the camera takes a frame only every 20 ms.
         assert!((seen_delay - f64::from(delay)).abs() < 1.0, "{seen_delay} for {delay}");
         assert!((seen_settling - f64::from(settling)).abs() < 1.0 + 0.1 * f64::from(settling), "{seen_settling}");
-        // The simulated lens has 0.004 of play: its two branches lie 0.008 apart.
+        // The simulated lens has a play of 0.004, so its two branches are 0.008 apart.
         assert!((found.hysteresis - 0.008).abs() < 0.002, "{}", found.hysteresis);
     }
 }
@@ -109,7 +109,7 @@ fn an_emulated_driver_is_measured_as_its_glass_moves() {
     let delay = 1000.0 * found.both.delay;
     let settling = 1000.0 * found.both.settling;
     println!("10 ms and 40 ms were measured as {delay:.1} ms and {settling:.1} ms");
-    // The way over the wire adds to the delay; a busy machine adds some milliseconds to either.
+    // The transfer over the wire adds to the delay. A busy machine adds some milliseconds to both.
     assert!((7.0..25.0).contains(&delay), "{delay}");
     assert!((25.0..60.0).contains(&settling), "{settling}");
 }
@@ -147,7 +147,7 @@ fn the_command_line_measures_and_the_server_takes_what_it_found() {
     assert!(kept.contains("driver = \"simulated\"") && kept.contains("settling_ms"), "{kept}");
     assert!(std::fs::read_to_string(out.join("steps.svg")).unwrap().contains("<polyline"));
 
-    // Of another lens they are refused.
+    // The dynamics of another lens are rejected.
     let other = out.join("other.toml");
     std::fs::write(&other, kept.replace("serial = \"none\"", "serial = \"AREA0042\"")).unwrap();
     let refused = Command::new(env!("CARGO_BIN_EXE_parfocal"))

@@ -1,4 +1,4 @@
-//! What can befall line, driver and lens: noticed, said in words, healed.
+//! Faults of line, driver and lens: each is noticed, reported in words, and recovered from.
 
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
@@ -152,7 +152,7 @@ fn a_port_in_use_is_refused_until_it_is_closed() {
     open(&emulator, "").unwrap();
 }
 
-/// `parfocal lens info` in a process of its own, under another user where `user` says so: what it says.
+/// Runs `parfocal lens info` in another process, as `user` if given, and returns its standard error.
 fn another_process(port: &str, user: Option<u32>) -> std::io::Result<String> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.args(["lens", "info", "--lens", &format!("optotune:{port}")]);
@@ -179,7 +179,8 @@ fn who_may_not_open_the_port_is_told_the_group() {
     let emulator = emulator(quick());
     let port = std::fs::read_link(emulator.path()).unwrap();
     let set = |mode| std::fs::set_permissions(&port, std::fs::Permissions::from_mode(mode)).unwrap();
-    // Root may open everything, so that it takes another user; everyone else is kept out of what they may not read.
+    // Root may open everything, so root needs another user for this test. All others can take their own permission
+    // away.
     let root = rustix::process::geteuid().is_root();
     if root {
         chown(&port, None, Some(DIALOUT)).unwrap();
@@ -192,7 +193,7 @@ fn who_may_not_open_the_port_is_told_the_group() {
         Ok(said) if said.contains("permission denied") => {
             assert!(said.contains(if root { "usermod -aG dialout $USER" } else { "usermod -aG" }), "{said}");
         }
-        // Nobody cannot even reach the program or its libraries here.
+        // Here the user `nobody` cannot even reach the program or its libraries.
         other => println!("skipped: the program cannot be run as another user: {other:?}"),
     }
 }

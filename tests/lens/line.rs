@@ -1,4 +1,4 @@
-//! A line that damages, delays and babbles: what asks is asked again, and every error is counted.
+//! A serial line that damages or delays replies, or adds noise: requests are repeated, and every error is counted.
 
 use std::process::Command;
 
@@ -6,7 +6,7 @@ use parfocal::lens::emulator::{Fault, Glitch};
 
 use super::{emulator, last_command, open, power, quick, until};
 
-/// Replies that opening a lens takes, and a few more.
+/// Number of replies during the opening of a lens, and a few more.
 const OPENING: usize = 16;
 
 #[test]

@@ -35,7 +35,7 @@ fn power(value: f64) -> FocalPower {
     FocalPower::new(value).unwrap()
 }
 
-/// Looks again and again until `condition` holds; how long that took. Fails after ten seconds.
+/// Checks `condition` until it holds, and returns how long that took. Fails after ten seconds.
 fn until(what: &str, mut condition: impl FnMut() -> bool) -> Duration {
     let begun = SystemClock.now();
     while !condition() {

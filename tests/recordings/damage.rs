@@ -1,11 +1,11 @@
-//! Recordings that are cut short, damaged, of another version, or have no room.
+//! Recordings that are cut short, damaged or of another version, and disks without space.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 
 use super::*;
 
-/// Reads, changes and writes a byte.
+/// Flips a bit of the byte at offset `at`.
 fn flip(file: &Path, at: u64) {
     let mut file = OpenOptions::new().read(true).write(true).open(file).unwrap();
     let mut byte = [0];
@@ -114,11 +114,11 @@ fn a_folder_that_exists_and_a_camera_without_mosaics_are_refused() {
     assert!(told.contains("guess") && !out.exists(), "{told}");
 }
 
-/// A disk of its own, in memory; gone when dropped.
+/// A small disk in memory, unmounted when dropped.
 struct SmallDisk(TempDir);
 
 impl SmallDisk {
-    /// A disk of so many megabytes, or (said on standard error) none where this user may not mount one.
+    /// A disk of this many megabytes. `None`, with a message on standard error, if this user may not mount one.
     fn mount(megabytes: u32) -> Option<Self> {
         let folder = TempDir::new().unwrap();
         let size = format!("size={megabytes}m");

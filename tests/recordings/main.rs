@@ -58,7 +58,7 @@ fn info(recording: &Path) -> Value {
     serde_json::from_str(&done(&["recording", "info", text(recording), "--json"])).unwrap()
 }
 
-/// What Python's zarr, xarray and, for a cube, spectral find.
+/// What Python's zarr and xarray find, and for a cube also spectral.
 fn python(arguments: &[&str]) -> Value {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let packages = root.join("target/recordings");
@@ -120,7 +120,7 @@ fn made_up(folder: &TempDir, frames: usize) -> PathBuf {
             optimal: None,
             mosaic: Arc::new(mosaic(frame)),
         });
-        // More frames at once than fit would be lost, as they should.
+        // Wait: if more frames were offered at once than fit, some would be lost, as they should.
         wait_for(|| recorder.progress().frames > frame as u64);
     }
     assert_eq!(recorder.stop().lost, 0);
@@ -245,7 +245,8 @@ fn a_span_becomes_a_video_or_pictures() {
         "csv=p=0",
     ]);
     let output = probe.arg(&video).output().unwrap();
-    // 66 numbered by the camera, at 46 a second: lost ones last as long as the one before.
+    // The camera numbered 66 frames. The video has 45 pictures a second; in place of a lost frame it shows the one
+    // before for longer.
     let fields: Vec<u32> = said(&output).trim().split(',').map(|field| field.parse().unwrap()).collect();
     assert_eq!(fields[..2], [64, 32]);
     assert!((60..=61).contains(&fields[2]), "{fields:?}");

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 
-/// The rows that `policy` writes over `recording`.
+/// The rows that `parfocal recording step` writes for `policy` over `recording`.
 fn stepped(folder: &TempDir, recording: &Path, policy: &str) -> Vec<BTreeMap<String, String>> {
     let out = folder.path().join(format!("{policy}.csv"));
     let printed = done(&["recording", "step", text(recording), "--policy", policy, "--out", text(&out)]);

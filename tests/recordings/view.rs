@@ -1,4 +1,4 @@
-//! Recordings of the view: what they hold, and what is read of one that was cut short or damaged.
+//! Recordings of the view: what they hold, and what can be read of one that was cut short or damaged.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A still that footage can be made of, and a lens that is not there.
+/// A still picture that serves as footage, and an emulated lens.
 fn bench(folder: &TempDir) -> (String, Emulator) {
     let still = folder.path().join("still.png");
     let noise = |x: u32, y: u32| u8::try_from((x * 7919 + y * 104_729 + x * y * 31) % 200).unwrap();

@@ -11,12 +11,12 @@ fn evaluate(more: &[&str]) -> Command {
 fn results_that_cannot_be_written_are_still_printed() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("results");
-    // Something stands where the last file would.
+    // A folder has the name of the last file.
     fs::create_dir_all(out.join("figure.svg")).unwrap();
     let output = evaluate(&["--policies", "fixed", "--out", text(&out)]).output().unwrap();
     assert!(complaint(&output).contains("cannot write the results to"), "{}", complaint(&output));
     assert!(said(&output).contains("| fixed |"), "{}", said(&output));
-    // A folder that cannot be is told before anything is played, so before the footage is missed.
+    // An impossible folder is reported before anything is played, so before the missing footage.
     let file = out.join("results.json");
     let output = evaluate(&["--out", text(&file), "--footage", "/no/such.mp4"]).output().unwrap();
     assert!(complaint(&output).contains("cannot write the results to"), "{}", complaint(&output));
@@ -27,7 +27,7 @@ fn a_full_disk_leaves_no_half_of_a_result() {
     let folder = TempDir::new().unwrap();
     let disk = folder.path().join("disk");
     fs::create_dir(&disk).unwrap();
-    // Four pages: the tables fit, the figure does not. The disk is gone with the namespace that it is mounted in.
+    // Four pages: the tables fit, the figure does not. The disk ends with the namespace in which it is mounted.
     let script = format!(
         "mount -t tmpfs -o size=16k tmpfs {0} || exit 77
          {1} evaluate --count 1 --policies fixed --out {0}/out >/dev/null; echo code $?; ls -A {0}/out",
@@ -72,7 +72,7 @@ fn numbers_of_scans_that_cannot_be_meant_are_wrong_usage() {
 
 #[test]
 fn a_policy_that_cannot_run_is_told_before_anything_is_played() {
-    // The footage would be missed next.
+    // The missing footage would be the next error.
     for (policies, told) in [
         ("fixed,nonsense", "there is no policy 'nonsense'"),
         ("file:no,such.pt", "cannot read no,such.pt"),
@@ -208,7 +208,7 @@ fn shards_put_together_are_one_run_to_the_last_digit() {
     assert!(none.contains("results.json is not a shard"), "{none}");
     let many = complaint(&parfocal(&["evaluate", "--count", "2", "--policies", "fixed", "--shard", "3/3", "--json"]));
     assert!(many.contains("shard 3/3 has no scans: there are only 2"), "{many}");
-    // Usage: a shard must go somewhere, a merge has its scans already.
+    // Wrong usage: a shard needs an output, and a merge already has its scans.
     for wrong in [["--shard", "1/2"].as_slice(), &["--shard", "3/2", "--json"], &["--merge", "a", "--seed", "1"]] {
         assert_eq!(parfocal(&[&["evaluate"], wrong].concat()).status.code(), Some(2), "{wrong:?}");
     }

@@ -1,4 +1,4 @@
-//! A focal stack made into a scan: what is no stack is refused, the scan is one that policies can be evaluated on.
+//! A focal stack is made into a scan. Pictures that are not a stack are refused. Policies can be evaluated on the scan.
 
 use parfocal::imaging::GrayImage;
 use parfocal::simulation::blur::gaussian_blur;
@@ -6,7 +6,8 @@ use parfocal::simulation::texture::texture;
 
 use super::*;
 
-/// Saves 13 pictures of a texture, sharpest in the seventh, 5 pixels of blur over the whole range, but those in `gaps`.
+/// Saves 13 pictures of a texture, without those in `gaps`. The seventh is the sharpest. Blur grows by 5 pixels per
+/// whole range.
 fn stack(folder: &Path, gaps: &[usize]) {
     fs::create_dir_all(folder).unwrap();
     let sharp = texture(8, 200);
@@ -80,9 +81,9 @@ fn policies_are_evaluated_on_a_stack_and_told_how_fast_its_optic_blurs() {
     assert_eq!(told["stacks"][0]["rows"], stacks[0]["rows"], "fixed has no use for it");
 
     for (wrong, expected) in [
-        (["--blur", "measured"].as_slice(), "--blur measured works with --stacks"),
+        (["--blur", "measured"].as_slice(), "--blur measured works only with --stacks"),
         (&["--blur", "0"], "must be from 0.1 to 200 pixels"),
-        (&["--blur", "much"], "'much' is no number of pixels"),
+        (&["--blur", "much"], "'much' is not a number of pixels"),
     ] {
         let output = evaluate(wrong);
         let told = String::from_utf8_lossy(&output.stderr).into_owned();

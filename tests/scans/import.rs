@@ -1,4 +1,4 @@
-//! A folder of pictures imported: checked before anything is written, and kept as it is.
+//! A folder of pictures is imported: checked before anything is written, and kept as it is.
 
 use super::*;
 

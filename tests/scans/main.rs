@@ -37,14 +37,14 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// The one sentence that a failing command ends with.
+/// The one sentence with which a failing command ends.
 fn complaint(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(1), "{}{}", said(output), String::from_utf8_lossy(&output.stderr));
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     error.lines().find(|line| line.starts_with("parfocal: ")).unwrap_or_else(|| panic!("{error}")).to_owned()
 }
 
-/// Arguments that record a scan of the phantom, small.
+/// Arguments that record a small scan of the phantom.
 fn recording(out: &Path, poses: usize) -> Vec<String> {
     let arguments = ["scan", "record", "--camera", "phantom", "--focal-powers", "5", "--seed", "7", "--poses"];
     let rest = [poses.to_string(), "--out".to_owned(), out.display().to_string()];
@@ -142,7 +142,7 @@ fn killed_or_stopped_a_recording_goes_on_to_the_same_scan() {
     until_stored(&out, 1, &mut killed);
     killed.kill().unwrap();
     killed.wait().unwrap();
-    // As if the power had gone while a line was being written, and a pose was being stored.
+    // As if the power had failed while a line was being written and a pose was being stored.
     fs::OpenOptions::new().append(true).open(out.join(POSES)).unwrap().write_all(b"{\"pose\":9").unwrap();
     fs::create_dir_all(out.join(".pose0005.partial")).unwrap();
 
@@ -216,7 +216,7 @@ fn what_is_missing_or_damaged_is_named() {
     assert!(nothing.contains("is not a recorded scan"), "{nothing}");
 }
 
-/// Glass at one focal power.
+/// A lens that stays at one focal power.
 struct At(f64);
 
 impl Optics for At {
@@ -271,7 +271,7 @@ fn a_full_disk_keeps_what_is_whole() {
     let disk = folder.path().join("disk");
     fs::create_dir(&disk).unwrap();
     let program = env!("CARGO_BIN_EXE_parfocal");
-    // A disk of 600 KB holds three poses of 180 KB. It is gone with the namespace that it is mounted in.
+    // A disk of 600 KB holds three poses of 180 KB. The disk ends with the namespace in which it is mounted.
     let script = format!(
         "mount -t tmpfs -o size=600k tmpfs {0} || exit 77
          {1} scan record --poses 6 --focal-powers 5 --seed 7 --out {0}/scan; echo code $?; ls -A {0}/scan

@@ -1,4 +1,4 @@
-//! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package
+//! GigE Vision cameras, tested with Aravis's fake camera, a separate program on the loopback (Debian's package
 //! `aravis-tools`).
 
 use std::process::Command;
@@ -31,7 +31,7 @@ fn refused(options: &str) -> String {
     open(options, 10.0).err().expect("it must not open").to_string()
 }
 
-/// Frames of the next `time`, and how often none came in time.
+/// Collects frames for `time`. Returns them, and how often none came in time.
 fn watch(camera: &mut GigeCamera, time: Duration) -> (Vec<Frame>, usize) {
     let mut frames = Vec::new();
     let mut failures = 0;
@@ -46,7 +46,7 @@ fn watch(camera: &mut GigeCamera, time: Duration) -> (Vec<Frame>, usize) {
     (frames, failures)
 }
 
-/// Lets go of the big picture, as the loop does.
+/// Drops the large picture, as the control loop does.
 fn shrunk(image: &FrameImage) -> FrameImage {
     match image {
         FrameImage::Mosaic(_) => FrameImage::Rgb(Arc::default()),
@@ -71,7 +71,7 @@ fn delivers_whole_mosaics_with_rising_numbers_and_times() {
     let FrameImage::Mosaic(mosaic) = &frame.image else { panic!("a mosaic") };
     assert_eq!((mosaic.width(), mosaic.height()), (2048, 1088));
     assert!(mosaic.samples().iter().all(|&sample| sample < 1024));
-    // The fake camera shows a diagonal ramp: each step right or down is one grey level more.
+    // The fake camera shows a diagonal ramp: one grey level more for each step right or down.
     let differing = mosaic.samples().windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert!(differing > 2048, "{differing}");
 
@@ -213,7 +213,7 @@ async fn the_operator_changes_them_through_the_server() {
     assert!(said.contains("Exposure must be from"), "{said}");
 }
 
-/// `parfocal calibrate` with the fake camera: whether it worked, and what it said.
+/// Runs `parfocal calibrate` with the fake camera. Returns whether it succeeded, and its error output.
 fn calibrate(which: &str, options: &str, out: &std::path::Path) -> (bool, String) {
     let camera = format!("gige:Aravis-Fake-TEST?width=512&height=512{options}");
     let output = Command::new(env!("CARGO_BIN_EXE_parfocal"))
@@ -228,7 +228,7 @@ fn calibrate(which: &str, options: &str, out: &std::path::Path) -> (bool, String
 fn references_are_taken_or_refused() {
     let Some(_fake) = Fake::start(&[]) else { return };
     let folder = tempfile::tempdir().unwrap();
-    // Its diagonal ramp is as dark as the exposure is short, and never even.
+    // The camera's diagonal ramp gets darker with a shorter exposure, and is never even.
     let (taken, said) = calibrate("dark", "&exposure=10000", folder.path());
     assert!(!taken && said.contains("this is not dark"), "{said}");
     let (taken, said) = calibrate("dark", "&exposure=100", folder.path());
@@ -238,7 +238,7 @@ fn references_are_taken_or_refused() {
     assert!(!taken && said.contains("uneven"), "{said}");
 }
 
-/// Streams the paper's size and rate for `time`: under 1 % of the frames may be lost on the way.
+/// Streams the paper's size and rate for `time`; less than 1 % of the frames may be lost.
 fn hardly_a_frame_is_lost_in(time: Duration) {
     let Some(_fake) = Fake::start(&[]) else { return };
     let mut camera = open("?format=Mono16&packet=16000", 25.0).unwrap();
@@ -248,12 +248,12 @@ fn hardly_a_frame_is_lost_in(time: Duration) {
     let lost = camera.health().lost - before;
     println!("{} frames in {time:?}, {lost} lost, {timeouts} timeouts: {}", frames.len(), camera.health().message);
     let due = usize::try_from(25 * time.as_secs()).unwrap();
-    // The fake camera's own pace falls a little short of what it is asked for.
+    // The fake camera's own rate is a little below the requested one.
     assert!(frames.len() * 10 > due * 9, "{} of {due} frames came", frames.len());
     assert!(usize::try_from(lost).unwrap() * 100 < due, "{lost} of {due} frames were lost");
 }
 
-/// `cargo test --features aravis --test system gige:: -- --ignored --nocapture`.
+/// Run with `cargo test --features aravis --test system gige:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute"]
 fn mono16_at_25_fps_loses_hardly_a_frame_in_a_minute() {

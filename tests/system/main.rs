@@ -1,8 +1,6 @@
-//! The whole system from outside: the real server, met over HTTP, encrypted, in browsers, and with a
-//! camera on the wire.
+//! The whole system from outside: the real server over HTTP, encrypted, in browsers, and with a camera on the network.
 //!
-//! These subjects share `support`, and so are one test: `cargo test --test system http::` runs one
-//! of them.
+//! These subjects share `support`, so they are one test binary. `cargo test --test system http::` runs one of them.
 
 mod browser;
 mod endurance;

@@ -1,11 +1,11 @@
-//! Training on the recordings of a bench: what is taken, what is kept for validation, what is refused.
+//! Training on the recordings of a bench: which are accepted, kept for validation, or rejected.
 
 use parfocal::simulation::blur::gaussian_blur;
 use parfocal::simulation::texture::texture;
 
 use super::*;
 
-/// Stores a focal stack of 9 pictures in `folder`, sharpest in the fifth, over a texture of its own.
+/// Stores a focal stack of 9 pictures in `folder`, over a texture drawn from `seed`. The fifth picture is the sharpest.
 fn stack(folder: &Path, seed: u64) {
     std::fs::create_dir_all(folder).unwrap();
     let sharp = texture(seed, 144);
@@ -17,7 +17,7 @@ fn stack(folder: &Path, seed: u64) {
     }
 }
 
-/// Five stacks, named as on the command line.
+/// Makes five stacks and returns their names for the command line.
 fn five_stacks(folder: &Path) -> Vec<String> {
     let names = ["first", "second", "third", "fourth", "fifth"];
     let made = names.iter().zip(1..).map(|(name, seed)| {
@@ -31,7 +31,7 @@ fn on(scans: &[String]) -> Sources {
     Sources { scans: scans.to_vec(), ..Sources::default() }
 }
 
-/// Updates that `mgm-learned` in `run` continues from when it is given `scans`, or why it does not.
+/// Resumes the `mgm-learned` in `run` with `scans`. Returns the number of updates done, or the error.
 fn again(run: &Path, scans: &[String]) -> Result<u64, String> {
     let asked = ResumeRequest { name: "mgm-learned".to_owned(), sources: on(scans), ..ResumeRequest::default() };
     Run::resume(run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())

@@ -1,5 +1,5 @@
-//! Training and evaluation from outside: a short training learns, stopping changes nothing, the
-//! same seed gives the same figures.
+//! Training and evaluation from outside: a short training learns, stopping changes nothing, and the same seed gives the
+//! same figures.
 
 mod bench;
 
@@ -23,7 +23,7 @@ use parfocal::training::run::checkpoint::Checkpoint;
 use parfocal::training::run::resume::ResumeRequest;
 use parfocal::training::run::{Run, Sources};
 
-/// The recipe that ships for `policy`, small.
+/// The recipe that ships as `policy`, made small, with `updates` updates.
 fn small(policy: &str, updates: u64) -> Recipe {
     let mut recipe = Recipe::parse(shipped(policy).unwrap()).unwrap();
     (recipe.pictures, recipe.validate_every, recipe.benchmark) = (6, updates, 2);
@@ -65,7 +65,7 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     assert!(train(begin(&recipe, folder.path()), u64::MAX));
     let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();
     let mae: f64 = curves.trim_end().rsplit(',').next().unwrap().parse().unwrap();
-    // `fixed` has 0.25: the mean distance of a uniformly spread optimum from the middle.
+    // `fixed` has 0.25, the mean distance of a uniformly distributed optimum from the middle.
     assert!(mae < 0.2, "{mae}");
 }
 
@@ -78,7 +78,7 @@ fn what_begins_with_weights_begins_with_what_they_know() {
         Run::begin(recipe.clone(), 7, &Sources::default(), folder.path(), from, tch::Device::Cpu)
     };
 
-    // Another policy's weights are refused, and leave nothing behind.
+    // Another policy's weights are rejected, and no file stays behind.
     assert!(start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot use the weights"));
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
 
@@ -87,7 +87,7 @@ fn what_begins_with_weights_begins_with_what_they_know() {
     run.report().unwrap();
     run.report().unwrap();
 
-    // After a single update: the shipped weights' error, where random ones stand at 0.25.
+    // After one update the error is still that of the shipped weights. Random weights would have 0.25.
     assert!(run.best() < 0.15, "{}", run.best());
 
     let card = std::fs::read_to_string(folder.path().join("MODEL_CARD.md")).unwrap();
@@ -206,7 +206,7 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     std::fs::rename(&other, &first).unwrap();
     assert!(again(&[], None).unwrap_err().contains("has changed;"));
 
-    // The model card that follows says so too.
+    // The model card names the footage too.
     std::fs::rename(&moved, &first).unwrap();
     assert!(train(resume("mgm-learned", &run), u64::MAX));
     assert!(std::fs::read_to_string(run.join("MODEL_CARD.md")).unwrap().contains("on 1 clips of footage"));
@@ -240,11 +240,11 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
 
     let mut process = start(&["--config", config.to_str().unwrap()]);
 
-    // Without a terminal it says how it does at each validation.
+    // Without a terminal, it reports its progress at each validation.
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.starts_with("100 of 1000000 updates: loss ") && line.contains("validation MAE 0.")));
 
-    // Meanwhile nobody else trains there.
+    // Meanwhile no other training may use the folder.
     let second = start(&["--resume"]).wait_with_output().unwrap();
     assert!(String::from_utf8_lossy(&second.stderr).contains("another training is running in"));
 
@@ -298,7 +298,7 @@ fn footage_is_read_as_what_it_is() {
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("damaged or cut short"));
 
-    // Recorders name files by the time.
+    // Recorders name files by the time, so names may contain colons.
     let made = Command::new("ffmpeg")
         .args(["-v", "error", "-f", "lavfi", "-i", "testsrc=s=128x128:r=10", "-frames:v", "10", "-c:v", "ffv1"])
         .arg(folder.path().join("10:30.mkv"))
@@ -330,7 +330,7 @@ fn the_same_seed_gives_the_same_figures_to_the_last_digit() {
 
 #[test]
 fn parfocal_keeps_the_lens_still_while_there_is_nothing_to_see() {
-    // Not by `evaluate --footage`, which refuses footage that shows nothing.
+    // Not with `evaluate --footage`, which rejects footage without detail.
     let glove = GrayImage { width: 128, height: 128, data: vec![90.0; 128 * 128] };
     let scenes = vec![Scene::Flat(Arc::new(Clip::still(glove).unwrap()))];
     let conditions = Conditions::Fitting;
@@ -338,7 +338,7 @@ fn parfocal_keeps_the_lens_still_while_there_is_nothing_to_see() {
     let policies = ["mgm-hill-climber", "parfocal"].map(PolicyName::new);
     let outcomes = evaluate(&Registry::standard(), &policies, &scans, &|_| ()).unwrap();
     let travels = [1, 2].map(|row: usize| outcomes[row].row().travel);
-    // A hill-climber steps at every frame.
+    // A hill-climber moves by a step at every frame.
     assert!((travels[0] - 0.05).abs() < 1e-9 && travels[1] == 0.0, "{travels:?}");
 }
 

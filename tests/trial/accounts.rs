@@ -1,4 +1,4 @@
-//! Personal accounts: made, changed, signed in to, and named beside the records that they make.
+//! Personal accounts: making and changing them, signing in, and the account names beside records.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
@@ -38,7 +38,7 @@ async fn accounts_are_made_and_changed_and_somebody_always_leads() {
 
     for change in [AccountChange::Disable, AccountChange::Role(AccountRole::Monitor)] {
         let refused = accounts.change(&lead.account, &change, None).await.unwrap_err();
-        assert!(refused.to_string().contains("the last account that leads"), "{refused}");
+        assert!(refused.to_string().contains("the last lead who can sign in"), "{refused}");
     }
     trial.account("g.hopper", AccountRole::Lead, "Dr Grace Hopper").await;
     accounts.change(&lead.account, &AccountChange::Role(AccountRole::Monitor), None).await.unwrap();
@@ -122,7 +122,7 @@ async fn whatever_is_wrong_has_the_same_words_and_is_recorded_without_them() {
         ]
     );
 
-    // Neither passphrases nor tokens are anywhere in the database's files.
+    // The database's files contain neither passphrases nor tokens.
     trial.store.close().await;
     for entry in std::fs::read_dir(folder.path()).unwrap() {
         let bytes = std::fs::read(entry.unwrap().path()).unwrap();
@@ -146,7 +146,7 @@ async fn the_production_parameters_hash_and_a_hash_keeps_its_own() {
     assert_eq!(cost, (19 * 1024, 2), "OWASP's first choice for argon2id");
 }
 
-/// A session whose operator and researcher were signed in.
+/// Makes a session with an operator and a researcher who are signed in.
 async fn a_session(trial: &mut Trial) -> parfocal::ids::SessionId {
     let operator = trial.account("operator", AccountRole::Operator, "Nurse Op").await;
     let researcher = trial.account("researcher", AccountRole::Researcher, "Dr Search").await;
@@ -156,7 +156,7 @@ async fn a_session(trial: &mut Trial) -> parfocal::ids::SessionId {
     let session = trial.conductor.create(operator.clone(), PARTICIPANT, "paper").await.unwrap();
     trial.conductor.act(operator.clone(), session, Action::Start).await.unwrap();
     trial.whole_setting().await;
-    // Stops the lens first, and is recorded after that.
+    // An abort stops the lens first, and is recorded after that.
     let abort = Action::Abort { reason: "the light failed".to_owned() };
     trial.conductor.act(operator, session, abort).await.unwrap();
     trial.conductor.recorder(researcher).record(&parfocal::store::Access::PathViewed(session)).await.unwrap();
@@ -194,7 +194,7 @@ async fn records_name_the_account_that_made_them_in_the_log_and_in_exports() {
     assert!(found.contains("actors: actor 1 was changed"), "{found}");
 }
 
-/// What is done to a database, and what the check of the chain has to say.
+/// SQL that tampers with a database, and the text that the chain's check must report.
 const TAMPERED: [(&str, &str); 5] = [
     ("UPDATE actors SET account = 'researcher' WHERE number = 1", "actors: actor 1 was changed"),
     ("DELETE FROM actors WHERE number = 3", "actors: actor 3 is missing"),

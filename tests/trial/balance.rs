@@ -1,4 +1,4 @@
-//! Balanced studies: the sets of sessions that share a seed.
+//! Balanced orders: the sets of sessions that share a seed.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -10,7 +10,7 @@ use parfocal::trial::role::Role;
 
 use crate::fixture::Trial;
 
-/// A folder with the paper's trial in balanced order.
+/// Writes the paper's protocol with balanced order into `folder`.
 fn balanced(folder: &Path) {
     let paper = include_str!("../../trial-protocols/paper.toml");
     let text = paper.replace("name = \"paper\"", "name = \"balanced\"").replace("\"shuffled\"", "\"balanced\"");
@@ -88,7 +88,7 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
     balanced(folder.path());
     let trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
     let left = session_that_is_left(&trial).await.session;
-    // In the place that was given back, and so by the same order.
+    // It takes the place that was freed, and so has the same order.
     let second = trial.begin("balanced").await;
     let unblind = || {
         trial.conductor.act(

@@ -1,5 +1,4 @@
-//! The chain: whatever an owner of the database file or of an export changes, takes away, puts in or puts elsewhere is
-//! found and named.
+//! The chain: every change, removal, insertion and reordering in a database file or an export is found and named.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,7 +19,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use crate::exports::{failed, with_session};
 use crate::fixture::{Trial, a_clock, a_run};
 
-/// A database with a record of every kind, and no server on it.
+/// Makes a database with a record of every kind, which no server has open. Returns the session and the chain's head.
 async fn a_database(folder: &Path) -> (SessionId, Head) {
     let (trial, session) = with_session(folder).await;
     for number in 1..=2 {
@@ -37,7 +36,7 @@ async fn a_database(folder: &Path) -> (SessionId, Head) {
     (session, head)
 }
 
-/// As an owner of the file opens it: nothing keeps it from being changed.
+/// Opens a database as the owner of the file can: without the triggers and constraints that prevent changes.
 async fn opened_by_its_owner(file: &Path) -> SqlitePool {
     let options = SqliteConnectOptions::new().filename(file).foreign_keys(false);
     let pool = SqlitePool::connect_with(options).await.unwrap();
@@ -56,7 +55,7 @@ pub fn said(checks: &[Check], name: &str) -> Result<String, String> {
     }
 }
 
-/// What verification says of a copy of `database` to which `sql` was done.
+/// The verification's result for a copy of `database` on which `sql` was run.
 pub async fn after(database: &Path, sql: &str, head: Option<&Head>) -> Vec<Check> {
     let folder = tempfile::tempdir().unwrap();
     let copy = folder.path().join("copy.db");
@@ -69,7 +68,7 @@ pub async fn after(database: &Path, sql: &str, head: Option<&Head>) -> Vec<Check
     verify_database(&copy, head.cloned()).await.unwrap()
 }
 
-/// What is done to a database, and what verification has to say.
+/// SQL that tampers with a database, and the text that verification must report.
 const TAMPERED: [(&str, &str); 47] = [
     ("UPDATE runs SET camera = 'another'", "runs: run 1 was changed"),
     ("UPDATE runs SET weights = '{}'", "runs: run 1 was changed"),
@@ -117,7 +116,7 @@ const TAMPERED: [(&str, &str); 47] = [
     (
         "UPDATE comments SET number = 100 WHERE number = 2; UPDATE comments SET number = 2 WHERE number = 3;
          UPDATE comments SET number = 3 WHERE number = 100",
-        "stands in another order",
+        "is not in the order in which it was kept",
     ),
     ("UPDATE answers SET value = '1' WHERE number = 1", "answers: answer"),
     ("UPDATE answers SET question = 'other' WHERE number = 1", "answers: answer"),
@@ -166,7 +165,7 @@ async fn whatever_is_changed_in_a_database_is_found_and_named() {
         assert!(wrong.contains(expected), "{sql}: {wrong}");
     }
 
-    // What the chain leaves to the commitment, so that nothing unblinds.
+    // The chain does not cover these fields, so that it cannot unblind anything. The commitment covers them.
     for sql in [
         "UPDATE segments SET policy = 'fixed' WHERE setting = 2",
         "UPDATE sessions SET seed = printf('%064d', 1)",
@@ -184,7 +183,7 @@ async fn a_head_that_was_noted_tells_of_what_was_cut_off_or_written_anew() {
     let (_, head) = a_database(folder.path()).await;
     let database = folder.path().join("parfocal.db");
 
-    // The latest event and its row.
+    // Removes the latest event and its row in the chain.
     let cut = "DELETE FROM events WHERE kind = 'unblinded'; DELETE FROM chain_salts WHERE number = (SELECT max(number) \
                FROM chain); DELETE FROM chain WHERE number = (SELECT max(number) FROM chain)";
     assert_eq!(failed(&after(&database, cut, None).await), [""; 0], "nobody else knows that there was more");
@@ -230,7 +229,7 @@ async fn a_database_of_a_version_without_a_chain_is_adopted_once() {
     trial.store.close().await;
     drop(trial);
 
-    // What is put beside the chain is not adopted at the next start.
+    // A record that was inserted without a row in the chain is not adopted at the next start.
     let pool = crate::storage::raw(folder.path()).await;
     assert_eq!(sqlx::query_scalar::<_, String>(commitment).fetch_one(&pool).await.unwrap(), before);
     sqlx::query("INSERT INTO participants VALUES ('S-99', '2020-01-01T00:00:00Z')").execute(&pool).await.unwrap();
@@ -240,7 +239,7 @@ async fn a_database_of_a_version_without_a_chain_is_adopted_once() {
     assert!(wrong.contains("participant S-99 was inserted"), "{wrong}");
 }
 
-/// What verification says of the export in `out` with `file` changed by `change`.
+/// The verification's result for the export in `out` with `file` changed by `change`. Restores the file.
 fn with_changed(out: &Path, file: &str, change: impl FnOnce(&str) -> String) -> Result<String, String> {
     let path = out.join(file);
     let before = std::fs::read_to_string(&path).unwrap();
@@ -252,7 +251,7 @@ fn with_changed(out: &Path, file: &str, change: impl FnOnce(&str) -> String) -> 
     said(&checks, "chain")
 }
 
-/// A CSV file with the rows that `keep` says, each changed by it.
+/// A CSV file with each row replaced by the result of `keep`, which may change or drop it. Row 0 is the header.
 fn by_rows(text: &str, mut keep: impl FnMut(usize, Vec<String>) -> Option<Vec<String>>) -> String {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -281,11 +280,11 @@ async fn whatever_is_changed_in_an_export_is_found_and_named() {
     let later = Head { number: head.number + 1, ..head };
     assert!(said(&verify(&out, Some(&later)), "chain").unwrap_err().contains("is not in here"));
 
-    // Of the other session there is nothing but hashes.
+    // The export contains nothing but hashes of the other session.
     let chain = std::fs::read_to_string(out.join("chain.csv")).unwrap();
     assert!(!chain.contains(&other.to_string()) && !chain.contains("S-01"));
 
-    // Each table's first row changed in each of its columns that are hashed; then taken away; then put in twice.
+    // Changes the first row of each table in each column that is hashed, and then removes the row.
     for (file, columns) in [
         ("runs.csv", vec!["wall", "version", "camera"]),
         ("sessions.csv", vec!["participant", "practice", "commitment"]),
@@ -323,7 +322,7 @@ async fn whatever_is_changed_in_an_export_is_found_and_named() {
         "{gone:?}"
     );
 
-    // A row of the session made to look like another session's, with its record taken away.
+    // Makes the comments' rows look like rows of another session, which have only a number and hashes.
     let hidden = with_changed(&out, "chain.csv", |text| {
         by_rows(text, |_, mut row| {
             if row[4] == "comment" {
@@ -334,7 +333,7 @@ async fn whatever_is_changed_in_an_export_is_found_and_named() {
     });
     assert!(hidden.as_ref().is_err_and(|said| said.contains("row of session")), "{hidden:?}");
 
-    // The end cut off.
+    // Cuts off the last row.
     let last = chain.lines().count() - 1;
     let cut = with_changed(&out, "chain.csv", |text| by_rows(text, |number, row| (number != last).then_some(row)));
     assert!(cut.is_err(), "{cut:?}");
@@ -397,7 +396,7 @@ async fn a_backup_is_made_while_the_server_writes_and_put_back_when_it_is_gone()
     let refused = restore(&data, &out, clock.clone()).await.unwrap_err();
     assert!(matches!(refused, BackupError::Store(StoreError::InUse { .. })), "{refused}");
 
-    // The server goes on after the backup.
+    // The server continues after the backup.
     trial.whole_session("practice").await;
     let ended = trial.store.reader().head().await.unwrap();
     trial.store.close().await;
@@ -417,11 +416,11 @@ async fn a_backup_is_made_while_the_server_writes_and_put_back_when_it_is_gone()
     trial.store.close().await;
     drop(trial);
 
-    // The other one is of another history by now.
+    // By now, the replaced database has another history.
     let restored = restore(&data, &kept, clock.clone()).await.unwrap();
     assert!(matches!(restored.relation, Relation::Apart { .. }), "{restored:?}");
 
-    // A backup that was changed is refused, and what is there stays.
+    // A changed backup is refused, and the present database stays.
     let pool = opened_by_its_owner(&out).await;
     sqlx::query("UPDATE comments SET text = 'sharper' WHERE number = 2").execute(&pool).await.unwrap();
     pool.close().await;
@@ -442,7 +441,7 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
     let folder = tempfile::tempdir().unwrap();
     a_database(folder.path()).await;
     let file = folder.path().join("parfocal.db");
-    // Without pages that hold nothing, whose damage would harm nobody.
+    // Removes empty pages, because damage to them harms nobody and is not found.
     let pool = crate::storage::raw(folder.path()).await;
     sqlx::query("VACUUM").execute(&pool).await.unwrap();
     pool.close().await;
@@ -464,7 +463,7 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
     }
 }
 
-/// Such a name made the database's driver panic, and verification wait for ever.
+/// A column name that is not valid UTF-8 made the database's driver panic, and verification wait forever.
 #[tokio::test]
 async fn a_column_named_by_what_is_no_text_is_refused_whoever_opens_the_database() {
     let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,7 @@ async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
     let other = record(Role::Operator, Consent { text_version: "1.0".to_owned(), ..consent() }).await.unwrap_err();
     assert!(matches!(&other, ConductError::Invalid(text) if text.contains("requires version '2.1'")), "{other}");
     let future = record(Role::Operator, Consent { given_on: date(2026, 4, 1), ..consent() }).await.unwrap_err();
-    assert!(matches!(&future, ConductError::Invalid(text) if text.contains("yet to come")), "{future}");
+    assert!(matches!(&future, ConductError::Invalid(text) if text.contains("in the future")), "{future}");
     let surgeon = record(Role::Surgeon, consent()).await.unwrap_err();
     assert!(matches!(surgeon, ConductError::Forbidden(_)), "{surgeon}");
 
@@ -43,7 +43,7 @@ async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
     assert_eq!(trial.store.reader().consents(session).await.unwrap().len(), 1, "the same again is the same");
     assert_eq!(trial.operator_view().consent, Some(consent()));
 
-    // It is known after a restart.
+    // The consent is still known after a restart.
     drop(trial);
     let trial = with_instruments(folder.path()).await;
     trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
@@ -88,7 +88,7 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_told_and_the_chain
     let withdrawals = detail.log.iter().filter(|line| line.text.starts_with("Withdrawn: ")).count();
     assert_eq!(withdrawals, 1, "the second time changes nothing");
 
-    // A later session by the same protocol tells of it; one by another protocol does not.
+    // The export of a later session with the same protocol mentions the withdrawal. With another protocol it does not.
     let later = trial.whole_session("paper").await;
     let out = folder.path().join("later");
     export(&trial.recorder(), later, &out, false).await.unwrap();
@@ -141,7 +141,7 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
         "comments, answers in words, a note"
     );
 
-    // Nothing that the surgeon said is in it, while everything that was done to the session is.
+    // The detail contains nothing that the surgeon said, but everything that was done to the session.
     let [before_json, json] = [&before, &after].map(|detail| serde_json::to_string(detail).unwrap());
     assert!(before_json.contains("fine 👍"));
     for text in ["a sharp word", "sharpness", "fine 👍"] {
@@ -156,7 +156,7 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
     let refused = correct(note("another")).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
 
-    // A withdrawal is a participant's: whose it is can be put right.
+    // A withdrawal belongs to a participant, so the participant can still be corrected.
     let back = FieldChange::Participant { old: "S-02".to_owned(), new: PARTICIPANT.to_owned() };
     correct(back).await.unwrap();
 }

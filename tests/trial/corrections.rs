@@ -1,4 +1,4 @@
-//! Corrections: beside the original, in the chain, in exports, and only where they make sense.
+//! Corrections: kept beside the original, in the chain and in exports, and refused if they make no sense.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ async fn correct(trial: &Trial, session: SessionId, change: FieldChange) -> Resu
     trial.conductor.correct(Role::Researcher, session, correction).await
 }
 
-/// The key of the answer that counts to `question`, after setting 1 or at the end.
+/// The answer to `question` that counts, after setting 1 or at the end: its key and its value.
 async fn answer(trial: &Trial, session: SessionId, question: &str) -> (IdempotencyKey, AnswerValue) {
     let detail = trial.conductor.session_detail(session).await.unwrap();
     let line = detail.answers.into_iter().find(|line| line.question == question && line.setting.unwrap_or(1) == 1);
@@ -36,7 +36,7 @@ fn note(record: IdempotencyKey, old: &str, new: &str) -> FieldChange {
     FieldChange::Note { record, old: old.to_owned(), new: new.to_owned() }
 }
 
-/// What of a session is never changed by a correction.
+/// The records of a session that a correction must never change, as text.
 async fn originals(trial: &Trial, session: SessionId) -> String {
     let reader = trial.store.reader();
     let stored = reader.session(session).await.unwrap().unwrap();
@@ -121,10 +121,10 @@ async fn what_makes_no_sense_is_not_corrected() {
     let open = AnswerValue::Points(vec![0, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 
     let conflicts = [
-        (value(sharpness, &AnswerValue::Point(6), AnswerValue::Point(5)), "meanwhile"),
-        (value(sharpness, &seven, seven.clone()), "already"),
-        (value(remarks, &words, AnswerValue::Text("better".to_owned())), "stays as it was written"),
-        (note(sharpness, "an earlier note", "a note"), "meanwhile"),
+        (value(sharpness, &AnswerValue::Point(6), AnswerValue::Point(5)), "in the meantime"),
+        (value(sharpness, &seven, seven.clone()), "is the present one"),
+        (value(remarks, &words, AnswerValue::Text("better".to_owned())), "words are never corrected"),
+        (note(sharpness, "an earlier note", "a note"), "in the meantime"),
     ];
     for (change, said) in conflicts {
         let refused = correct(&trial, session, change).await.unwrap_err();
@@ -134,7 +134,7 @@ async fn what_makes_no_sense_is_not_corrected() {
     let invalid = [
         (participant(PARTICIPANT, "S-99"), "no participant 'S-99'"),
         (value(sharpness, &seven, AnswerValue::Point(8)), "from 1 to 7"),
-        (value(usability, &items, open), "leaves nothing open"),
+        (value(usability, &items, open), "must be complete"),
         (note(sharpness, "", &"x".repeat(20_000)), "16384"),
     ];
     for (change, said) in invalid {

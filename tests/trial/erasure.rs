@@ -1,4 +1,4 @@
-//! Erasure: the words are nowhere in the database's files, while records, hashes and order stay.
+//! Erasure: erased words are nowhere in the database's files, but records, hashes and order stay.
 
 use std::path::{Path, PathBuf};
 
@@ -20,12 +20,12 @@ use crate::exports::{failed, rows};
 use crate::fixture::{PARTICIPANT, Trial};
 use crate::studies;
 
-/// Words that stand nowhere else. Long enough to fill pages of the database, so that SQLite splits them.
+/// Words that occur nowhere else. They are long enough to fill pages of the database, so that SQLite splits them.
 fn words(what: &str) -> String {
     format!("{what} Frau Mustermann, bed twelve; ").repeat(40)
 }
 
-/// The files of `folder` that hold `text` anywhere.
+/// The files in `folder` that contain `text`.
 fn holding(folder: &Path, text: &str) -> Vec<PathBuf> {
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
     let holds = |path: &PathBuf| {
@@ -41,7 +41,7 @@ fn erasure(subject: Erasable, record: IdempotencyKey) -> NewErasure {
     NewErasure { subject, record: record.to_string(), reason: "names a patient".to_owned() }
 }
 
-/// A session that has ended, with comments of which the one that comes back is to be erased.
+/// Makes a session with comments, up to its end. Returns it with the comment to erase.
 async fn session(trial: &mut Trial) -> (SessionId, NewComment) {
     let session = trial.begin("practice").await;
     for number in 0..30 {
@@ -95,10 +95,10 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     for path in [&data, &file] {
         let checks = verify_database(path, None).await.unwrap();
         assert_eq!(failed(&checks), [""; 0], "{checks:?}");
-        assert!(crate::chain::said(&checks, "chain").unwrap().contains("of 3 the words were erased"), "{checks:?}");
+        assert!(crate::chain::said(&checks, "chain").unwrap().contains("3 have erased words"), "{checks:?}");
     }
 
-    // The records stay, each with when and by whom.
+    // The records stay, with their times and authors.
     let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
     let erased: Vec<_> = timeline.comments.iter().filter(|comment| comment.erased.is_some()).collect();
     assert_eq!((timeline.comments.len(), erased.len(), erased[0].key), (61, 1, comment.key));
@@ -118,7 +118,7 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     let expected = ["comment", "correction", "answer"].map(|what| format!("{what}, researcher, names a patient"));
     assert_eq!(told, expected);
 
-    // A tablet that never heard that its comment was kept sends it again, and may forget it.
+    // A tablet that got no confirmation sends its comment again. It gets one, but the words do not come back.
     trial.conductor.comment(comment).await.unwrap();
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
 }
@@ -136,7 +136,7 @@ async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
 
     let all = async |by: Role| trial.conductor.erase_all_words(by, session, "the participant asks".to_owned()).await;
     let refused = all(Role::Researcher).await.unwrap_err();
-    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("only of a withdrawn")), "{refused}");
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("only for a withdrawn")), "{refused}");
     let withdraw = Action::Withdraw { reason: "wants no part in it".to_owned() };
     trial.conductor.act(Role::Researcher, session, withdraw).await.unwrap();
     assert!(matches!(all(Role::Operator).await, Err(ConductError::Forbidden(_))));
@@ -154,7 +154,7 @@ async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
     assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 61, "the records stay");
 
-    // What a tablet still held is kept, and can be erased as well.
+    // A comment that a tablet still held is kept, and can be erased as well.
     let late = NewComment { key: trial.key(), ..comment };
     trial.conductor.comment(late).await.unwrap();
     let detail = trial.conductor.session_detail(session).await.unwrap();
@@ -163,7 +163,7 @@ async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
 }
 
-/// Reasons that name a patient: of an abort, and of an unblinding, which the study's audit trail repeats.
+/// Erases reasons that name a patient: of an abort, and of an unblinding, whose reason the study's audit trail repeats.
 #[tokio::test]
 async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,7 +209,7 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     trial.store.close().await;
     drop(trial);
 
-    // The server's own view of the session comes from the events again.
+    // After a restart, the server rebuilds the session from its events.
     let trial = Trial::start_with(&data, Some(&data), 5).await;
     let checks = verify_database(&data, None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
@@ -243,7 +243,7 @@ async fn what_a_killed_server_did_not_come_to_erase_is_erased_at_the_next_start(
     let mut trial = Trial::start(folder.path()).await;
     let (session, comment) = session(&mut trial).await;
 
-    // Somebody reads the database: its log has to stay.
+    // Somebody is reading the database, so its write-ahead log cannot be removed.
     let reader = Reader::open(folder.path()).await.unwrap();
     let snapshot = reader.snapshot().await.unwrap();
     let unfinished =
@@ -284,7 +284,7 @@ async fn only_words_are_erased_and_only_by_an_erasure() {
     assert!(matches!(&under_way, ConductError::Conflict(text) if text.contains("under way")), "{under_way}");
     trial.store.close().await;
 
-    // Nobody empties a text by mistake.
+    // Texts cannot be emptied by mistake.
     let pool = crate::storage::raw(folder.path()).await;
     for sql in [
         "UPDATE comments SET text = '' WHERE number = 31",
@@ -300,7 +300,7 @@ async fn only_words_are_erased_and_only_by_an_erasure() {
     }
     pool.close().await;
 
-    // An owner of the file who empties one, and says that it was erased, has no row for that.
+    // The owner of the file can empty a text and claim that it was erased, but has no row in the chain for the erasure.
     let emptied = "DELETE FROM chain_salts WHERE number = (
             SELECT number FROM chain WHERE kind = 'comment' AND key = (SELECT key FROM comments WHERE number = 1));
         UPDATE comments SET text = '' WHERE number = 1; DELETE FROM erasures;";

@@ -1,4 +1,4 @@
-//! Exports, read back by other means than those that wrote them, and their verification.
+//! Exports and their verification. The tests read exports with other code than the code that wrote them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
@@ -20,7 +20,7 @@ use sha2::{Digest, Sha256};
 use crate::fixture::Trial;
 use crate::storage::step;
 
-/// A server with one whole session with telemetry.
+/// Starts a server with one complete session that has telemetry.
 pub async fn with_session(folder: &Path) -> (Trial, SessionId) {
     let mut trial = Trial::start(folder).await;
     let session = trial.begin("paper").await;
@@ -53,7 +53,7 @@ fn files(folder: &Path) -> BTreeSet<String> {
     std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
 }
 
-/// Whether `file` differs between two exports, as each is recorded.
+/// Whether `file` differs between two exports of a session, because each export is recorded.
 fn tells_of_the_export(file: &str) -> bool {
     ["SHA256SUMS", "datapackage.json", "accesses.csv", "chain.csv", "session.json"].contains(&file)
 }
@@ -70,7 +70,7 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     let summary = export(&trial.recorder(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
 
-    // What the policies were told of the optic.
+    // The blur rate of the optics that the policies were given.
     assert_eq!(rows(&out, "runs")[0]["blur"], "6.2");
     let comments = rows(&out, "comments");
     assert_eq!(comments.len(), 6);
@@ -85,11 +85,11 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     assert_eq!((telemetry[15]["asked"].as_str(), telemetry[15]["setting"].as_str()), ("0.35", "2"));
     assert_eq!(rows(&out, "segments")[5]["inspected_seconds"], "20.0");
     let kinds: Vec<String> = rows(&out, "events").into_iter().map(|event| event["kind"].clone()).collect();
-    // created, started, three for each of six settings, closing questions done, completed.
+    // Created, started, three for each of six settings, closing questions done, completed.
     assert_eq!(kinds.len(), 2 + 6 * 3 + 2);
     assert_eq!(json(&out, "session.json")["comments"][1]["text"], comments[1]["text"].as_str());
 
-    // The protocol names the policies compared, as it must; nothing else names any.
+    // The protocol must name the compared policies. No other file names any.
     for file in files(&out).iter().filter(|file| *file != "protocol.toml") {
         let text = std::fs::read_to_string(out.join(file)).unwrap();
         for tell in ["mgm", "cnn", "hill-climber", "12.5"] {
@@ -179,7 +179,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     for file in files(&blinded).iter().filter(|file| !tells_of_the_export(file)) {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert!(read(&blinded) == read(&unblinded), "{file}");
-        // The reason for unblinding names a policy, and is the unblinded export's alone.
+        // The reason for unblinding names a policy, so only the unblinded export has it.
         assert!(!String::from_utf8(read(&blinded)).unwrap().contains("CNN"), "{file}");
     }
 
@@ -187,7 +187,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     assert_eq!((steps.len(), steps[0]["metric"].as_str(), steps[0]["policy_micros"].as_str()), (60, "12.5", "17"));
     assert_eq!(json(&unblinded, "allocation.json")["unblinding_reason"], "the study is over; CNN won");
     assert_eq!(rows(&unblinded, "sessions")[0]["unblinded"], "after-end");
-    // Of the two learned policies in the session, by the checksums of what ships.
+    // The weights of the two learned policies in the session, with the checksums of the shipped files.
     let sum = |name: &str| hex::encode(Sha256::digest(std::fs::read(format!("policies/{name}.safetensors")).unwrap()));
     let weights: Vec<_> =
         rows(&unblinded, "weights").into_iter().map(|row| (row["policy"].clone(), row["sha256"].clone())).collect();
@@ -198,7 +198,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
 async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
-    // As the command does it while the server runs.
+    // As the command exports while the server runs.
     let recorder = Recorder::open(data.path(), trial.clock.clone()).await.unwrap();
     let out = data.path().join("a/new/export");
     export(&recorder, session, &out, false).await.unwrap();
@@ -273,7 +273,7 @@ async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
     assert!(json(&out, "datapackage.json")["description"].as_str().unwrap().contains("apostrophe"));
     assert_eq!(failed(&verify(&out, None)), [""; 0]);
 
-    // As earlier versions wrote it: only the checksums tell of it.
+    // Text without the apostrophe, as earlier versions wrote it: only the checksums report it.
     let comments = std::fs::read_to_string(out.join("comments.csv")).unwrap();
     std::fs::write(out.join("comments.csv"), comments.replace("'=1+1", "=1+1")).unwrap();
     assert_eq!(failed(&verify(&out, None)), ["checksums"]);

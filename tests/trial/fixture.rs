@@ -1,5 +1,4 @@
-//! A conductor on a folder of its own, with clocks that stand still until told to move and a control loop that only
-//! listens.
+//! A conductor on a folder of its own, with manual clocks and a fake control loop that only receives commands.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +30,7 @@ pub const PARTICIPANT: &str = "S-01";
 /// The passphrase of every account.
 pub const PASSPHRASE: &str = "four words and a number 7";
 
-/// Cheap to hash: most tests sign in to see something else.
+/// A cheap cost for hashes, because most tests sign in to test something else.
 pub const CHEAP: Cost = Cost { memory_kib: 64, passes: 1 };
 
 /// A server on a folder of its own, without HTTP.
@@ -69,12 +68,12 @@ pub fn known() -> Vec<PolicyName> {
 }
 
 impl Trial {
-    /// A server on `folder`, just started.
+    /// Starts a server on `folder`.
     pub async fn start(folder: &Path) -> Self {
         Self::start_with(folder, None, 7).await
     }
 
-    /// The same with a folder of protocols and a seed.
+    /// Starts a server on `folder` with a folder of protocols and a seed.
     pub async fn start_with(folder: &Path, protocols: Option<&Path>, seed: u64) -> Self {
         let clock = Arc::new(a_clock());
         let store = Store::open(folder, &a_run(&clock)).await.unwrap();
@@ -100,7 +99,7 @@ impl Trial {
         IdempotencyKey(Uuid::from_u64_pair(self.keys.next_u64(), self.keys.next_u64()))
     }
 
-    /// Its personal accounts.
+    /// The server's personal accounts.
     pub fn accounts(&self) -> Accounts {
         Accounts::of_server(&self.store, self.clock.clone(), CHEAP)
     }
@@ -111,7 +110,7 @@ impl Trial {
         self.accounts().add(AccountName::new(name).unwrap(), display, role, passphrase, None).await.unwrap()
     }
 
-    /// As the researcher's page exports.
+    /// The recorder with which the researcher's page exports.
     pub fn recorder(&self) -> Recorder {
         self.conductor.recorder(Role::Researcher)
     }
@@ -124,7 +123,7 @@ impl Trial {
         self.conductor.operator_view().borrow().as_deref().unwrap().clone()
     }
 
-    /// A session by `protocol`, started.
+    /// Makes and starts a session with `protocol`.
     pub async fn begin(&self, protocol: &str) -> SessionId {
         let session = self.conductor.create(Role::Operator, PARTICIPANT, protocol).await.unwrap();
         self.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
@@ -140,7 +139,7 @@ impl Trial {
         self.conductor.tick().await;
     }
 
-    /// A comment as the page would send it now.
+    /// A comment with `text`, as the page would send it now.
     pub fn comment(&mut self, text: &str) -> NewComment {
         let view = self.view();
         NewComment {
@@ -159,7 +158,7 @@ impl Trial {
         self.conductor.comment(comment).await.unwrap();
     }
 
-    /// Answers every question asked now.
+    /// Answers every question that is asked now.
     pub async fn answer_all(&mut self) {
         let view = self.view();
         for question in &view.questions {
@@ -191,7 +190,7 @@ impl Trial {
         self.conductor.answer(answer).await
     }
 
-    /// One setting from its notice to the end of its questions; its segment.
+    /// Runs one setting from its notice to the end of its questions, and returns its segment.
     pub async fn whole_setting(&mut self) -> SegmentId {
         let segment = self.view().segment.unwrap();
         self.surgeon(Action::Acknowledge { segment }).await;
@@ -205,7 +204,7 @@ impl Trial {
         segment
     }
 
-    /// A session by `protocol` from beginning to end.
+    /// Runs a session with `protocol` from beginning to end.
     pub async fn whole_session(&mut self, protocol: &str) -> SessionId {
         let session = self.begin(protocol).await;
         while self.view().phase == Phase::Notice {
@@ -226,13 +225,13 @@ impl Trial {
         self.conductor.act(Role::Researcher, session, action).await.unwrap();
     }
 
-    /// The commands that the control loop got since the last look.
+    /// The commands that the control loop got since the last call.
     pub fn commanded(&mut self) -> Vec<Command> {
         std::iter::from_fn(|| self.commands.try_recv().ok()).collect()
     }
 }
 
-/// A control loop that only listens.
+/// A fake control loop that only receives commands.
 fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
     let status = ControlStatus {
         at: parfocal::clock::Moment::default(),

@@ -1,4 +1,5 @@
-//! Instruments in a session: asked by a protocol, answered in parts, scored in the export and on the researcher's page.
+//! Instruments in a session: asked by a protocol, answered in parts, and scored in the export and on the researcher's
+//! page.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +21,7 @@ use crate::fixture::{PARTICIPANT, Trial, known};
 
 pub const PROTOCOL: &str = include_str!("../system/browser/instruments.toml");
 
-/// A server on `folder` that knows the protocol with every instrument.
+/// Starts a server on `folder` that has the protocol with every instrument.
 pub async fn with_instruments(folder: &Path) -> Trial {
     std::fs::write(folder.join("instruments.toml"), PROTOCOL).unwrap();
     Trial::start_with(folder, Some(folder), 7).await
@@ -35,7 +36,7 @@ pub fn consent() -> Consent {
     }
 }
 
-/// A session with consent, started.
+/// Makes a session, records the consent, and starts it.
 pub async fn begin(trial: &Trial) -> SessionId {
     let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments").await.unwrap();
     trial.conductor.record_consent(Role::Operator, NewConsent { session, consent: consent() }).await.unwrap();
@@ -43,7 +44,7 @@ pub async fn begin(trial: &Trial) -> SessionId {
     session
 }
 
-/// Inspects the setting under way and asks its questions.
+/// Inspects the current setting up to its questions.
 async fn inspect(trial: &mut Trial) {
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
@@ -55,7 +56,7 @@ fn points(points: &[u8]) -> AnswerValue {
     AnswerValue::Points(points.to_vec())
 }
 
-/// The scores of an export by question, setting and measure.
+/// The scores of an export, by question, setting and measure.
 fn scores(out: &Path) -> BTreeMap<(String, String, String), String> {
     let key =
         |row: &BTreeMap<String, String>| (row["question"].clone(), row["setting"].clone(), row["measure"].clone());
@@ -71,7 +72,7 @@ async fn every_instrument_is_answered_and_scored() {
     inspect(&mut trial).await;
     trial.answer("effort", AnswerValue::Point(0)).await.unwrap();
     trial.answer("how-often", AnswerValue::Point(3)).await.unwrap();
-    // One scale after the other, as the page gives them: ratings of 30, 15, 60, 40, 30 and 40.
+    // One scale after the other, as the page sends them: ratings of 30, 15, 60, 40, 30 and 40.
     for (place, gradation) in [(0, 7), (1, 4), (2, 13), (3, 9), (4, 7), (5, 9)] {
         let mut items = [0; 6];
         items[place] = gradation;
@@ -88,7 +89,7 @@ async fn every_instrument_is_answered_and_scored() {
     let refused = trial.conductor.act(Role::Surgeon, session, Action::FinishQuestions { segment }).await.unwrap_err();
     assert!(refused.to_string().contains("still to be answered"), "a scale is open: {refused}");
 
-    // Half-filled it outlives a restart of the server.
+    // A half-filled questionnaire survives a restart of the server.
     drop(trial);
     let mut trial = with_instruments(folder.path()).await;
     trial.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
@@ -163,7 +164,7 @@ async fn what_no_instrument_takes_is_refused_and_said_why() {
     }
 }
 
-/// What parsing says of the protocol with `from` replaced by `to`.
+/// The error from parsing the protocol with `from` replaced by `to`.
 fn fault(from: &str, to: &str) -> String {
     assert!(PROTOCOL.contains(from), "{from}");
     Protocol::parse(&PROTOCOL.replace(from, to), "trial.toml", &known()).unwrap_err().to_string()
@@ -173,13 +174,13 @@ fn fault(from: &str, to: &str) -> String {
 fn a_protocol_with_a_wrong_instrument_is_refused_with_line_and_key() {
     for (from, to, said) in [
         ("ties = true", "ties = 2", "key 'ties'"),
-        ("weighted = true", "ties = true", "key 'ties': questions of this kind do not have it"),
+        ("weighted = true", "ties = true", "key 'ties': this kind of question does not have this key"),
         ("low = \"Not at all\"\n", "", "key 'low': a 'visual-analogue' question needs it"),
         ("kind = \"nasa-tlx\"", "kind = \"nasa-tlx\"\nweighted = true", "key 'weighted'"),
         ("kind = \"nasa-tlx\"", "kind = \"ranking\"", "in [[closing]] only"),
-        ("\"Never\", ", "\"Never\", \"mgm-learned\", ", "surgeons are blind"),
+        ("\"Never\", ", "\"Never\", \"mgm-learned\", ", "surgeons must not know"),
         ("[\"Never\", \"Rarely\", \"Sometimes\", \"Often\", \"Always\"]", "[\"Never\"]", "2 to 9 labels, not 1"),
-        ("kind = \"likert\"", "kind = \"likert\"\npoints = 5", "'labels' says it already"),
+        ("kind = \"likert\"", "kind = \"likert\"\npoints = 5", "not allowed together with 'labels'"),
         ("consent_version = \"2.1\"", "consent_version = \" \"", "key 'consent_version'"),
         ("kind = \"recognition\"", "kind = \"recognise\"", "key 'kind'"),
     ] {

@@ -1,5 +1,4 @@
-//! Answers that arrive late or out of order: which one counts, until when anything does, and what
-//! is told of the others.
+//! Answers that arrive late or out of order: which one counts, until when answers count, and how the others are shown.
 
 use std::path::Path;
 use std::time::Duration;
@@ -25,7 +24,7 @@ const MINUTE: Duration = Duration::from_mins(1);
 const TABLET_A: DeviceId = DeviceId(Uuid::from_u128(0xa));
 const TABLET_B: DeviceId = DeviceId(Uuid::from_u128(0xb));
 
-/// What a page tells of something said on `device` that has waited there for `waited`.
+/// The origin that a page reports for a comment or answer that has waited on `device` for `waited`.
 fn origin(device: DeviceId, sequence: i64, waited: Duration) -> Origin {
     Origin {
         device: Some(device),
@@ -36,7 +35,7 @@ fn origin(device: DeviceId, sequence: i64, waited: Duration) -> Origin {
     }
 }
 
-/// An answer about the sharpness of the setting whose questions are asked now.
+/// An answer to the question about sharpness in the current setting.
 fn sharpness(trial: &mut Trial, point: u8, origin: Origin) -> NewAnswer {
     let view = trial.view();
     let key = trial.key();
@@ -44,7 +43,7 @@ fn sharpness(trial: &mut Trial, point: u8, origin: Origin) -> NewAnswer {
     NewAnswer { key, session: view.session, segment: view.segment, question, value: AnswerValue::Point(point), origin }
 }
 
-/// A session of the paper, at the questions after its first setting.
+/// Runs a session with the paper's protocol up to the questions after its first setting.
 async fn at_questions(folder: &Path) -> (Trial, SessionId) {
     let trial = Trial::start(folder).await;
     let session = trial.begin("paper").await;
@@ -70,7 +69,7 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
     let (mut trial, session) = at_questions(folder.path()).await;
     trial.wait(60 * SECOND).await;
 
-    // "5" is given on tablet B, while tablet A, which has no network, holds a "3" that was given 50 s before.
+    // "5" is given on tablet B. Tablet A has no network, and holds a "3" that was given 50 s before.
     let five = sharpness(&mut trial, 5, origin(TABLET_B, 1, Duration::ZERO));
     trial.conductor.answer(five).await.unwrap();
 
@@ -138,7 +137,7 @@ async fn a_servers_clock_that_was_set_back_while_it_was_down_makes_no_later_answ
     trial.conductor.answer(five).await.unwrap();
     drop(trial);
 
-    // Both its clocks begin again where they were an hour before.
+    // Both clocks of the server begin again where they were an hour before.
     let mut trial = Trial::start(folder.path()).await;
     let two = sharpness(&mut trial, 2, origin(TABLET_A, 1, Duration::ZERO));
     trial.wait(SECOND).await;
@@ -159,7 +158,7 @@ async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arr
     trial.conductor.comment(comments[0].clone()).await.unwrap();
     drop(trial);
 
-    // The server was started anew meanwhile; a session of its own is under way there.
+    // The server was restarted in the meantime, and another session is under way on it.
     let trial = Trial::start(folder.path()).await;
     trial.wait(MINUTE).await;
     trial.conductor.answer(held[1].clone()).await.unwrap();
@@ -220,7 +219,7 @@ async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_cou
 
     unblind(&trial, session, true).await.unwrap();
     trial.conductor.answer(late.clone()).await.unwrap();
-    // The same once the session is off the screens.
+    // The same after the session was closed.
     trial.conductor.dismiss(Role::Operator, session).unwrap();
     late.key = trial.key();
     trial.conductor.answer(late).await.unwrap();
@@ -243,7 +242,7 @@ async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_
     trial.wait(31 * MINUTE).await;
 
     let refused = unblind(&trial, session, false).await.unwrap_err().to_string();
-    assert!(refused.contains("2 surgeon's devices have not said"), "{refused}");
+    assert!(refused.contains("2 surgeon's devices have not reported"), "{refused}");
     trial.conductor.holding(told(TABLET_A, 0)).await.unwrap();
     trial.conductor.holding(told(TABLET_B, 1)).await.unwrap();
     let refused = unblind(&trial, session, false).await.unwrap_err().to_string();
@@ -280,7 +279,7 @@ async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_
 
     let pool = crate::storage::raw(folder.path()).await;
     MIGRATOR.undo(&pool, 4).await.unwrap();
-    // As the version before kept a change of mind, long after the end.
+    // A changed answer long after the end, as the previous version stored it.
     let changed = "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
         SELECT '00000000-0000-4000-8000-000000000001', session, segment, question, '2', run,
             '2026-03-02T09:00:00Z', monotonic_ns

@@ -1,4 +1,4 @@
-//! Who may move the lens beside a session, and when.
+//! Who may move the lens outside sessions, and when.
 
 use parfocal::autofocus::PolicyName;
 use parfocal::conductor::ConductError;

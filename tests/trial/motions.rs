@@ -1,4 +1,4 @@
-//! What telemetry tells of each setting in a few figures, beside the same by hand.
+//! The figures that are computed from the telemetry of each setting, compared with values computed by hand.
 
 use parfocal::store::Motion;
 use parfocal::trial::action::Action;
@@ -8,7 +8,7 @@ use sqlx::SqlitePool;
 use crate::fixture::Trial;
 use crate::storage::raw;
 
-/// A frame of a setting.
+/// A telemetry row of a setting.
 #[derive(Clone, Copy)]
 struct Frame {
     run: i64,
@@ -18,7 +18,7 @@ struct Frame {
     optimal: Option<f64>,
 }
 
-/// Frames 40 ms apart that ask for these focal powers.
+/// Frames at intervals of 40 ms that request these focal powers.
 fn frames(asked: &[f64]) -> Vec<Frame> {
     let frame =
         |(place, asked): (i64, &f64)| Frame { run: 1, millis: 40 * place, asked: *asked, held: None, optimal: None };
@@ -66,14 +66,15 @@ async fn figures_of_a_setting_are_those_by_hand_and_leave_out_pauses_and_restart
     trial.conductor.act(Role::Operator, session, Action::Abort { reason: "enough".to_owned() }).await.unwrap();
     assert_eq!(trial.store.reader().motions(session).await.unwrap(), []);
 
-    // Up by 0.1 twice, a rest, down by 0.1 twice, up by 0.3: two turns in 0.24 s.
+    // Up by 0.1 twice, no movement once, down by 0.1 twice, up by 0.3: two turns in 0.24 s.
     let mut first = frames(&[0.2, 0.3, 0.4, 0.4, 0.3, 0.2, 0.5]);
-    // The optimum is known of three frames: errors 0.05, 0.25 and 0.
+    // The optimum is known for three frames. The errors are 0.05, 0.25 and 0.
     for (place, optimal) in [(0, 0.25), (1, 0.55), (2, 0.4)] {
         first[place].optimal = Some(optimal);
     }
 
-    // Up; a pause of 0.4 s during which the lens is moved; up again. After a restart, from elsewhere, down twice.
+    // Up, then a pause of 0.4 s in which the lens is moved, then up again. After a restart, from another place, down
+    // twice.
     let mut second = frames(&[0.2, 0.3, 0.9, 0.9, 0.4, 0.5, 0.8, 0.7, 0.6]);
     for frame in &mut second[2..4] {
         frame.held = Some("paused");
@@ -84,7 +85,7 @@ async fn figures_of_a_setting_are_those_by_hand_and_leave_out_pauses_and_restart
     for frame in &mut second[6..] {
         frame.run = 2;
     }
-    // The last frame comes after two seconds without any.
+    // The last frame comes after two seconds without a frame.
     second[8].millis += 2000;
 
     let pool = raw(folder.path()).await;
@@ -96,14 +97,15 @@ async fn figures_of_a_setting_are_those_by_hand_and_leave_out_pauses_and_restart
 
     let found = trial.store.reader().motions(session).await.unwrap();
     assert_eq!(found.len(), 2);
-    // What is remembered of a session that is over is the same, whoever asks.
+    // The cached figures of an ended session are the same at each call.
     for _ in 0..2 {
         assert_eq!(trial.store.reader().motions_of_ended(session).await.unwrap(), found);
     }
     let expected =
         Motion { setting: 1, frames: 7, seconds: 0.24, travel: 0.7, turns: 2, known: 3, error: 0.3, in_focus: 2 };
     assert_is(&found[0], expected);
-    // Driven: 0.2 to 0.3, 0.4 to 0.5, 0.8 to 0.7 to 0.6: one turn; 40 ms each but the last, which is a gap.
+    // Movements of the policy: 0.2 to 0.3, 0.4 to 0.5, 0.8 to 0.7 to 0.6. That is one turn. Each takes 40 ms, except
+    // the last, which is a gap.
     let expected =
         Motion { setting: 2, frames: 7, seconds: 0.12, travel: 0.4, turns: 1, known: 0, error: 0.0, in_focus: 0 };
     assert_is(&found[1], expected);

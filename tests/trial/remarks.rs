@@ -1,4 +1,4 @@
-//! What surgeons say: comments and answers, kept once, in whatever state the session is, over restarts and gaps.
+//! Comments and answers of surgeons: each is kept once, in every state of the session, over restarts and network gaps.
 
 use std::time::Duration;
 
@@ -28,11 +28,11 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     trial.clock.advance(Duration::from_secs(40));
     comment.origin.waited_millis = Some(30_000);
     trial.conductor.comment(comment.clone()).await.unwrap();
-    // Sent once more, it has waited longer, and is still the same comment.
+    // When it is sent again, it has waited longer, but is still the same comment.
     comment.origin.waited_millis = Some(31_000);
     trial.conductor.comment(comment.clone()).await.unwrap();
 
-    // Another comment, which names a run that never was.
+    // Another comment, which names a run that does not exist.
     comment.key.0 = uuid::Uuid::from_u128(1);
     comment.run = Some(99);
     trial.conductor.comment(comment).await.unwrap();
@@ -108,7 +108,7 @@ async fn what_is_said_is_kept_whatever_the_state() {
     late.segment = Some(segment);
     trial.conductor.comment(late.clone()).await.unwrap();
 
-    // Even when another session has begun.
+    // Also after another session has begun.
     trial.begin("paper").await;
     late.key = trial.key();
     trial.conductor.comment(late).await.unwrap();
@@ -129,7 +129,7 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
 
     trial.begin("paper").await;
 
-    // The first session is now by a protocol that this version cannot read.
+    // The first session now has a protocol that this version cannot read.
     let pool = crate::storage::raw(folder.path()).await;
     let change = "DROP TRIGGER sessions_no_update; UPDATE sessions SET protocol_toml = 'of another version'";
     sqlx::raw_sql(change).execute(&pool).await.unwrap();
@@ -158,7 +158,7 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
 
     let told = trial.conductor.session_detail(first).await.unwrap_err().to_string();
-    assert!(told.contains(&first.to_string()) && told.contains("go on with the version that made it"), "{told}");
+    assert!(told.contains(&first.to_string()) && told.contains("use the version that made it"), "{told}");
 }
 
 #[tokio::test]
@@ -212,7 +212,7 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
         trial.answer(&sus, item(place, point)).await.unwrap();
     }
 
-    // A tablet that never got the answer sends it again, after all that.
+    // A tablet that got no confirmation sends its answer again, after all the others.
     trial.conductor.answer(answer).await.unwrap();
 
     for question in view.questions.iter().filter(|question| question.id != sus) {

@@ -1,4 +1,4 @@
-//! Sessions through the conductor: their course, what each role sees, what the control loop is told, and restarts.
+//! Sessions in the conductor: their course, the views of each role, the commands to the control loop, and restarts.
 
 use std::collections::BTreeSet;
 use std::task::{Context, Waker};
@@ -54,7 +54,7 @@ async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
         seen += &serde_json::to_string(operator.borrow_and_update().as_deref().unwrap()).unwrap();
     }
 
-    // An emergency unblinding by the researcher changes nothing of that.
+    // An emergency unblinding by the researcher does not change that.
     trial.unblind(session).await;
     seen += &serde_json::to_string(&trial.operator_view()).unwrap();
     seen += &serde_json::to_string(&trial.conductor.sessions(true).await.unwrap()).unwrap();
@@ -101,7 +101,7 @@ async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in
         expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     }
 
-    // After the last setting the lens holds through the closing questions, and is told so again at the end.
+    // After the last setting the lens holds during the closing questions, and gets the same command again at the end.
     expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     assert_eq!(trial.commanded(), expected);
 }
@@ -143,7 +143,7 @@ async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_seco
     assert_eq!((view.session, view.segment, view.phase), (session, Some(segment), Phase::Inspecting));
     assert_eq!((view.paused, view.may_resume, view.setting, view.comments), (true, true, 2, 2));
     assert_eq!(view.remaining_seconds, Some(90.0));
-    // No step of a policy was recorded on this trial: the lens waits where the setting began.
+    // No step of a policy was recorded in this test, so the lens waits where the setting began.
     let start = Some(FocalPower::MIDDLE);
     assert_eq!(trial.commanded(), [Command::Drive { drive: Drive::Hold { at: start }, segment: Some(segment) }]);
     trial.surgeon(Action::Resume).await;
@@ -210,7 +210,7 @@ async fn a_handler_that_is_dropped_midway_leaves_memory_and_disk_the_same() {
     {
         let tap = trial.conductor.act(Role::Surgeon, session, Action::Acknowledge { segment });
         let mut tap = std::pin::pin!(tap);
-        // Polled once, as by a browser that went away at once, then dropped.
+        // Polled once and then dropped, as for a browser that disconnects at once.
         let _ = tap.as_mut().poll(&mut Context::from_waker(Waker::noop()));
     }
 
@@ -232,7 +232,7 @@ async fn a_pause_asked_for_while_the_session_is_being_resumed_is_kept() {
     trial.conductor.act(Role::Operator, session, pause("a question")).await.unwrap();
     trial.commanded();
 
-    // Another program keeps the database, so that the resumption is on its way to the disk for a while.
+    // Another program locks the database, so that the resumption takes a while to reach the disk.
     let database = crate::storage::raw(folder.path()).await;
     let other_program = database.begin_with("BEGIN IMMEDIATE").await.unwrap();
     let conductor = trial.conductor.clone();
@@ -268,7 +268,7 @@ async fn a_stop_that_the_disk_does_not_take_is_done_all_the_same_and_recorded_on
     assert_eq!(trial.commanded(), [Command::Drive { drive: Drive::Hold { at: None }, segment: None }]);
     assert!(trial.view().unrecorded && trial.view().phase == Phase::Questions);
     assert!(trial.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
-    // Nothing is said to be done that is not on the disk, but for what stops.
+    // Only stops are reported as done before they are on disk.
     let answer = trial.answer("sharpness", parfocal::trial::question::AnswerValue::Point(4)).await;
     assert!(matches!(answer, Err(ConductError::Storage(_))), "{answer:?}");
     let finish = Action::FinishQuestions { segment: Some(segment) };

@@ -1,4 +1,4 @@
-//! The store on a real file: migrations, locks, full disks, rows that cannot be changed, telemetry.
+//! The store on a real file: migrations, locks, full disks, rows that cannot be changed, and telemetry.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
@@ -106,7 +106,7 @@ async fn on_a_full_disk_nothing_is_acknowledged_and_nothing_is_lost() {
     let session = trial.begin("paper").await;
     trial.say("there was room").await;
     trial.store.limit_pages(1).await.unwrap();
-    // The file's free pages take some more.
+    // The file's free pages have space for a few more.
     let mut kept = 1;
     let (comment, refused) = loop {
         let comment = trial.comment(&"no room ".repeat(1000));
@@ -136,7 +136,7 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
         }
     }
 
-    // REPLACE removes what it puts itself in the place of, by any of the columns that must be unique.
+    // REPLACE removes the row that it replaces, found by any of the unique columns.
     let mut connection = pool.acquire().await.unwrap();
     for (table, forged) in [
         ("sessions", "seed"),

@@ -1,5 +1,5 @@
-//! Voice: pieces of recordings are kept once, whenever and in whatever order they arrive; what is changed in them is
-//! found; they are exported, erased, and kept no longer than the protocol says.
+//! Voice: each piece of a recording is kept once, whenever and in whatever order the pieces arrive. Changes in them are
+//! found. They are exported, erased, and kept no longer than the protocol says.
 
 use std::path::Path;
 use std::time::Duration;
@@ -27,13 +27,13 @@ const PROTOCOL: &str = include_str!("../system/browser/spoken.toml");
 
 const DAY: Duration = Duration::from_hours(24);
 
-/// A server on `folder` that knows a protocol that asks for voice.
+/// Starts a server on `folder` with a protocol that asks for voice.
 async fn start(folder: &Path) -> Trial {
     std::fs::write(folder.join("spoken.toml"), PROTOCOL).unwrap();
     Trial::start_with(folder, Some(folder), 7).await
 }
 
-/// The surgeon begins to speak: the comment's key.
+/// Lets the surgeon begin to speak, and returns the comment's key.
 async fn begin_to_speak(trial: &mut Trial) -> IdempotencyKey {
     let mut comment = trial.comment("");
     comment.said = Said::Voice;
@@ -41,7 +41,7 @@ async fn begin_to_speak(trial: &mut Trial) -> IdempotencyKey {
     comment.key
 }
 
-/// A piece of a recording whose bytes differ from those of every other.
+/// Piece `number` of a recording. Its bytes differ from those of every other piece.
 fn piece(session: SessionId, comment: IdempotencyKey, number: u32) -> NewPiece {
     NewPiece {
         comment,
@@ -58,7 +58,7 @@ fn sound(number: u32) -> Vec<u8> {
     format!("Frau Mustermann, piece {number};").repeat(100).into_bytes()
 }
 
-/// A recording of three pieces, with its end.
+/// Sends a recording of three pieces and the empty piece that ends it.
 async fn speak(trial: &mut Trial) -> IdempotencyKey {
     let session = trial.view().session;
     let comment = begin_to_speak(trial).await;
@@ -162,7 +162,7 @@ async fn what_is_no_piece_of_this_recording_is_refused_and_changes_nothing() {
     }
     assert_eq!(kept_pieces(&trial, session, comment).await, [1]);
 
-    // A recording has an end, however small its pieces are.
+    // The size of a recording is limited, even if each piece is small enough.
     let whole = u32::try_from(LARGEST_RECORDING / LARGEST_PIECE).unwrap();
     let full = |number| NewPiece { audio: vec![7; LARGEST_PIECE], ..piece(session, comment, number) };
     for number in 2..=whole {
@@ -172,7 +172,7 @@ async fn what_is_no_piece_of_this_recording_is_refused_and_changes_nothing() {
     assert!(matches!(&refused, ConductError::Invalid(text) if text.contains("begin another one")), "{refused}");
 }
 
-/// A database with a recording in a session that has ended, and no server on it.
+/// Makes a database with a recording in an ended session, which no server has open.
 async fn a_database(folder: &Path) {
     let mut trial = start(folder).await;
     let session = trial.begin("spoken").await;
@@ -219,7 +219,7 @@ async fn a_piece_that_was_changed_lost_or_inserted_is_found_in_the_database() {
     let wrong = said(&after(&database, &claimed, None).await, "chain").unwrap_err();
     assert!(wrong.contains("erasure"), "an erasure has a row of its own: {wrong}");
 
-    // What nobody does by mistake.
+    // Recordings cannot be changed or removed by mistake.
     let pool = raw(folder.path()).await;
     for sql in [
         "UPDATE voice_pieces SET audio = NULL",
@@ -274,7 +274,7 @@ async fn an_export_has_each_recording_as_a_file_and_a_changed_one_is_found() {
     let head = format!("{}:{}", chain["number"], chain["hash"].as_str().unwrap());
     assert_eq!(again["head"], head.as_str(), "another program computes the same chain: {again}");
 
-    // Whoever changes a file and its checksum is found by the chain's hashes.
+    // A forger who changes a file and its checksum is found by the hashes in the chain.
     let forged = |name: &str, bytes: &[u8]| {
         let before = std::fs::read(out.join(name)).ok();
         let sums = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
@@ -323,7 +323,7 @@ async fn an_erased_recording_is_nowhere_in_the_files_and_its_hashes_stay() {
     assert_eq!(holds(&data), 0);
     assert!(matches!(trial.conductor.voice_audio(session, comment).await, Err(ConductError::NotFound(_))));
 
-    // A tablet sends a piece again, and one that it still held: neither brings the sound back.
+    // A tablet sends one piece again, and one that it still held. Neither brings the sound back.
     trial.conductor.voice_piece(piece(session, comment, 2)).await.unwrap();
     trial.conductor.voice_piece(piece(session, comment, 5)).await.unwrap();
     assert_eq!(holds(&data), 0);

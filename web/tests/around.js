@@ -1,6 +1,6 @@
-// What the tests give the pages' logic in place of a browser.
+// Replacements for parts of the browser and the server, with which the tests run the pages' logic.
 
-/** What the surgeon is told in the middle of a setting. @type {Api.SurgeonView} */
+/** The surgeon's view in the middle of a setting. @type {Api.SurgeonView} */
 export const VIEW = {
   session: "s",
   phase: "inspecting",
@@ -22,7 +22,7 @@ export const VIEW = {
 };
 
 /**
- * A browser's storage; `full` makes every write fail.
+ * A browser's storage. `full` makes every write fail.
  *
  * @returns {import("../static/shared/storage.js").Store & { full: boolean, kept: Map<string, string> }}
  */
@@ -43,7 +43,7 @@ export function fakeStore() {
 }
 
 /**
- * What a device has on its disk; `full` makes every write fail.
+ * A device's disk. `full` makes every write fail.
  *
  * @template {{ id: string }} Thing
  */
@@ -82,14 +82,14 @@ export class FakeTime {
     };
   };
 
-  /** In how many milliseconds the next timer runs out; null where none is set. */
+  /** Milliseconds until the next timer runs out; null if none is set. */
   get nextIn() {
     const times = this.#timers.map(({ at }) => at - this.pageMillis);
     return times.length === 0 ? null : Math.min(...times);
   }
 
   /**
-   * Time goes by, and timers run out.
+   * Lets time pass, and runs the timers that run out.
    *
    * @param {number} ms
    */
@@ -103,12 +103,12 @@ export class FakeTime {
   }
 }
 
-/** Lets everything happen that waits for nothing but its turn. */
+/** Waits until all promises that are ready to continue have done so. */
 export function settle() {
   return new Promise((resolve) => setImmediate(resolve));
 }
 
-/** Identifiers that differ: `id-1`, `id-2`. */
+/** Generates distinct identifiers: `id-1`, `id-2`, and so on. */
 export function countedIds() {
   let count = 0;
   return () => {
@@ -117,11 +117,11 @@ export function countedIds() {
   };
 }
 
-/** A server whose answers a test gives by hand, or that takes everything. */
+/** A server whose answers a test sets. Without answers it accepts everything. */
 export class FakeServer {
   /** @type {{ path: string, body: any }[]} */
   got = [];
-  /** What it throws, in turn; null takes what was sent. @type {(Error | null)[]} */
+  /** The answers, in order: an error to throw, or null to accept what was sent. @type {(Error | null)[]} */
   answers = [];
 
   send = async (/** @type {string} */ path, /** @type {any} */ body) => {

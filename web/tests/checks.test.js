@@ -1,4 +1,4 @@
-// What the operator reads about whether everything is ready.
+// The texts that tell the operator whether everything is ready.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -36,7 +36,7 @@ test("the summary says whether a trial can run", () => {
   assert.equal(summary([finding("well"), finding("advice")]), "A trial can run. 1 thing to look at.");
   assert.equal(
     summary([finding("wrong"), finding("wrong"), finding("advice")]),
-    "2 things to put right before a trial.",
+    "2 things to fix before a trial.",
   );
   assert.equal(passed(1), "1 check passed");
   assert.equal(passed(9), "9 checks passed");

@@ -26,7 +26,7 @@ test("an answer is read as it is written, by what its question takes", () => {
 test("a surgeon's words cannot be corrected, and what was corrected is corrected further", () => {
   const line = { question: "q", text: "Sharp?", setting: 2, value: 3, corrected: 5 };
   const said = { ...line, value: "fine" };
-  // @ts-expect-error only what the list looks at
+  // @ts-expect-error only the fields that the list uses
   assert.deepEqual(correctable([line, said]), [line]);
   assert.equal(soFar(line), 5);
   assert.equal(soFar({ value: 3 }), 3);
@@ -36,13 +36,13 @@ test("a surgeon's words cannot be corrected, and what was corrected is corrected
 
 test("an erased comment says when it was erased", () => {
   const comment = { kind: "text", text: "", erased: "2026-03-01T09:00:00Z" };
-  // @ts-expect-error only what the words are made of
+  // @ts-expect-error only the fields that the text uses
   assert.equal(commentWords(comment), "Erased on 2026-03-01");
 });
 
 /** A session as the operator sees it, ready to start. @param {object} more @returns {Api.OperatorView} */
 function ready(more) {
-  // @ts-expect-error only what the words are made of
+  // @ts-expect-error only the fields that the text uses
   return { phase: "ready", paused: false, setting: 0, withdrawn: false, ...more };
 }
 

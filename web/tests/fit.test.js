@@ -12,7 +12,7 @@ const WHOLE = { x: 0, y: 0, width: 512, height: 272 };
 const jumping = () => new Fit({ glides: false });
 
 /**
- * What is shown after each of `count` pictures, 20 ms apart.
+ * The part shown after each of `count` pictures, 20 ms apart.
  *
  * @param {Fit} fit
  * @param {(index: number) => Stream.Circle | null} circle

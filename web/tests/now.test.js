@@ -16,7 +16,7 @@ const PHASES = /** @type {const} */ ([
   "aborted",
 ]);
 
-/** A minute past two, wherever the test runs. */
+/** 14:01 local time, in whatever time zone the test runs. */
 const HEARD_AT = new Date(2026, 0, 5, 14, 1).getTime();
 
 const SURGEON = {
@@ -53,7 +53,7 @@ test("each phase has a line of its own, which fits on a tablet’s screen", () =
   const surgeon = PHASES.map((phase) => surgeonWords({ ...SURGEON, view: { ...VIEW, phase } }));
   const operator = PHASES.map((phase) => operatorWords({ ...OPERATOR, view: operatorView({ phase }) }));
 
-  // However a session has ended, there is the same to do.
+  // Two of the phases share a line: what to do is the same after every end of a session.
   assert.equal(new Set(surgeon).size, PHASES.length - 1);
   assert.equal(new Set(operator).size, PHASES.length - 1);
   for (const line of surgeon) assert.ok(line.length > 0 && line.length <= 85, line);
@@ -74,7 +74,7 @@ test("a tablet that holds something is not given back", () => {
 
 test("a server that is not heard is told with the time since when", () => {
   const lost = { ...SURGEON, missed: true };
-  assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. You can go on commenting/);
+  assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. You can continue to comment/);
   assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
   assert.match(surgeonWords({ ...lost, heardAt: null, view: null }), /^The server cannot be reached\./);
   assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);
@@ -97,7 +97,7 @@ test("a certificate that has ended is told as the reason, and only while the ser
   assert.match(operatorWords({ ...OPERATOR, ...refused, view: null }), /since 14:01.*certificate has ended/);
   assert.doesNotMatch(surgeonWords({ ...SURGEON, refused: true, view: VIEW }), /certificate/);
 
-  // The server has another by now.
+  // The server has a new certificate now.
   contact.certifiedUntil(new Date(time.wall() + 60_000).toISOString());
   assert.equal(contact.isCertificateOver, false);
 });

@@ -92,7 +92,7 @@ test("a store that is full or holds something else gives no last view", () => {
   assert.equal(storageAdvice(fakeStore()), "");
 });
 
-/** A browser that gives locks, and takes them back whenever the page is hidden. */
+/** A browser that gives screen locks, and ends them whenever the page is hidden. */
 function screen() {
   const around = { visible: true, willing: true, given: 0, released: 0, changes: 0 };
   /** @type {(() => void)[]} */
@@ -166,7 +166,7 @@ const ORIGIN = "https://theatre.local";
 /** @param {string | Request} what */
 const pathOf = (what) => new URL(typeof what === "string" ? what : what.url, ORIGIN).pathname;
 
-/** The caches of one browser, in which each worker that it runs finds what the one before kept. */
+/** The caches of one browser. Each worker finds in them what the worker before it kept. */
 function fakeCaches() {
   /** @type {Map<string, Map<string, Response>>} */
   const all = new Map();
@@ -194,7 +194,7 @@ function fakeCaches() {
   };
 }
 
-/** What the network answers; a test changes it. */
+/** The network's answer. Tests replace it. */
 const network = {
   /** @type {(what: string | Request) => Promise<Response>} */
   fetch: () => Promise.reject(new TypeError("Failed to fetch")),
@@ -211,7 +211,7 @@ const server = (version) => async (/** @type {string | Request} */ what) => {
 };
 
 /**
- * A worker of `version`, with the files that the server tells it.
+ * A worker of `version`, with the list of files that the server gives it.
  *
  * @param {string} version
  * @param {ReturnType<typeof fakeCaches>} caches
@@ -241,7 +241,7 @@ function worker(version, caches) {
     await done;
   };
 
-  /** What a page gets; null where the worker leaves it to the browser. */
+  /** The answer that a page gets; null if the worker leaves the request to the browser. */
   const get = async (/** @type {string} */ path, { mode = "navigate", method = "GET" } = {}) => {
     /** @type {Promise<Response> | null} */
     let answer = null;
@@ -317,7 +317,7 @@ test("a newer server replaces everything at once, and a page never gets files of
   network.fetch = server("one");
   await one.start();
 
-  // The older worker sees the newer server's page first: it must not keep it beside the older files.
+  // The older worker sees the newer server's page first. It must not keep that page beside the older files.
   network.fetch = server("two");
   assert.equal(await one.get("/surgeon"), "page of two");
   network.fetch = down;

@@ -94,7 +94,7 @@ test("what a tablet forgot when it lost its power is sent from the spare copy, i
   first.add("/comments", { session: "s", text: "two" });
   await settle();
 
-  // Only what was said some seconds before had come to the disk.
+  // Only what was said some seconds earlier had reached the disk.
   const forgotten = page.store.names("parfocal.outbox.").sort().at(-1) ?? "";
   page.store.kept.delete(forgotten);
   const later = openPage(page.store, page.time, page.newId, page.spare);
@@ -289,7 +289,7 @@ test("each entry tells its place among all that the device said, and how long ag
   page.server.answers = [noNetwork(), noNetwork()];
   outbox.add("/comments", { session: "s", text: "one" });
   await page.time.pass(200);
-  // Somebody sets the clock: the wait is not measured by it.
+  // Somebody sets the wall clock. The wait is not measured by it.
   page.time.wallMillis += 3_600_000;
   outbox.add("/comments", { session: "s", text: "two" });
   await settle();

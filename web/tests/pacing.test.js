@@ -6,7 +6,7 @@ import { Reconnection } from "../static/shared/reconnection.js";
 import { settle } from "./around.js";
 
 /**
- * A frame's message as the server makes it, byte by byte.
+ * A frame message as the server builds it, byte by byte.
  *
  * @param {string} header
  * @param {number[]} jpeg
@@ -18,7 +18,7 @@ function message(header, jpeg) {
 
 const FRAME = message('{"frame": 7}', [0xff, 0xd8, 1, 2]);
 
-/** Notes what happens, in order. */
+/** A page that notes each call, in order. */
 function notingPage() {
   /** @type {string[]} */
   const notes = [];

@@ -1,4 +1,4 @@
-// Playing a recording: which frame is on screen when, how playback moves, and how its pictures come.
+// Playing a recording: which frame is on screen at a time, how playback moves, and how its pictures are loaded.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -28,7 +28,7 @@ const recording = (name, from, count, ms = 100) => ({
 const always = () => true;
 
 test("a frame is on screen from its exposure to the next, and nothing where nothing was recorded", () => {
-  // The later one is listed first: 10 to 10.4 s, and 20 to 20.4 s after a restart.
+  // The later recording is listed first. They cover 10 to 10.4 s and, after a restart, 20 to 20.4 s.
   const track = new Track([recording("S-2", 20, 5), recording("S", 10, 5)]);
   assert.equal(track.length, 10);
   assert.deepEqual(
@@ -104,7 +104,7 @@ test("steps go frame by frame, over gaps too, and pause", () => {
 });
 
 test("fast playback needs no more pictures than can be told apart", () => {
-  // 50 a second, at four times the pace: 200, of which every seventh makes 29 a second.
+  // 50 frames a second at four times the pace are 200 a second. Every seventh of them makes 29 a second.
   const playhead = new Playhead(new Track([recording("S", 0, 1000, 20)]));
   playhead.speed = 4;
   playhead.play();
@@ -114,7 +114,7 @@ test("fast playback needs no more pictures than can be told apart", () => {
   assert.deepEqual(playhead.needed(4), [5, 6, 4, 7], "the neighbours, where it stands");
 });
 
-/** Loads that a test ends itself. */
+/** A server whose answers a test gives by hand. */
 function fakeServer() {
   /** @type {Map<number, { resolve: (picture: string) => void, reject: (error: unknown) => void }>} */
   const asked = new Map();
@@ -224,7 +224,7 @@ const TIMELINE = {
 };
 
 test("the metric's line reaches the top in every setting", () => {
-  // 1000 pixels for 100 seconds, from 44 on; 0 at 88, the greatest of a setting at 8.
+  // 100 seconds cover 1000 pixels, beginning at 44. A metric of 0 is at 88, a setting's largest metric at 8.
   const scale = new Scale(100, 1056);
   assert.equal(metricPath(TIMELINE.points, scale, 8, 88), "M44.0 48.0L144.0 8.0M164.0 8.0L244.0 48.0");
 });

@@ -17,7 +17,7 @@ const USABILITY = { id: "usability", kind: "sus", text: "Usability" };
 
 const UNCONFIRMED = "Kept on this device until you tap “This order is right”";
 
-/** A page with questions about three settings; `given` is what it sends. */
+/** A page with questions about three settings. `given` holds the answers that it sends. */
 function openPage(store = fakeStore()) {
   const time = new FakeTime();
   const newId = countedIds();

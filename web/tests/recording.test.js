@@ -1,4 +1,4 @@
-// What the operator reads about recordings.
+// The texts about recordings on the operator's page.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -38,10 +38,10 @@ test("before it starts, the disk's time is told", () => {
   assert.equal(nowWords(IDLE), "Nothing is being recorded.");
   assert.equal(
     diskWords(IDLE),
-    "The disk lasts for about 1 h 0 min at 40 MB a second (145.0 GB free, of which 1.0 GB are kept for the trial).",
+    "The disk lasts for about 1 h 0 min at 40 MB a second (145.0 GB free; the trial’s reserve is 1.0 GB).",
   );
   const unmeasured = { ...IDLE, bytes_per_second: null, seconds_left: null };
-  assert.equal(diskWords(unmeasured), "The disk has 145.0 GB free, of which 1.0 GB are kept for the trial.");
+  assert.equal(diskWords(unmeasured), "The disk has 145.0 GB free; the trial’s reserve is 1.0 GB.");
 });
 
 test("while it runs, lost frames and the protocol's wish are told", () => {

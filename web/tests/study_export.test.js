@@ -1,4 +1,4 @@
-// What the study's page says of an export.
+// The texts about an export on the study's page.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

@@ -9,10 +9,10 @@ import { FakeTime, settle } from "./around.js";
 
 const PLACE = { session: "s", segment: "g", setting: 1, frame: 7, run: 1 };
 
-/** A surgeon's page with a microphone that a test works by hand. */
+/** A surgeon's page with a microphone that a test controls. */
 function openPage() {
   const time = new FakeTime();
-  /** What reached the outbox, in short. @type {string[]} */
+  /** What reached the outbox, abbreviated. @type {string[]} */
   const kept = [];
   const outbox = {
     begin: (/** @type {{ frame: number | null }} */ { frame }) => {
@@ -27,7 +27,7 @@ function openPage() {
     /** @type {import("../static/surgeon/microphone.js").Heard | null} */
     heard: null,
     stops: 0,
-    /** Settles the wish for a microphone. @type {(error?: Error) => void} */
+    /** Answers the request for the microphone. @type {(error?: Error) => void} */
     opened: () => {},
   };
   const record = (/** @type {import("../static/surgeon/microphone.js").Heard} */ heard) => {

@@ -54,7 +54,7 @@ test("a span is as wide as it is long, to the end where it has none, and never t
 });
 
 test("times are written at round steps with room between them", () => {
-  // 900 pixels hold ten times of 90 pixels each.
+  // 900 pixels have space for ten labels of 90 pixels each.
   assert.deepEqual(new Scale(50, 900).ticks(), [0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50]);
   assert.deepEqual(new Scale(51, 900).ticks(), [0, 10, 20, 30, 40, 50]);
   assert.deepEqual(new Scale(600, 900).ticks().slice(0, 3), [0, 60, 120]);

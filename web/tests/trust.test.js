@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { judge, kindOf, WORDS } from "../static/trust/verdict.js";
 
 /**
- * A browser that gets answers from the addresses that begin with one of `answering`.
+ * A browser that gets answers only from addresses that begin with one of `answering`.
  *
  * @param {...string} answering
  */

@@ -11,15 +11,15 @@ const noNetwork = () => new TypeError("Failed to fetch");
 
 /** @typedef {import("../static/surgeon/voice_outbox.js").Step} Step */
 
-/** A page on `store`, before a server whose answers a test gives. */
+/** A page on `store`, with a server whose answers a test sets. */
 function openPage(
   store = /** @type {FakeDisk<Step>} */ (new FakeDisk()),
   time = new FakeTime(),
   newId = countedIds(),
 ) {
-  /** What the server was sent, in short. @type {string[]} */
+  /** What the server received, abbreviated. @type {string[]} */
   const got = [];
-  /** What it throws, in turn; null takes what was sent. @type {(Error | null)[]} */
+  /** The server's answers, in order: an error to throw, or null to accept. @type {(Error | null)[]} */
   const answers = [];
   const take = (/** @type {string} */ what) => {
     got.push(what);

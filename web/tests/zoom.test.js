@@ -65,7 +65,7 @@ test("one can zoom in four times, or to a sample a screen pixel, and out to the 
   made.zoomBy(0.001);
   assert.equal(made.zoom, 1);
 
-  // In a tiny box four times is less than a sample a pixel: 4 samples a cell, 2 screen pixels a CSS pixel.
+  // In a tiny box four times is less than one sample per pixel: 4 samples per cell, 2 screen pixels per CSS pixel.
   const tiny = framing({ width: 40, height: 40 }, 2);
   tiny.zoomBy(100);
   assert.equal(tiny.place.scale, 2);
@@ -94,7 +94,7 @@ test("nothing but a person moves a zoomed view", () => {
   made.show(CELLS, { x: 170, y: 40, width: 190, height: 190 });
   assert.deepEqual(made.place, before);
 
-  // A turned tablet shows the same place in the middle, and turned back the very same.
+  // A tablet that is turned shows the same place in the middle. When it is turned back, the view is as before.
   const middle = under(made, 400, 500);
   made.resize({ width: 1000, height: 800 }, 2);
   near(under(made, 500, 400), middle);
@@ -113,7 +113,7 @@ test("a double tap zooms in on a place, and back", () => {
   assert.deepEqual(made.place, fitted);
 });
 
-/** Notes what gestures do. */
+/** Gestures on a picture that notes each movement. */
 function noting() {
   /** @type {string[]} */
   const notes = [];

@@ -11,7 +11,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The start page: on to the page of the role that the browser holds. */
+        /** The start page: redirects to the page of the role that the browser holds. */
         get: operations["roles_start"];
         put?: never;
         post?: never;
@@ -28,7 +28,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The head of the chain: whoever notes it can prove later that nothing recorded before it was changed. */
+        /** The head of the chain. A note of it can later prove that nothing recorded before it was changed. */
         get: operations["service_chain_head"];
         put?: never;
         post?: never;
@@ -64,7 +64,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then. */
+        /** Moves the session on; repeating an action changes nothing. Answers with the session as it is then. */
         post: operations["operator_act"];
         delete?: never;
         options?: never;
@@ -79,12 +79,15 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** What can be changed now, with the camera's own bounds. Empty for a camera that has nothing to change, or is away. */
+        /**
+         * What can be changed now, with the camera's own bounds. Empty for a camera without such settings, or one that is
+         *     disconnected.
+         */
         get: operations["operator_offer"];
         put?: never;
         /**
-         * Changes a setting, before the next frame.
-         * @description What the camera makes of it is in `/api/operator/camera` and the live status.
+         * Changes a setting before the next frame.
+         * @description `/api/operator/camera` and the live status show the value that the camera then uses.
          */
         post: operations["operator_change"];
         delete?: never;
@@ -102,7 +105,8 @@ export interface paths {
         };
         /**
          * Whether everything is ready for a trial.
-         * @description Looks at the machine and the database anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
+         * @description Checks the machine and the database again.
+         *     Devices are not asked, because the focus loop holds them: the server reports what it already knows.
          */
         get: operations["operator_checks"];
         put?: never;
@@ -173,7 +177,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Lets a policy focus, or sets the focal power by hand. Not while a session is under way. */
+        /** Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session is under way. */
         post: operations["operator_focus"];
         delete?: never;
         options?: never;
@@ -190,7 +194,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Adds a participant; one that is there already stays as it is. Answers with all codes. */
+        /** Adds a participant; one that exists already stays as it is. Answers with all codes. */
         post: operations["operator_add_participant"];
         delete?: never;
         options?: never;
@@ -205,10 +209,10 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** How recording stands, and how long the disk will last. */
+        /** The state of recording, and how long the disk will last. */
         get: operations["operator_status"];
         put?: never;
-        /** Starts or stops recording. Stopping again changes nothing. Answers with how recording stands then. */
+        /** Starts or stops recording. Stopping again changes nothing. Answers with the new state of recording. */
         post: operations["operator_order"];
         delete?: never;
         options?: never;
@@ -223,7 +227,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The session under way; null when there is none. */
+        /** The session under way; null if there is none. */
         get: operations["operator_session"];
         put?: never;
         post?: never;
@@ -257,7 +261,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The surgeon's link: in a session of a study, to that session alone, which it ends with. */
+        /** The surgeon's link. In a session of a study it is valid only for that session, and ends with it. */
         get: operations["operator_link"];
         put?: never;
         post?: never;
@@ -309,7 +313,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The sessions, newest first, practice included and marked. */
+        /** The sessions, newest first, including practice sessions, which are marked. */
         get: operations["researcher_list"];
         put?: never;
         post?: never;
@@ -326,7 +330,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** One session in detail; its policies once it was unblinded. */
+        /** One session in detail; with its policies once it is unblinded. */
         get: operations["researcher_session"];
         put?: never;
         post?: never;
@@ -345,7 +349,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Corrects something of a session that has ended. The original stays; the correction stands beside it. */
+        /** Corrects a record of a session that has ended. The original stays; the correction is kept beside it. */
         post: operations["researcher_correct"];
         delete?: never;
         options?: never;
@@ -360,7 +364,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** One session over time without its focal path. */
+        /** One session over time, without its focal path. */
         get: operations["researcher_course"];
         put?: never;
         post?: never;
@@ -379,7 +383,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Erases words for good. Once this has answered, they are nowhere in the database; their record and its hash stay. */
+        /** Erases words permanently. Once this has answered, they are nowhere in the database. Their record and its hash stay. */
         post: operations["researcher_erase"];
         delete?: never;
         options?: never;
@@ -397,8 +401,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Erases all words of a withdrawn session for good: comments with their sound, answers in words, and notes. Once this
-         *     has answered, they are nowhere in the database; their records and hashes stay.
+         * Erases all words of a withdrawn session permanently: comments with their sound, answers in words, and notes. Once
+         *     this has answered, they are nowhere in the database. Their records and hashes stay.
          */
         post: operations["researcher_erase_all"];
         delete?: never;
@@ -431,7 +435,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The recordings of an unblinded session, with the times of their frames; each look at them is recorded. */
+        /** The recordings of an unblinded session, with the times of their frames. Each access is recorded. */
         get: operations["researcher_recordings"];
         put?: never;
         post?: never;
@@ -465,7 +469,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** One session over time with its focal path, which may tell policies apart: each look at it is recorded. */
+        /** One session over time with its focal path. The path may tell policies apart, so each access is recorded. */
         get: operations["researcher_timeline"];
         put?: never;
         post?: never;
@@ -485,8 +489,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Tells which policies ran; on a session still under way, or of a study that is still blinded, this is emergency
-         *     unblinding and marked so for good.
+         * Unblinds a session. If it is still under way, or belongs to a study that is still blinded, this is emergency
+         *     unblinding and permanently marked as such.
          */
         post: operations["researcher_unblind"];
         delete?: never;
@@ -502,7 +506,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** What was said aloud in a voice comment, as far as it has arrived. A request for a range of bytes gets that range. */
+        /** The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets that range. */
         get: operations["researcher_recording"];
         put?: never;
         post?: never;
@@ -554,7 +558,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** One study in detail. It tells no order. */
+        /** One study in detail, without the orders. */
         get: operations["researcher_study"];
         put?: never;
         post?: never;
@@ -571,7 +575,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The analysis of a study. Each look at it is recorded. */
+        /** The analysis of a study. Each access is recorded. */
         get: operations["researcher_analysis"];
         put?: never;
         post?: never;
@@ -623,14 +627,14 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * How the latest export of a study stands. A finished one is kept for an hour, unless a surgeon withdraws or words are
-         *     erased.
+         * The state of the latest export of a study. A finished export is kept for an hour, unless a surgeon withdraws or
+         *     words are erased.
          */
         get: operations["researcher_study_export"];
         put?: never;
         /**
-         * Begins to export all sessions of a study as one package, in the background. While one is being made, no other
-         *     begins: the answer then tells how far that one has come.
+         * Begins to export all sessions of a study as one package, in the background. If an export is already being made, no
+         *     other begins, and the answer gives the progress of that one.
          */
         post: operations["researcher_start_study_export"];
         delete?: never;
@@ -682,7 +686,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Signs out: the token opens nothing any more. Signing out again changes nothing. */
+        /** Signs out: the token is no longer valid. Signing out again changes nothing. */
         post: operations["accounts_sign_out"];
         delete?: never;
         options?: never;
@@ -699,7 +703,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then. */
+        /** Moves the session on; repeating an action changes nothing. Answers with the session as it is then. */
         post: operations["surgeon_act"];
         delete?: never;
         options?: never;
@@ -717,8 +721,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Keeps an answer: once this has answered, it is on disk. Of several to a question the one given last counts; one that
-         *     comes too long after the session's end is kept, but never counts.
+         * Stores an answer: once this has answered, it is on disk. If a question has several, the one given last counts. One
+         *     that arrives too long after the session's end is stored, but never counts.
          */
         post: operations["surgeon_answer"];
         delete?: never;
@@ -736,7 +740,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Keeps a comment: once this has answered, it is on disk. The same key again is the same comment. */
+        /** Stores a comment: once this has answered, it is on disk. A comment sent again with the same key is stored once. */
         post: operations["surgeon_comment"];
         delete?: never;
         options?: never;
@@ -753,7 +757,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Hears how much of a session a surgeon's device still holds, so that nobody unblinds it over that unasked. */
+        /** Notes how much of a session a surgeon's device still holds, so that nobody unblinds it without being warned. */
         post: operations["surgeon_holding"];
         delete?: never;
         options?: never;
@@ -768,7 +772,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The session under way; null when there is none. */
+        /** The session under way; null if there is none. */
         get: operations["surgeon_session"];
         put?: never;
         post?: never;
@@ -788,8 +792,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Keeps a piece of a recording: once this has answered, it is on disk. The comment (of kind voice) comes first; its
-         *     pieces may then come late, again, and in any order.
+         * Stores a piece of a recording: once this has answered, it is on disk. The comment (of kind voice) must come first;
+         *     its pieces may then come late, repeatedly, and in any order.
          */
         post: operations["surgeon_keep_piece"];
         delete?: never;
@@ -823,8 +827,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * How the server is, and what is wrong.
-         * @description Answers at once, also while the disk hangs.
+         * The server's health, and what is wrong.
+         * @description Answers at once, even while the disk hangs.
          */
         get: operations["service_healthz"];
         put?: never;
@@ -893,7 +897,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The list of sessions, practice apart. */
+        /** The list of sessions, with practice sessions listed separately. */
         get: operations["researcher_list_page"];
         put?: never;
         post?: never;
@@ -1046,7 +1050,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The live picture as motion JPEG, one pixel a mosaic cell, without end. */
+        /** The live picture as an endless motion JPEG, one pixel per mosaic cell. */
         get: operations["stream_mjpeg"];
         put?: never;
         post?: never;
@@ -1080,7 +1084,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The service worker of the surgeon's page, which opens the page where there is no network. */
+        /** The service worker of the surgeon's page, which opens the page if there is no network. */
         get: operations["surgeon_worker"];
         put?: never;
         post?: never;
@@ -1097,7 +1101,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The page that leads through trusting the server on this device. */
+        /** The page that explains how to trust the server on this device. */
         get: operations["trust_page"];
         put?: never;
         post?: never;
@@ -1148,7 +1152,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Asked for over TLS by the page that was opened without: a device that gets an answer trusts the server. */
+        /** Requested over TLS by the trust page, which was loaded unencrypted: a device that gets the answer trusts the server. */
         get: operations["trust_check"];
         put?: never;
         post?: never;
@@ -1166,18 +1170,18 @@ export interface components {
         Account: {
             /** @description The name that the person signs in with. */
             account: components["schemas"]["AccountName"];
-            /** @description Whether the person may not sign in. */
+            /** @description Whether the account is disabled: nobody can sign in to it. */
             disabled: boolean;
-            /** @description The person's name, as signatures have it. */
+            /** @description The person's name, as signatures show it. */
             display: string;
-            /** @description What the person may do. */
+            /** @description The role, which decides what the person may do. */
             role: components["schemas"]["AccountRole"];
         };
-        /** @description What is to be done to an account. */
+        /** @description A change to make to an account. */
         AccountAction: {
             /** @enum {string} */
             change: "role";
-            /** @description The role. */
+            /** @description The new role. */
             role: components["schemas"]["AccountRole"];
         } | {
             /** @enum {string} */
@@ -1191,7 +1195,7 @@ export interface components {
         } | {
             /** @enum {string} */
             change: "passphrase";
-            /** @description The passphrase. */
+            /** @description The passphrase for that sign-in. */
             first_passphrase: string;
         };
         /** @description An account as a lead sees it. */
@@ -1204,7 +1208,7 @@ export interface components {
         /** @description The name that a person signs in with: 1 to 40 lower-case letters, digits, dots and dashes. */
         AccountName: string;
         /**
-         * @description What a person does in a study.
+         * @description The role of a personal account in studies.
          * @enum {string}
          */
         AccountRole: "lead" | "operator" | "researcher" | "monitor";
@@ -1214,8 +1218,8 @@ export interface components {
             session: components["schemas"]["SessionId"];
         };
         /**
-         * @description Something that moves a session on. `segment` names the one that the page was showing, so that a
-         *     stale tab or a double click moves nothing twice.
+         * @description An action that advances a session. `segment` is the segment that the page was showing, so that a stale tab or a
+         *     double click does not advance the session twice.
          */
         Action: {
             /** @enum {string} */
@@ -1223,12 +1227,12 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "acknowledge";
-            /** @description The segment. */
+            /** @description Segment whose notice was tapped. */
             segment: components["schemas"]["SegmentId"];
         } | {
             /** @enum {string} */
             action: "finish-segment";
-            /** @description The segment. */
+            /** @description Segment to finish. */
             segment: components["schemas"]["SegmentId"];
         } | {
             /** @enum {string} */
@@ -1237,7 +1241,7 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "pause";
-            /** @description Why. */
+            /** @description Reason for the pause. */
             reason: string;
         } | {
             /** @enum {string} */
@@ -1245,19 +1249,19 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "abort";
-            /** @description Why. */
+            /** @description Reason for the abort. */
             reason: string;
         } | {
             /** @enum {string} */
             action: "withdraw";
-            /** @description Why. */
+            /** @description Reason for the withdrawal. */
             reason: string;
         } | {
             /** @enum {string} */
             action: "unblind";
-            /** @description Whether to do it though what a surgeon's device still holds would then not count any more. */
+            /** @description Whether to unblind even though comments and answers that a surgeon's device still holds will then not count. */
             despite_outstanding?: boolean;
-            /** @description Why. */
+            /** @description Reason for the unblinding. */
             reason: string;
         };
         /** @description A setting's value and the bounds that the camera gives for it. */
@@ -1272,29 +1276,29 @@ export interface components {
              * @description Least value.
              */
             min: number;
-            /** @description Which. */
+            /** @description The setting. */
             setting: components["schemas"]["Setting"];
             /**
              * Format: double
-             * @description As the camera has it.
+             * @description Its present value.
              */
             value: number;
         };
-        /** @description How far repeats agree. */
+        /** @description Agreement of repeats. */
         Agreement: {
             /**
              * Format: double
-             * @description Upper end.
+             * @description Upper end of its 95 % interval; none if repeats agree exactly.
              */
             high?: number | null;
             /**
              * Format: double
-             * @description ICC(A,1), at most 1; negative where repeats differ more than subjects.
+             * @description ICC(A,1), at most 1; negative if repeats differ more than subjects.
              */
             icc: number;
             /**
              * Format: double
-             * @description Lower end of its 95 % interval; none where repeats agree without any difference.
+             * @description Lower end of its 95 % interval; none if repeats agree exactly.
              */
             low?: number | null;
         };
@@ -1302,76 +1306,76 @@ export interface components {
         AnalysedSession: {
             /** @description Whether it counts. */
             counts: boolean;
-            /** @description Why it does not count; or what is to be known of it though it does. */
+            /** @description Why it does not count, or a remark on a session that counts. */
             remark?: string | null;
             /** @description The session. */
             session: components["schemas"]["SessionId"];
-            /** @description Its site. */
+            /** @description Name of the site. */
             site: string;
-            /** @description The surgeon's code, as it was corrected; none of a withdrawn session. */
+            /** @description The surgeon's code, corrected if it was; none for a withdrawn session. */
             surgeon?: string | null;
         };
-        /** @description The analysis of a study that was unblinded. */
+        /** @description The analysis of an unblinded study. */
         Analysis: {
-            /** @description SHA-256 of its definition. */
+            /** @description SHA-256 of the study's definition. */
             definition_sha256: string;
-            /** @description What a reader must know of all figures. */
+            /** @description Notes that apply to all figures. */
             notes: string[];
-            /** @description How its definition says that it is analysed. */
+            /** @description The planned analysis, as in the definition. */
             planned: string;
-            /** @description Each of its protocols by itself. */
+            /** @description One analysis per protocol. */
             protocols: components["schemas"]["ProtocolAnalysis"][];
-            /** @description What resamples and permutations are drawn from: the first 16 digits of `definition_sha256`. */
+            /** @description Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`. */
             seed: string;
-            /** @description The sites of it that this database runs. */
+            /** @description Names of the study's sites that this database runs. */
             sites: string[];
-            /** @description The study. */
+            /** @description Name of the study. */
             study: string;
-            /** @description Its title. */
+            /** @description Title of the study. */
             title: string;
-            /** @description When it was unblinded, by the server's wall clock. */
+            /** @description When the study was unblinded, by the server's wall clock. */
             unblinded: string;
         };
-        /** @description An answer for reading. */
+        /** @description An answer, as it is shown. */
         AnswerLine: {
-            /** @description When, by the server's wall clock. */
+            /** @description When it was recorded, by the server's wall clock. */
             at: string;
             /** @description Whether it replaced an earlier answer. */
             changed: boolean;
             corrected?: components["schemas"]["AnswerValue"] | null;
-            /** @description The same in words. */
+            /** @description The corrected answer in words. */
             corrected_words?: string | null;
-            /** @description Whether another of the surgeon's devices said something else; the timeline tells what. */
+            /** @description Whether another of the surgeon's devices gave a different answer; the timeline shows it. */
             devices_disagree: boolean;
-            /** @description When its words were erased, by the server's wall clock. */
+            /** @description When its words were erased, by the server's wall clock; none if they were not. */
             erased?: string | null;
             /** @description The answer's key. */
             key: components["schemas"]["IdempotencyKey"];
-            /** @description The question's kind, where it is known. */
+            /** @description The question's kind; none if it is not known. */
             kind?: string | null;
-            /** @description A researcher's note on it. */
+            /** @description A researcher's note on the answer. */
             note?: string | null;
-            /** @description Question's id. */
+            /** @description The question's identifier. */
             question: string;
-            /** @description What it scores, corrected where it was; none where it has no score or lacks an item. */
+            /** @description Its scores, from the corrected answer if there is one; none if it has no score or an item is missing. */
             scores: components["schemas"]["Measure"][];
             /** @description Setting, from 1; none for a closing question. */
             setting?: number | null;
             /**
              * Format: double
-             * @description The System Usability Scale's score, 0..=100, for its ten items.
+             * @description The score of the System Usability Scale, 0 to 100, for its ten items.
              */
             sus_score?: number | null;
-            /** @description The question. */
+            /** @description The question's text. */
             text: string;
-            /** @description The answer. */
+            /** @description The answer as it was given. */
             value: components["schemas"]["AnswerValue"];
-            /** @description The same in words. */
+            /** @description The answer in words. */
             words: string;
         };
-        /** @description An answer. */
+        /** @description The value of an answer. */
         AnswerValue: number | number[] | string;
-        /** @description What can be changed, and what became of the last change. */
+        /** @description What can be changed, and whether the last change failed. */
         CameraOffer: {
             /** @description Every setting that the camera offers now. */
             settings: components["schemas"]["Adjustable"][];
@@ -1382,7 +1386,7 @@ export interface components {
         ChainHead: {
             /** @description Its hash: SHA-256, hexadecimal. */
             hash: string;
-            /** @description Both as they stand on the pages, for `parfocal verify --head`. */
+            /** @description Number and hash as the pages show them, for `parfocal verify --head`. */
             head: string;
             /**
              * Format: int64
@@ -1390,44 +1394,44 @@ export interface components {
              */
             number: number;
         };
-        /** @description A setting to be changed. */
+        /** @description A setting to change. */
         Change: {
-            /** @description Which. */
+            /** @description The setting. */
             setting: components["schemas"]["Setting"];
             /**
              * Format: double
-             * @description To what: microseconds, the camera's unit of gain, or frames a second.
+             * @description The new value: microseconds, the camera's unit of gain, or frames a second.
              */
             value: number;
         };
         /** @description A change of an account, confirmed by a lead. */
         ChangeAccount: components["schemas"]["AccountAction"] & {
-            /** @description The lead's own passphrase, once more. */
+            /** @description The lead's own passphrase, entered again. */
             passphrase: string;
         };
-        /** @description A change of a study, signed. */
+        /** @description A signed change of a study. */
         ChangeStudy: components["schemas"]["StudyAction"] & {
-            /** @description The passphrase of the lead who is signed in, once more: needed to lock and to unblind. */
+            /** @description The passphrase of the lead who is signed in, entered again: needed to lock and to unblind. */
             passphrase?: string | null;
-            /** @description Why. */
+            /** @description The reason, which is signed. */
             reason: string;
         };
-        /** @description What was found. */
+        /** @description Results of all checks. */
         Checks: {
-            /** @description When, by the server's wall clock. */
+            /** @description When the checks were made, by the server's wall clock. */
             at: string;
-            /** @description What was looked at, and what to do. */
+            /** @description One result for each thing that was checked. */
             findings: components["schemas"]["Finding"][];
         };
         /** @description What the operator can choose from. */
         Choices: {
             /** @description Codes of the participants. */
             participants: string[];
-            /** @description Policies. */
+            /** @description The policies. */
             policies: Record<string, never>[];
-            /** @description Protocols. */
+            /** @description The protocols. */
             protocols: components["schemas"]["ProtocolSummary"][];
-            /** @description Studies that take sessions now. */
+            /** @description Studies in which sessions can be made now. */
             studies: components["schemas"]["OpenStudy"][];
         };
         /**
@@ -1435,22 +1439,22 @@ export interface components {
          * @enum {string}
          */
         Code: "camera-silent" | "lens-gone" | "lens-warns" | "disk-nearly-full" | "disk-silent" | "database-troubled" | "database-unwritable" | "events-unrecorded" | "telemetry-lost" | "loop-stalled";
-        /** @description A comment for reading. */
+        /** @description A comment, as it is shown. */
         CommentLine: components["schemas"]["Said"] & {
-            /** @description When, by the server's wall clock. */
+            /** @description Time of the comment, by the server's wall clock. */
             at: string;
-            /** @description Setting, from 1. */
+            /** @description Number of the setting, from 1; none outside settings. */
             setting?: number | null;
         };
         /** @description An outcome compared between policies. */
         Comparison: components["schemas"]["Outcome"] & {
-            /** @description Surgeons of whom no value is missing: those that the tests use. */
+            /** @description Number of surgeons without a missing value; the tests use these. */
             complete: number;
             /** @description Whether the policies differ. */
             difference: components["schemas"]["Difference"];
-            /** @description Surgeons who are left out of the tests, because a value is missing. */
+            /** @description Number of surgeons left out of the tests because a value is missing. */
             left_out: number;
-            /** @description Each policy with each other. */
+            /** @description Every pair of policies. */
             pairs: components["schemas"]["Pair"][];
             /** @description Each policy's values over all settings. */
             policies: components["schemas"]["PolicySummary"][];
@@ -1462,51 +1466,51 @@ export interface components {
             surgeons: components["schemas"]["SurgeonMeans"][];
         };
         /**
-         * @description How the server is.
+         * @description The server's condition.
          * @enum {string}
          */
         Condition: "ok" | "degraded" | "failing";
-        /** @description A consent. */
+        /** @description A recorded consent of a participant. */
         Consent: {
             /**
              * Format: date
-             * @description The day on which it was given.
+             * @description Day on which the consent was given.
              */
             given_on: string;
-            /** @description On paper or on a screen. */
+            /** @description Whether the consent was given on paper or on a screen. */
             medium: components["schemas"]["Medium"];
-            /** @description Who obtained it: initials or a code. */
+            /** @description Person who obtained the consent: initials or a code. */
             obtained_by: string;
-            /** @description Version of the text. */
+            /** @description Version of the consent text. */
             text_version: string;
         };
-        /** @description A consent for reading. */
+        /** @description A consent, as it is shown. */
         ConsentLine: components["schemas"]["Consent"] & {
             /** @description When it was recorded, by the server's wall clock. */
             at: string;
         };
-        /** @description A correction for reading. */
+        /** @description A correction, as it is shown. */
         CorrectionLine: {
-            /** @description What was corrected, in words. */
+            /** @description The corrected record, in words. */
             about: string;
-            /** @description When, by the server's wall clock. */
+            /** @description When it was recorded, by the server's wall clock. */
             at: string;
-            /** @description Who. */
+            /** @description Who recorded it. */
             by: components["schemas"]["Role"];
-            /** @description When its words were erased, by the server's wall clock. */
+            /** @description When its words were erased, by the server's wall clock; none if they were not. */
             erased?: string | null;
-            /** @description What of it. */
+            /** @description The corrected part of the record. */
             field: components["schemas"]["Field"];
-            /** @description What is right, in words. */
+            /** @description The corrected value, in words. */
             new: string;
             /**
              * Format: int64
              * @description Order of the record in the database.
              */
             number: number;
-            /** @description What stood there so far, in words. */
+            /** @description The value before the correction, in words. */
             old: string;
-            /** @description Why. */
+            /** @description Reason for the correction. */
             reason: string;
         };
         /**
@@ -1521,7 +1525,7 @@ export interface components {
             said: string;
             w_interval?: components["schemas"]["Interval"] | null;
         };
-        /** @description A session to be taken off the screens. */
+        /** @description A session to take off the screens. */
         Dismissal: {
             /** @description The session. */
             session: components["schemas"]["SessionId"];
@@ -1536,96 +1540,99 @@ export interface components {
          * @enum {string}
          */
         Erasable: "answer" | "comment" | "correction" | "event" | "study-event";
-        /** @description Why all words of a session are erased. */
+        /** @description An erasure of all words of a session. */
         EraseAll: {
-            /** @description Kept with each erasure. It must not repeat the words. */
+            /** @description Why; stored with each erasure. It must not repeat the words. */
             reason: string;
         };
-        /** @description A failure as programs get it. */
+        /** @description An error as programs get it. */
         ErrorBody: {
             /** @description What happened and what to do. */
             error: string;
             /** @description Whether signing in under a personal account would help. */
             sign_in?: boolean;
         };
-        /** @description What is to be exported. */
+        /** @description What to export. */
         ExportStudy: {
-            /** @description Whether to tell which policy ran in which setting; only after unblinding. */
+            /** @description Whether to include which policy ran in which setting; only after unblinding. */
             unblinded?: boolean;
         };
         /**
-         * @description What of a record is put right.
+         * @description The corrected part of a record.
          * @enum {string}
          */
         Field: "participant" | "value" | "note";
-        /** @description What is put right. `old` is what the page showed, so that nobody corrects what somebody else corrected meanwhile. */
+        /**
+         * @description The corrected field. `old` is the value that the page showed, so that nobody overwrites another person's correction
+         *     without seeing it.
+         */
         FieldChange: {
             /** @enum {string} */
             field: "participant";
-            /** @description The right code. */
+            /** @description Correct participant code. */
             new: string;
-            /** @description The code so far. */
+            /** @description Participant code that the page showed. */
             old: string;
         } | {
             /** @enum {string} */
             field: "value";
-            /** @description The right answer. */
+            /** @description Correct answer. */
             new: components["schemas"]["AnswerValue"];
-            /** @description The answer so far. */
+            /** @description Answer that the page showed. */
             old: components["schemas"]["AnswerValue"];
-            /** @description The answer's key. */
+            /** @description Key of the answer. */
             record: components["schemas"]["IdempotencyKey"];
         } | {
             /** @enum {string} */
             field: "note";
-            /** @description The note. */
+            /** @description New note. */
             new: string;
-            /** @description The note so far; empty where there is none. */
+            /** @description Note that the page showed; empty if there was none. */
             old: string;
             /** @description The key of the comment or answer. */
             record: components["schemas"]["IdempotencyKey"];
         };
-        /** @description One thing that was looked at. */
+        /** @description One thing that was checked. */
         Finding: {
-            /** @description What to do about it; none where all is well. */
+            /** @description What to do about it; none if all is well. */
             advice?: string | null;
-            /** @description What was found, in one sentence. */
+            /** @description What was found, in words. */
             found: string;
-            /** @description What was looked at, for example `disk`. */
+            /** @description What was checked, for example `disk`. */
             subject: string;
-            /** @description What it came to. */
+            /** @description The result. */
             verdict: components["schemas"]["Verdict"];
         };
-        /** @description Who is to focus outside sessions. */
+        /** @description What focuses the lens outside sessions. */
         Focus: {
             /**
              * Format: double
-             * @description Nobody: the lens goes to this focal power, 0..=1, and stays.
+             * @description No policy: the lens moves to this focal power (0..=1) and stays there.
              */
             focal_power: number;
         } | {
-            /** @description A policy. */
+            /** @description The policy with this name. */
             policy: string;
         };
-        /** @description What Friedman's test found. */
+        /** @description Result of Friedman's test. */
         Friedman: {
             /**
              * Format: double
              * @description The statistic, corrected for ties.
              */
             chi_square: number;
-            /** @description Degrees of freedom: treatments less one. */
+            /** @description Degrees of freedom: treatments minus one. */
             df: number;
             /**
              * Format: double
              * @description Kendall's W, 0..=1: how far the blocks agree on an order.
              */
             kendalls_w: number;
-            /** @description The mean rank of each treatment, 1 for the least value. */
+            /** @description The mean rank of each treatment; rank 1 is the lowest value. */
             mean_ranks: number[];
             /**
              * Format: double
-             * @description p from the chi-square distribution, which is rough for few blocks.
+             * @description p from the chi-square distribution, a rough approximation for few blocks.
              */
             p_chi_square: number;
             /**
@@ -1633,10 +1640,10 @@ export interface components {
              * @description p over the permutations of each block's ranks.
              */
             p_permutation: number;
-            /** @description How it was computed. */
+            /** @description How `p_permutation` was computed. */
             permutation: components["schemas"]["PermutationMethod"];
         };
-        /** @description How the server is. */
+        /** @description The server's health. */
         Health: {
             /** @description Whether the camera delivers frames. */
             camera: boolean;
@@ -1644,40 +1651,40 @@ export interface components {
             lens: boolean;
             /** @description What is wrong, the worst first. */
             problems: components["schemas"]["Problem"][];
-            /** @description Whether the picture or the lens is not of the real world. */
+            /** @description Whether the camera or the lens is simulated. */
             simulated: boolean;
-            /** @description Whether all is well. */
+            /** @description The server's condition. */
             status: components["schemas"]["Condition"];
             /** @description The program's version. */
             version: string;
         };
-        /** @description How much a surgeon's device still holds. */
+        /** @description The number of comments and answers that a surgeon's device still holds. */
         Holding: {
-            /** @description The device. */
+            /** @description Device that holds them. */
             device: components["schemas"]["DeviceId"];
             /**
              * Format: int32
-             * @description Comments and answers that it has not seen saved, half-written ones included.
+             * @description Number of comments and answers whose saving the device has not seen confirmed, half-written ones included.
              */
             holding: number;
-            /** @description The session that it was said in. */
+            /** @description Session in which they were given. */
             session: components["schemas"]["SessionId"];
         };
         /**
          * Format: uuid
-         * @description Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
+         * @description Made by a browser for one comment or answer, which is kept once, however often it is sent.
          */
         IdempotencyKey: string;
         /** @description A 95 % interval. */
         Interval: {
             /**
              * Format: double
-             * @description Its upper end.
+             * @description Upper end.
              */
             high: number;
             /**
              * Format: double
-             * @description Its lower end.
+             * @description Lower end.
              */
             low: number;
         };
@@ -1688,31 +1695,31 @@ export interface components {
         Kind: "mosaic" | "view";
         /** @description An event in words. */
         LogLine: {
-            /** @description The account of whoever it was, where the person was signed in. */
+            /** @description Account of the person who caused the event, if signed in. */
             account?: string | null;
-            /** @description When, by the server's wall clock. */
+            /** @description Time of the event, by the server's wall clock. */
             at: string;
-            /** @description Who. */
+            /** @description Role that caused the event. */
             by: components["schemas"]["Role"];
             /**
              * Format: int32
-             * @description The number of the session's event that it tells, where the event has a reason that a researcher can erase.
+             * @description Number of the session's event that this line shows, if the event has a reason that a researcher can erase.
              */
             erasable_event?: number | null;
-            /** @description What happened. */
+            /** @description Description of the event. */
             text: string;
         };
-        /** @description An item or a score of an answer, as a number. */
+        /** @description An item or a score of an answer as a number. */
         Measure: {
-            /** @description Its name for reading. */
+            /** @description Name of the measure for people. */
             label: string;
-            /** @description Its name: lower case letters, digits and dashes. */
+            /** @description Name of the measure: lower-case letters, digits and dashes. */
             name: string;
-            /** @description Whether it is computed from other items. */
+            /** @description Whether the number is computed from other items. */
             score: boolean;
             /**
              * Format: double
-             * @description The number; none where it is missing.
+             * @description The number; none if it is missing.
              */
             value?: number | null;
         };
@@ -1730,107 +1737,110 @@ export interface components {
         NewAccount: {
             /** @description The name that the person will sign in with: lower-case letters, digits, dots and dashes. */
             account: string;
-            /** @description The person's name, as signatures will have it. */
+            /** @description The person's name, as it will appear in signatures. */
             display: string;
-            /** @description The passphrase for the person's first sign-in, who then chooses another. */
+            /** @description The passphrase for the person's first sign-in, where the person then chooses another. */
             first_passphrase: string;
-            /** @description The lead's own passphrase, once more. */
+            /** @description The lead's own passphrase, entered again. */
             passphrase: string;
             /** @description What the person may do. */
             role: components["schemas"]["AccountRole"];
         };
         /**
-         * @description An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it
-         *     gives an answer, in whatever order they arrive; the others stay in the log.
+         * @description An answer as a surgeon's browser sends it. If there are several answers to a question, the one given last counts, in
+         *     whatever order they arrive. Items that it leaves open keep their earlier values. The other answers stay in the log.
          */
         NewAnswer: components["schemas"]["Origin"] & {
-            /** @description Idempotency key. */
+            /** @description Idempotency key, made by the browser. The same key again means the same answer. */
             key: components["schemas"]["IdempotencyKey"];
-            /** @description Question id. */
+            /** @description Id of the question. */
             question: string;
             segment?: components["schemas"]["SegmentId"] | null;
-            /** @description Session. */
+            /** @description Session in which the answer was given. */
             session: components["schemas"]["SessionId"];
-            /** @description The answer. */
+            /** @description Value of the answer. */
             value: components["schemas"]["AnswerValue"];
         };
         /** @description A comment as a surgeon's browser sends it. */
         NewComment: components["schemas"]["Origin"] & components["schemas"]["Said"] & {
             /**
              * Format: int64
-             * @description Number of the frame that was on screen.
+             * @description Number of the frame that was on the screen.
              */
             frame?: number | null;
-            /** @description Idempotency key, made by the browser: the same key again is the same comment. */
+            /** @description Idempotency key, made by the browser. The same key again means the same comment. */
             key: components["schemas"]["IdempotencyKey"];
             /**
              * Format: int64
-             * @description The run that counted it, as its header told.
+             * @description Run of the server that counted the frame, as given in the frame's header.
              */
             run?: number | null;
             segment?: components["schemas"]["SegmentId"] | null;
-            /** @description Session that the surgeon's page was showing. */
+            /** @description Session that the surgeon's page was showing when the comment was made. */
             session: components["schemas"]["SessionId"];
         };
         /** @description A consent as the operator's page sends it. */
         NewConsent: components["schemas"]["Consent"] & {
-            /** @description The session that it is for. */
+            /** @description Session that the consent is for. */
             session: components["schemas"]["SessionId"];
         };
         /** @description A correction as the researcher's page sends it. */
         NewCorrection: components["schemas"]["FieldChange"] & {
-            /** @description Why; kept with the correction. */
+            /** @description Reason for the correction; kept with it. */
             reason: string;
         };
         /** @description An erasure as the researcher's page sends it. */
         NewErasure: {
-            /** @description Why; kept with the erasure. It must not repeat the words. */
+            /** @description Reason for the erasure; kept with it. It must not repeat the erased words. */
             reason: string;
-            /** @description Its key; of a correction or an event its number. */
+            /** @description Key of the record; for a correction or an event, its number. */
             record: string;
-            /** @description What sort of record. */
+            /** @description Kind of record whose words are erased. */
             subject: components["schemas"]["Erasable"];
         };
-        /** @description A participant to be added. */
+        /** @description A participant to add. */
         NewParticipant: {
             /** @description 2 to 16 capital letters, digits and dashes; never a name. */
             code: string;
         };
-        /** @description A session to be prepared. */
+        /** @description A session to prepare. */
         NewSession: {
-            /** @description Participant's code. */
+            /** @description Code of the participant. */
             participant: string;
-            /** @description Protocol's name. */
+            /** @description Name of the protocol. */
             protocol: string;
             study?: components["schemas"]["StudyPlace"] | null;
         };
-        /** @description A study that takes sessions now, for the operator to choose. Says nothing of its policies. */
+        /** @description A study that accepts new sessions now, for the operator to choose. Says nothing of its policies. */
         OpenStudy: {
-            /** @description Its protocols, as they were when it was planned. */
+            /** @description The study's protocols, as they were when it was planned. */
             protocols: components["schemas"]["ProtocolSummary"][];
-            /** @description The names of its sites that this database runs. */
+            /** @description Names of the sites that this database runs. */
             sites: string[];
-            /** @description Its name. */
+            /** @description Name of the study. */
             study: string;
-            /** @description Its title. */
+            /** @description Title of the study. */
             title: string;
         };
-        /** @description The session under way as the operator sees it. No policy either: the operator stands beside the surgeon. */
+        /**
+         * @description The current session as the operator sees it. It has no policy either, because the operator stands beside the
+         *     surgeon.
+         */
         OperatorView: components["schemas"]["SurgeonView"] & {
             consent?: components["schemas"]["Consent"] | null;
-            /** @description The version of the consent text without which the session does not start; none where none is required. */
+            /** @description Version of the consent text that the session requires before its start; none if no consent is required. */
             consent_required?: string | null;
             /** @description The latest comments, newest first. */
             latest_comments: components["schemas"]["CommentLine"][];
             /** @description The latest events in words, newest first. */
             log: components["schemas"]["LogLine"][];
-            /** @description Participant's code. */
+            /** @description Code of the participant. */
             participant: string;
-            /** @description Protocol's name. */
+            /** @description Name of the protocol. */
             protocol: string;
-            /** @description The study that it belongs to; none outside any study. */
+            /** @description Name of the session's study; none outside studies. */
             study?: string | null;
-            /** @description Why the disk has not taken what is `unrecorded`, as far as it has said. */
+            /** @description Why the disk has not taken the `unrecorded` event; none if that is not known. */
             unrecorded_because?: string | null;
             /** @description Whether the participant withdrew. */
             withdrawn: boolean;
@@ -1840,79 +1850,79 @@ export interface components {
          * @enum {string}
          */
         Order: "shuffled" | "balanced";
-        /** @description Where and when something was said, as the surgeon's page tells. */
+        /** @description Device and time of a comment or answer, as the surgeon's page reports them. */
         Origin: {
             /**
              * Format: int64
-             * @description When it was said: milliseconds since 1970 by the browser's clock.
+             * @description When it was given: milliseconds since 1970 by the browser's clock.
              */
             client_millis?: number | null;
             device?: components["schemas"]["DeviceId"] | null;
             /**
              * Format: int64
-             * @description Counts up with everything that is said on the device, in whatever tab; gaps mean nothing.
+             * @description Number that grows with every comment or answer on the device, in all its tabs. Gaps have no meaning.
              */
             sequence?: number | null;
             waited_by?: components["schemas"]["WaitClock"] | null;
             /**
              * Format: int64
-             * @description Milliseconds that it waited on the device before it was sent this time.
+             * @description Milliseconds that it waited on the device before this attempt to send it.
              */
             waited_millis?: number | null;
         };
-        /** @description Something that each setting has a number of. */
+        /** @description A quantity that has a number in each setting. */
         Outcome: {
-            /** @description Which end is better, where that is known: `higher` or `lower`. */
+            /** @description Which end is better, if known: `higher` or `lower`. */
             better?: string | null;
             /**
              * Format: double
-             * @description Its highest possible value, where there is one.
+             * @description Highest possible value, if there is one.
              */
             highest?: number | null;
-            /** @description What it is, for reading. */
+            /** @description Label for people. */
             label: string;
             /**
              * Format: double
-             * @description Its lowest possible value, where there is one.
+             * @description Lowest possible value, if there is one.
              */
             lowest?: number | null;
-            /** @description Its name: question and measure, or what of the focal power. */
+            /** @description Name: question and measure, or a quantity of the focal power. */
             outcome: string;
-            /** @description Its unit or scale. */
+            /** @description Unit or scale. */
             unit: string;
         };
-        /** @description What may still come in for a session that has ended. */
+        /** @description What may still arrive for a session that has ended. */
         Outstanding: {
-            /** @description Until when, by the server's clock, it counts; none once that time is over. */
+            /** @description Until when, by the server's clock, arrivals count; none once that time is over. */
             counts_until?: string | null;
-            /** @description Surgeons' devices that have not said since the end that they hold nothing more. */
+            /** @description Number of surgeons' devices that have not reported since the end that they hold nothing more. */
             devices: number;
         };
-        /** @description Two scales of a questionnaire, by their places from 0, of which the surgeon chooses one. */
+        /** @description Two scales of a questionnaire, of which the surgeon chooses one. Scales are numbered from 0. */
         Pair: {
             /**
              * Format: int32
-             * @description The one offered first.
+             * @description Scale that is offered first.
              */
             first: number;
             /**
              * Format: int32
-             * @description The other.
+             * @description Scale that is offered second.
              */
             second: number;
         };
-        /** @description When the session was held, by someone or by a restart of the server. */
+        /** @description When the session was paused, by a person or by a restart of the server. */
         PauseSpan: {
             /**
              * Format: double
-             * @description From, seconds. For a restart: when the server ended, as far as is known.
+             * @description Start, in seconds. For a restart: when the server ended, as far as is known.
              */
             from: number;
-            /** @description Why, in words. */
+            /** @description Reason in words. */
             reason: string;
             /**
              * Format: double
-             * @description To, seconds; none while it lasts.
+             * @description End, in seconds; none while it lasts.
              */
             to?: number | null;
         };
@@ -1922,31 +1932,31 @@ export interface components {
          */
         PermutationMethod: "exact" | "monte-carlo";
         /**
-         * @description Where a session stands.
+         * @description The phase of a session.
          * @enum {string}
          */
         Phase: "ready" | "notice" | "inspecting" | "questions" | "closing" | "completed" | "aborted";
-        /** @description What becomes of places whose session does not stand. */
+        /** @description Rules for the places of aborted and withdrawn sessions, and for repeated sessions. */
         PlaceRules: {
-            /** @description Of an aborted session. */
+            /** @description What happens to the place of an aborted session. */
             aborted: components["schemas"]["Replacement"];
-            /** @description Whether a surgeon may have a second session. */
+            /** @description Whether a surgeon may have a second session with the same protocol. */
             repeated: components["schemas"]["Repetition"];
-            /** @description Of a session whose surgeon withdrew. */
+            /** @description What happens to the place of a session whose surgeon withdrew. */
             withdrawn: components["schemas"]["Replacement"];
         };
-        /** @description A study to be planned. */
+        /** @description A study to plan. */
         PlanStudy: {
-            /** @description The definition: TOML, as docs/study.md describes it. */
+            /** @description The definition in TOML, as docs/study.md describes it. */
             definition: string;
-            /** @description Why. */
+            /** @description The reason, which is signed. */
             reason: string;
-            /** @description The sites of it that this database runs; all of them where none are named. */
+            /** @description The sites of the study that this database runs; all sites if none are named. */
             sites?: string[];
         };
-        /** @description A policy's values in short. */
+        /** @description Summary of a policy's values. */
         PolicySummary: components["schemas"]["Summary"] & {
-            /** @description Settings without a value. */
+            /** @description Number of settings without a value. */
             missing: number;
             /** @description The policy. */
             policy: string;
@@ -1957,7 +1967,7 @@ export interface components {
             means: number[];
             /** @description The finding in a sentence, or why there is none. */
             said: string;
-            /** @description Sessions without a missing value. */
+            /** @description Number of sessions without a missing value. */
             sessions: number;
             trend?: components["schemas"]["Trend"] | null;
         };
@@ -1970,36 +1980,36 @@ export interface components {
             /** @description What it is, in one sentence for people. */
             message: string;
         };
-        /** @description The sessions of a protocol analysed. */
+        /** @description The analysis of a protocol's sessions. */
         ProtocolAnalysis: {
-            /** @description What a reader must know of this protocol's figures. */
+            /** @description Notes that apply to this protocol's figures. */
             notes: string[];
-            /** @description What is compared between the policies. */
+            /** @description The outcomes, compared between the policies. */
             outcomes: components["schemas"]["Comparison"][];
-            /** @description Its policies. */
+            /** @description Names of the policies. */
             policies: string[];
-            /** @description The protocol. */
+            /** @description Name of the protocol. */
             protocol: string;
-            /** @description Settings of each policy in a session. */
+            /** @description Number of settings of each policy in a session. */
             repeats: number;
-            /** @description Its title for researchers. */
+            /** @description Title of the protocol for researchers. */
             researcher_title: string;
-            /** @description The sessions made by it, and whether each counts. */
+            /** @description The sessions with this protocol, and whether each counts. */
             sessions: components["schemas"]["AnalysedSession"][];
-            /** @description Surgeons whose sessions count. */
+            /** @description Number of surgeons whose sessions count. */
             surgeons: number;
-            /** @description Each value that was compared. */
+            /** @description Every value that was compared. */
             values: unknown[];
-            /** @description Answers about sessions as a whole, which no policy can be given. */
+            /** @description Answers about sessions as a whole, which cannot be assigned to a policy. */
             whole_sessions: components["schemas"]["WholeSessions"][];
-            /** @description What surgeons said. */
+            /** @description Comments and answers in words. */
             words: components["schemas"]["SurgeonWords"][];
         };
-        /** @description A protocol for the operator to choose. Says nothing of its policies, for the operator stands beside the surgeon. */
+        /** @description A protocol for the operator to choose. Says nothing of its policies, because the operator stands beside the surgeon. */
         ProtocolSummary: {
-            /** @description Name. */
+            /** @description Name of the protocol. */
             name: string;
-            /** @description Whether it is practice. */
+            /** @description Whether its sessions are practice. */
             practice: boolean;
             /** @description Title for operators and researchers. */
             researcher_title: string;
@@ -2015,25 +2025,25 @@ export interface components {
         };
         /** @description A question of the protocol. */
         Question: components["schemas"]["QuestionKind"] & {
-            /** @description Id, unique in the protocol. */
+            /** @description Id of the question, unique in the protocol. */
             id: string;
-            /** @description Whether it can be left out. */
+            /** @description Whether the question can be left unanswered. */
             optional?: boolean;
-            /** @description The question as read by the surgeon. */
+            /** @description The question as the surgeon reads it. */
             text: string;
         };
-        /** @description Sorts of answer. */
+        /** @description The kinds of question, by the answers that they take. */
         QuestionKind: {
             /** @enum {string} */
             kind: "text";
         } | {
-            /** @description What the highest point means. */
+            /** @description Meaning of the highest point. */
             high: string;
             /** @enum {string} */
             kind: "likert";
-            /** @description What each point means, in order; empty where only the ends are named. */
+            /** @description Meaning of each point, in order; empty if only the ends are named. */
             labels?: string[];
-            /** @description What 1 means. */
+            /** @description Meaning of point 1. */
             low: string;
             /**
              * Format: int32
@@ -2041,11 +2051,11 @@ export interface components {
              */
             points: number;
         } | {
-            /** @description What 100 means. */
+            /** @description Meaning of 100, the upper end. */
             high: string;
             /** @enum {string} */
             kind: "visual-analogue";
-            /** @description What 0 means. */
+            /** @description Meaning of 0, the lower end. */
             low: string;
         } | {
             /** @enum {string} */
@@ -2058,44 +2068,44 @@ export interface components {
         } | {
             /** @enum {string} */
             kind: "nasa-tlx";
-            /** @description Its six scales. */
+            /** @description The six scales. */
             scales: components["schemas"]["Scale"][];
         } | {
             /** @enum {string} */
             kind: "surg-tlx";
-            /** @description The pairs of scales to be compared; empty where it is asked without weights. */
+            /** @description The pairs of scales to compare; empty if the index is asked without weights. */
             pairs: components["schemas"]["Pair"][];
-            /** @description Its six scales. */
+            /** @description The six scales. */
             scales: components["schemas"]["Scale"][];
         } | {
             /** @enum {string} */
             kind: "recognition";
         };
         /**
-         * @description What of a session is recorded, from its start to its end.
+         * @description What is recorded during a session, from its start to its end.
          * @enum {string}
          */
         Record: "none" | "view" | "mosaic";
-        /** @description When the frames of a recording were exposed. */
+        /** @description A recording, with the times at which its frames were exposed. */
         RecordingCourse: {
             /**
              * Format: double
-             * @description Its first frame, in seconds of the session's timeline; negative before the session's start.
+             * @description Time of the first frame, in seconds of the session's timeline; negative before the session's start.
              */
             from: number;
-            /** @description What it is made of. */
+            /** @description Whether it consists of mosaics or of the view's pictures. */
             kind: components["schemas"]["Kind"];
-            /** @description Its name. */
+            /** @description Name of the recording. */
             name: string;
-            /** @description Each frame, in whole milliseconds since the first. A frame is named by its place here, from 0. */
+            /** @description Time of each frame, in whole milliseconds since the first. A frame's index in this list, from 0, identifies it. */
             times_ms: number[];
         };
-        /** @description What is to happen. */
+        /** @description Whether to start or to stop recording. */
         RecordingOrder: {
-            /** @description Whether mosaics are to be recorded. */
+            /** @description True to start recording mosaics, false to stop. */
             record: boolean;
         };
-        /** @description How recording stands. Sizes depend on the picture alone, which the operator sees anyway. */
+        /** @description State of recording. Sizes depend only on the picture, which the operator sees anyway. */
         RecordingStatus: {
             /** @description Whether the session's protocol asked for it. */
             by_protocol: boolean;
@@ -2106,7 +2116,7 @@ export interface components {
             bytes: number;
             /**
              * Format: double
-             * @description Bytes a second, as measured; while nothing is recorded, what mosaics would take.
+             * @description Bytes a second, as measured; while nothing is recorded, what recording mosaics would take.
              */
             bytes_per_second?: number | null;
             /** @description Name of its folder, below `recordings` in the data folder. */
@@ -2126,14 +2136,14 @@ export interface components {
              * @description Frames lost, because this machine or its disk was too slow.
              */
             lost: number;
-            /** @description What became of the last recording. */
+            /** @description How the last recording ended, or why it did not start. */
             notice?: string | null;
-            /** @description Whether that is a warning: frames were lost, or a recording did not begin or ended by itself. */
+            /** @description Whether `notice` is a warning: frames were lost, or a recording did not begin or ended by itself. */
             notice_warns: boolean;
             recording?: components["schemas"]["Record"] | null;
             /**
              * Format: int64
-             * @description Bytes of these that recordings leave free.
+             * @description Of these, the bytes that recordings leave free.
              */
             reserve_bytes?: number | null;
             /**
@@ -2146,7 +2156,7 @@ export interface components {
              * @description Seconds after which a recording would stop by itself.
              */
             seconds_left?: number | null;
-            /** @description Why the operator cannot record, where it is so. */
+            /** @description Why the operator cannot record; none if recording is possible. */
             unavailable?: string | null;
         };
         /** @description How far repeats of a policy agree within a session. */
@@ -2154,29 +2164,29 @@ export interface components {
             agreement?: components["schemas"]["Agreement"] | null;
             /** @description The finding in a sentence, or why there is none. */
             said: string;
-            /** @description Policies of sessions of which all repeats have a value. */
+            /** @description Number of subjects; a subject is a policy in a session without missing values. */
             subjects: number;
         };
         /**
-         * @description Whether a surgeon who has a session that stands may have another by the same protocol.
+         * @description Whether a surgeon who already has a session with a protocol may have another one.
          * @enum {string}
          */
         Repetition: "refuse" | "next-spare";
         /**
-         * @description What becomes of the place of a session that does not stand.
+         * @description What happens to the place of a session that was aborted or withdrawn.
          * @enum {string}
          */
         Replacement: "keep" | "same-place" | "next-spare";
         /**
-         * @description Who acts; kept with every event.
+         * @description The role in which somebody acts; kept with every event.
          * @enum {string}
          */
         Role: "surgeon" | "operator" | "researcher" | "system";
-        /** @description What was said. */
+        /** @description The content of a comment. */
         Said: {
             /** @enum {string} */
             kind: "text";
-            /** @description Typed. */
+            /** @description A typed text. */
             text: string;
         } | {
             /** @enum {string} */
@@ -2194,15 +2204,15 @@ export interface components {
         };
         /** @description A scale of a questionnaire. */
         Scale: {
-            /** @description What its upper end means. */
+            /** @description Meaning of the upper end. */
             high: string;
-            /** @description What its lower end means. */
+            /** @description Meaning of the lower end. */
             low: string;
-            /** @description Its name in exports: lower case letters and dashes. */
+            /** @description Name of the scale in exports: lower-case letters and dashes. */
             name: string;
-            /** @description What is asked. */
+            /** @description The question about this scale. */
             text: string;
-            /** @description Its name as the surgeon reads it. */
+            /** @description Name of the scale as the surgeon reads it. */
             title: string;
         };
         /**
@@ -2210,26 +2220,26 @@ export interface components {
          * @description One segment of a session. Random, so that two segments of one policy share nothing.
          */
         SegmentId: string;
-        /** @description A session in detail, for the researcher. Policies are in it once it was unblinded, and not before. */
+        /** @description A session in detail, for the researcher. Contains the policies only after it was unblinded. */
         SessionDetail: components["schemas"]["SessionLine"] & {
             /** @description Algorithm that drew the order. */
             algorithm: string;
             /** @description Answers that count, in the order they were given; none once the participant has withdrawn. */
             answers: components["schemas"]["AnswerLine"][];
-            /** @description SHA-256 that commits to the order since the session was made. */
+            /** @description SHA-256 with which the order was committed to when the session was made. */
             commitment: string;
-            /** @description What the participant consented to, oldest first; the latest counts. */
+            /** @description The participant's consents, oldest first; the latest counts. */
             consents: components["schemas"]["ConsentLine"][];
-            /** @description What was put right, oldest first; once the participant has withdrawn, only whose session it was. */
+            /** @description Corrections, oldest first. Once the participant has withdrawn, only those of the participant. */
             corrections: components["schemas"]["CorrectionLine"][];
-            /** @description Until when, by the server's clock, what arrives counts; none while the session is under way. */
+            /** @description Time, by the server's clock, until which what arrives counts; none while the session is under way. */
             counts_until?: string | null;
             /** @description Everything that happened, oldest first. */
             log: components["schemas"]["LogLine"][];
             outstanding?: components["schemas"]["Outstanding"] | null;
-            /** @description Protocol's title for researchers. */
+            /** @description The protocol's title for researchers. */
             researcher_title: string;
-            /** @description Its settings, in order. */
+            /** @description The session's settings, in order. */
             settings_detail: components["schemas"]["SettingDetail"][];
             unblinding?: components["schemas"]["Unblinding"] | null;
             withdrawal?: components["schemas"]["WithdrawalLine"] | null;
@@ -2279,35 +2289,35 @@ export interface components {
             /** @description Whether the participant withdrew: its data stay out of exports. */
             withdrawn: boolean;
         };
-        /** @description The recordings of a session, as far as they can be played. */
+        /** @description The recordings of a session that can be played. */
         SessionRecordings: {
-            /** @description What is wrong with others, or missing from these, in sentences. */
+            /** @description Problems with other recordings, and parts missing from these, in sentences. */
             problems: string[];
-            /** @description Those that can be played, in the order in which they were made. */
+            /** @description Recordings that can be played, in the order in which they were made. */
             recordings: components["schemas"]["RecordingCourse"][];
         };
         /**
-         * @description How far a session came.
+         * @description Whether a session is under way, completed or aborted.
          * @enum {string}
          */
         SessionStatus: "under-way" | "completed" | "aborted";
-        /** @description An answer that does not count: a later one from another device says something else, or it arrived too late. */
+        /** @description An answer that does not count: a later one from another device differs, or it arrived too late. */
         SetAside: {
-            /** @description When it was kept, by the server's wall clock. */
+            /** @description When it was stored, by the server's wall clock. */
             at: string;
             counted?: components["schemas"]["AnswerValue"] | null;
             /** @description Whether it arrived too late. */
             late: boolean;
-            /** @description The question's id. */
+            /** @description The question's identifier. */
             question: string;
             /**
              * Format: double
-             * @description When it was given, seconds: what it waited on the surgeon's device is taken off.
+             * @description When it was given, in seconds: the time that it waited on the surgeon's device is subtracted.
              */
             seconds: number;
             /** @description Setting, from 1; none for a closing question. */
             setting?: number | null;
-            /** @description The question. */
+            /** @description The question's text. */
             text: string;
             /** @description The answer. */
             value: components["schemas"]["AnswerValue"];
@@ -2321,12 +2331,12 @@ export interface components {
         SettingDetail: {
             /**
              * Format: double
-             * @description Time inspected without pauses, seconds, once it is over.
+             * @description Time inspected without pauses, in seconds; none until the inspection is over.
              */
             inspected_seconds?: number | null;
-            /** @description Segment. */
+            /** @description Identifier of the segment. */
             segment: components["schemas"]["SegmentId"];
-            /** @description Number, from 1. */
+            /** @description Number of the setting, from 1. */
             setting: number;
             /** @description When inspection began, by the server's wall clock. */
             started?: string | null;
@@ -2335,70 +2345,70 @@ export interface components {
         SettingSpan: {
             /**
              * Format: double
-             * @description From, seconds.
+             * @description Start, in seconds.
              */
             from: number;
             /** @description Setting, from 1. */
             setting: number;
             /**
              * Format: double
-             * @description To, seconds; none while it lasts.
+             * @description End, in seconds; none while it lasts.
              */
             to?: number | null;
         };
-        /** @description What was said in a setting, or beside all settings of a session. */
+        /** @description The words in a setting, or outside all settings of a session. */
         SettingWords: {
-            /** @description The policy that ran. */
+            /** @description The policy that ran; none outside settings. */
             policy?: string | null;
             /** @description The session. */
             session: components["schemas"]["SessionId"];
-            /** @description The setting, from 1; none beside all settings. */
+            /** @description The setting, from 1; none outside settings. */
             setting?: number | null;
-            /** @description What was said, in order. */
+            /** @description The words, in order. */
             words: components["schemas"]["Words"][];
         };
-        /** @description Who wants to sign in. */
+        /** @description A request to sign in. */
         SignIn: {
-            /** @description Whether the answer is to hold the token, for a program, instead of setting a cookie. */
+            /** @description Whether the answer contains the token, for a program, instead of setting a cookie. */
             as_bearer?: boolean;
             /** @description The account's name. */
             name: string;
-            /** @description The passphrase that replaces it from now on: needed where a lead set the present one. */
+            /** @description A new passphrase that replaces it: needed if a lead set the current one. */
             new_passphrase?: string | null;
-            /** @description Its passphrase. */
+            /** @description The account's passphrase. */
             passphrase: string;
         };
-        /** @description Who signed in. */
+        /** @description The answer after signing in. */
         SignedInAs: components["schemas"]["Account"] & {
             /** @description The page of the account's role. */
             home: string;
-            /** @description The token, to be sent as `Authorization: Bearer`, where it was asked for. */
+            /** @description The token, to be sent as `Authorization: Bearer`, if it was asked for. */
             token?: string | null;
         };
         /** @description A site of a study. */
         Site: {
-            /** @description Its name: lower case letters, digits and dashes. */
+            /** @description Name of the site: lower-case letters, digits and dashes. */
             name: string;
-            /** @description Further places at the end of each list, which the rules open one by one. */
+            /** @description Number of spare places at the end of each list. The rules open them one by one. */
             spares: number;
-            /** @description Surgeons planned: the places of each list that are open from the beginning. */
+            /** @description Number of surgeons planned: places of each list that are open from the beginning. */
             surgeons: number;
-            /** @description Its title. */
+            /** @description Title of the site. */
             title: string;
         };
         /** @description A site of a study. */
         SiteDetail: components["schemas"]["Site"] & {
-            /** @description Whether this database runs it. */
+            /** @description Whether this database runs the site. */
             here: boolean;
-            /** @description Sessions that were made there. */
+            /** @description Number of sessions made at the site. */
             sessions: number;
         };
         /**
-         * @description How far a study has come.
+         * @description The stage of a study.
          * @enum {string}
          */
         Stage: "planned" | "open" | "closed" | "locked" | "unblinded";
-        /** @description What a person wants to do to a study. */
+        /** @description A change to a study that a person requests. */
         StudyAction: {
             /** @enum {string} */
             change: "open";
@@ -2408,7 +2418,7 @@ export interface components {
         } | {
             /** @enum {string} */
             change: "lock";
-            /** @description Whether to do it though what a surgeon's device still holds would then not count. */
+            /** @description Whether to lock even though comments and answers that a surgeon's device still holds will then not count. */
             despite_outstanding?: boolean;
         } | {
             /** @enum {string} */
@@ -2416,105 +2426,105 @@ export interface components {
         } | {
             /** @enum {string} */
             change: "withdraw";
-            /** @description The session. */
+            /** @description Session of the surgeon. */
             session: components["schemas"]["SessionId"];
         };
         /** @description A study in detail. */
         StudyDetail: components["schemas"]["StudyLine"] & {
-            /** @description How it will be analysed. */
+            /** @description The planned analysis. */
             analysis: string;
-            /** @description The line to print, publish or mail before the first session; none before the orders were drawn. */
+            /** @description The line to print, publish or mail before the first session; none until the orders are drawn. */
             commitment_line?: string | null;
-            /** @description Its definition, byte for byte. */
+            /** @description The definition, byte for byte. */
             definition: string;
-            /** @description SHA-256 of its definition: the same at every site. */
+            /** @description SHA-256 of the definition: the same at every site. */
             definition_sha256: string;
-            /** @description What happened to it, oldest first. */
+            /** @description The study's events, oldest first. */
             log: components["schemas"]["StudyLogLine"][];
-            /** @description Who may unblind all of it. */
+            /** @description Names of the people who may unblind the whole study. */
             may_unblind: string[];
-            /** @description How its sessions are ordered. */
+            /** @description How sessions are ordered, the same as in each protocol. */
             order: components["schemas"]["Order"];
             /**
-             * @description While it is closed: sessions for which a surgeon's device may still hold something that locking would keep from
-             *     counting.
+             * @description Number of sessions for which a surgeon's device may still hold something that would not count after locking. 0
+             *     unless the study is closed.
              */
             outstanding: number;
-            /** @description Its protocols. */
+            /** @description The study's protocols. */
             protocols: components["schemas"]["StudyProtocol"][];
-            /** @description What becomes of places whose session does not stand. */
+            /** @description Rules for the place of an aborted or withdrawn session. */
             rules: components["schemas"]["PlaceRules"];
-            /** @description Its sites. */
+            /** @description The study's sites. */
             sites: components["schemas"]["SiteDetail"][];
-            /** @description Its sessions, in the order in which they were made. */
+            /** @description The study's sessions, in the order in which they were made. */
             study_sessions: components["schemas"]["StudySession"][];
             /** @description What to do when a list is used up. */
             when_used_up: string;
         };
-        /** @description How far an export has come. */
+        /** @description The progress of an export. */
         StudyExportProgress: {
-            /** @description Sessions that are exported and verified. */
+            /** @description Number of sessions that are exported and verified. */
             exported: number;
-            /** @description Steps of joining that are done. */
+            /** @description Number of steps for joining that are done. */
             joined: number;
-            /** @description Sessions to export. */
+            /** @description Number of sessions to export. */
             sessions: number;
-            /** @description Steps of joining them; 0 until all sessions are exported. */
+            /** @description Number of steps for joining the sessions; 0 until all sessions are exported. */
             steps: number;
         };
-        /** @description How a study's latest export stands. */
+        /** @description The state of a study's latest export. */
         StudyExportState: {
             /** @enum {string} */
             state: "none";
         } | {
-            /** @description How far it has come. */
+            /** @description Progress of the export. */
             progress: components["schemas"]["StudyExportProgress"];
             /** @enum {string} */
             state: "running";
-            /** @description Whether policies will be in it. */
+            /** @description Whether the export will contain the policies. */
             unblinded: boolean;
         } | {
-            /** @description Sessions in it. */
+            /** @description Number of sessions in the export. */
             sessions: number;
             /** @enum {string} */
             state: "ready";
-            /** @description Whether policies are in it. */
+            /** @description Whether the export contains the policies. */
             unblinded: boolean;
         } | {
-            /** @description Why, for people. */
+            /** @description Reason for the failure, for people. */
             reason: string;
             /** @enum {string} */
             state: "failed";
-            /** @description Whether policies were asked for. */
+            /** @description Whether an export with the policies was requested. */
             unblinded: boolean;
         };
         /** @description A study in a list. */
         StudyLine: {
-            /** @description Sessions that were made in it. */
+            /** @description Number of sessions made in it. */
             sessions: number;
-            /** @description How far it has come. */
+            /** @description Stage of the study, from planned to unblinded. */
             stage: components["schemas"]["Stage"];
-            /** @description Its name. */
+            /** @description Name of the study. */
             study: string;
-            /** @description Surgeons planned at the sites that this database runs. */
+            /** @description Number of surgeons planned at the sites that this database runs. */
             surgeons: number;
-            /** @description Its title. */
+            /** @description Title of the study. */
             title: string;
         };
         /** @description An event of a study in words. */
         StudyLogLine: {
-            /** @description When, by the wall clock. */
+            /** @description When it happened, by the wall clock. */
             at: string;
-            /** @description By which way: a role, or the command line. */
+            /** @description Where it came from: a role, or the command line. */
             by: string;
-            /** @description Who, as the person said. */
+            /** @description The person who did it, as given in the signature. */
             person: string;
-            /** @description Why. */
+            /** @description Reason for the change. */
             reason: string;
             /** @description What happened. */
             text: string;
         };
-        /** @description Where in a study a session is to be made. */
+        /** @description A study and the site at which a session is made. */
         StudyPlace: {
             /** @description The site's name. */
             site: string;
@@ -2523,133 +2533,136 @@ export interface components {
         };
         /** @description A protocol of a study. */
         StudyProtocol: {
-            /** @description Its name. */
+            /** @description Name of the protocol. */
             name: string;
-            /** @description SHA-256 of its text. */
+            /** @description SHA-256 of the protocol's text. */
             sha256: string;
         };
         /** @description A session of a study. */
         StudySession: {
-            /** @description The right code, where it was corrected. */
+            /** @description The corrected code; none if it was not corrected. */
             corrected_participant?: string | null;
-            /** @description Participant's code. */
+            /** @description The participant's code. */
             participant: string;
-            /** @description Its place in the list of both, from 1. */
+            /** @description Place in the list of this site and protocol, from 1. */
             place: number;
-            /** @description Its protocol. */
+            /** @description Name of the protocol. */
             protocol: string;
             /** @description The session. */
             session: components["schemas"]["SessionId"];
-            /** @description Its site. */
+            /** @description Name of the site. */
             site: string;
-            /** @description How far it came. */
+            /** @description State of the session. */
             status: components["schemas"]["SessionStatus"];
-            /** @description Whether it was told which policies ran. */
+            /** @description Whether the session's policies were revealed. */
             unblinded: boolean;
-            /** @description Whether its surgeon withdrew. */
+            /** @description Whether the surgeon withdrew. */
             withdrawn: boolean;
         };
-        /** @description What a sample is in short. */
+        /** @description Summary of a sample. */
         Summary: {
             /**
              * Format: double
-             * @description Mean; none of nothing.
+             * @description Mean; none without values.
              */
             mean?: number | null;
             /**
              * Format: double
-             * @description Median; none of nothing.
+             * @description Median; none without values.
              */
             median?: number | null;
-            /** @description Values there are. */
+            /** @description Number of values. */
             n: number;
             /**
              * Format: double
-             * @description Standard deviation of the sample (divided by n - 1); none of fewer than two.
+             * @description Standard deviation of the sample (divided by n - 1); none for fewer than two values.
              */
             sd?: number | null;
         };
-        /** @description The surgeon's link, as text and as a code. */
+        /** @description The surgeon's link, as text and as a QR code. */
         SurgeonLink: {
             /** @description The link. */
             link: string;
-            /** @description The same as an SVG picture. */
+            /** @description The link as a QR code in SVG. */
             qr: string;
             session?: components["schemas"]["SessionId"] | null;
         };
         /** @description A surgeon's mean of each policy. */
         SurgeonMeans: {
-            /** @description The mean over the settings of each policy, in the order of `policies`; none where a value is missing. */
+            /** @description The mean over the settings of each policy, in the order of `policies`; none if a value is missing. */
             means: (number | null)[];
             /** @description The surgeon's code. */
             surgeon: string;
         };
-        /** @description A session as the surgeon's browser gets it. Everything in it is the same whatever the policy. */
+        /** @description A session as the surgeon's browser gets it. Nothing in it depends on the policy. */
         SurgeonView: {
-            /** @description Answers already kept for those questions, by question id. */
+            /** @description Saved answers to those questions, by question id. */
             answers: {
                 [key: string]: components["schemas"]["AnswerValue"];
             };
-            /** @description Comments kept so far in this session. */
+            /** @description Number of comments saved so far in this session. */
             comments: number;
-            /** @description Whether the surgeon may let it go on: after a restart of the server, not after a pause by the operator. */
+            /**
+             * @description Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
+             *     operator.
+             */
             may_resume: boolean;
-            /** @description Whether it is paused in that phase (by the operator, or by a restart of the server). */
+            /** @description Whether the session is paused in that phase (by the operator, or by a restart of the server). */
             paused: boolean;
-            /** @description Where it stands. */
+            /** @description Phase of the session. */
             phase: components["schemas"]["Phase"];
-            /** @description Whether this is practice. */
+            /** @description Whether this is a practice session. */
             practice: boolean;
-            /** @description The prompt to show now, if one is due ("How does the focus feel now?"). */
+            /** @description Prompt to show now, for example "How does the focus feel now?"; none if none is due. */
             prompt?: string | null;
-            /** @description The questions to show in `Questions` and `Closing`. */
+            /** @description Questions to show in the phases `Questions` and `Closing`. */
             questions: components["schemas"]["Question"][];
-            /** @description One-tap comments. */
+            /** @description Comments that the surgeon can give with one tap. */
             quick_comments: string[];
             /**
              * Format: double
-             * @description Seconds of inspection left in the segment at the time of sending.
+             * @description Seconds of inspection left in the segment when the view was sent; none outside inspection.
              */
             remaining_seconds?: number | null;
             segment?: components["schemas"]["SegmentId"] | null;
-            /** @description The session; random. */
+            /** @description Random id of the session. */
             session: components["schemas"]["SessionId"];
-            /** @description Setting in progress, from 1; 0 before the first. */
+            /** @description Number of the current setting, from 1; 0 before the first. */
             setting: number;
-            /** @description Settings in all. */
+            /** @description Number of settings in the session. */
             settings: number;
             /** @description The protocol's title for surgeons. */
             title: string;
-            /** @description Whether what stopped the session or its setting last (a pause, an end) is not on the disk yet. */
+            /** @description Whether the event that last stopped the session or its setting (a pause, an end) is not written to disk yet. */
             unrecorded: boolean;
             /** @description Whether the surgeon may comment aloud. */
             voice: boolean;
         };
-        /** @description What a surgeon said in the sessions that count. */
+        /** @description A surgeon's words in the sessions that count. */
         SurgeonWords: {
-            /** @description By setting; those beside all settings come last. */
+            /** @description The words by setting; those outside settings come last in each session. */
             settings: components["schemas"]["SettingWords"][];
             /** @description The surgeon's code. */
             surgeon: string;
         };
         /** @description A session over time. Seconds count from its start by the server's clocks, pauses included. */
         Timeline: {
-            /** @description What was said. */
+            /** @description The comments. */
             comments: components["schemas"]["TimelineComment"][];
-            /** @description When the session was held, with the lens where it stood. */
+            /** @description When the session was paused and the lens held where it was. */
             pauses: components["schemas"]["PauseSpan"][];
             /** @description The focal path. */
             points: components["schemas"]["TimelinePoint"][];
-            /** @description Answers that do not count though they are their device's last word. */
+            /** @description Answers that do not count, although they are their device's latest. */
             set_aside: components["schemas"]["SetAside"][];
             /** @description When each setting was inspected. */
             settings: components["schemas"]["SettingSpan"][];
         };
         /** @description A comment on the timeline. */
         TimelineComment: components["schemas"]["Said"] & {
-            /** @description When it was kept, by the server's wall clock. */
+            /** @description When it was stored, by the server's wall clock. */
             at: string;
-            /** @description When its words were erased, by the server's wall clock. */
+            /** @description When its words were erased, by the server's wall clock; none if they were not. */
             erased?: string | null;
             /**
              * Format: int64
@@ -2658,16 +2671,16 @@ export interface components {
             frame?: number | null;
             /** @description The comment's key. */
             key: components["schemas"]["IdempotencyKey"];
-            /** @description Whether it arrived after the time in which what a surgeon's device held counted. */
+            /** @description Whether it arrived after the time in which what a surgeon's device held still counted. */
             late: boolean;
-            /** @description A researcher's note on it; of a voice comment what was said, typed out. */
+            /** @description A researcher's note on the comment; for a voice comment, its transcript. */
             note?: string | null;
             /**
              * Format: double
-             * @description When it was said, seconds: what it waited on the surgeon's device is taken off.
+             * @description When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.
              */
             seconds: number;
-            /** @description Setting, from 1. */
+            /** @description Setting, from 1; none outside settings. */
             setting?: number | null;
             voice?: components["schemas"]["TimelineVoice"] | null;
         };
@@ -2675,32 +2688,32 @@ export interface components {
         TimelinePoint: {
             /**
              * Format: double
-             * @description Focal power asked for, 0..=1.
+             * @description Requested focal power, 0 to 1.
              */
             asked: number;
             /**
              * Format: int64
-             * @description Frame's number.
+             * @description Number of the frame.
              */
             frame: number;
             /**
              * Format: double
-             * @description Focal power that the frame was exposed at, 0..=1.
+             * @description Focal power at which the frame was exposed, 0 to 1.
              */
             measured?: number | null;
             /**
              * Format: double
-             * @description The policy's focus metric, by a scale of its own; only once the session was unblinded.
+             * @description The policy's focus metric, on a scale of its own; only after the session was unblinded.
              */
             metric?: number | null;
             /**
              * Format: double
-             * @description The optimum, 0..=1, where a simulation knows it.
+             * @description The optimum, 0 to 1, if a simulation knows it.
              */
             optimal?: number | null;
             /**
              * Format: double
-             * @description Seconds.
+             * @description When the frame was exposed, in seconds.
              */
             seconds: number;
             /**
@@ -2712,21 +2725,21 @@ export interface components {
         /** @description The recording of a voice comment. */
         TimelineVoice: {
             ended?: components["schemas"]["Ending"] | null;
-            /** @description What it is; none while nothing of it has arrived. */
+            /** @description Media type; none until a part of the recording has arrived. */
             media_type?: string | null;
-            /** @description Pieces of about a second that have not arrived, though later ones have. */
+            /** @description Number of pieces, of about a second each, that have not arrived although later ones have. */
             missing: number;
             /**
              * Format: double
-             * @description How long it is, seconds.
+             * @description Length in seconds.
              */
             seconds: number;
         };
-        /** @description What Page's test found. */
+        /** @description Result of Page's test. */
         Trend: {
             /**
              * Format: double
-             * @description What L is on average where there is no trend.
+             * @description Mean of L if there is no trend.
              */
             expected: number;
             /**
@@ -2734,7 +2747,7 @@ export interface components {
              * @description Page's L: the sum over treatments of place times rank sum.
              */
             l: number;
-            /** @description How it was computed. */
+            /** @description How `p` was computed. */
             method: components["schemas"]["Method"];
             /**
              * Format: double
@@ -2742,16 +2755,16 @@ export interface components {
              */
             p: number;
         };
-        /** @description Why policies are to be told. */
+        /** @description A request to unblind a session. */
         Unblind: {
-            /** @description Whether to do it though something may be outstanding, which would then not count any more. */
+            /** @description Whether to unblind even though something may be outstanding, which would then no longer count. */
             despite_outstanding?: boolean;
-            /** @description The passphrase of the lead who is signed in, once more: needed for a session of a study. */
+            /** @description The passphrase of the lead who is signed in, entered again: needed for a session of a study. */
             passphrase?: string | null;
-            /** @description Kept in the audit trail. */
+            /** @description Why; stored in the audit trail. */
             reason: string;
         };
-        /** @description What unblinding told. */
+        /** @description What unblinding revealed. */
         Unblinding: {
             /** @description When, by the server's wall clock. */
             at: string;
@@ -2759,51 +2772,51 @@ export interface components {
             emergency: boolean;
             /** @description The policy of each setting, in order. */
             policies: string[];
-            /** @description Why. */
+            /** @description Reason for the unblinding. */
             reason: string;
         };
         /**
-         * @description What a check came to.
+         * @description The result of a check.
          * @enum {string}
          */
         Verdict: "well" | "advice" | "wrong";
         /**
-         * @description The clock by which a page measured how long something waited.
+         * @description The clock with which a page measured how long a comment or answer waited.
          * @enum {string}
          */
         WaitClock: "page-clock" | "wall-clock";
-        /** @description A closing question's answers. */
+        /** @description The answers to a closing question. */
         WholeSessions: components["schemas"]["Outcome"] & components["schemas"]["Summary"] & {
-            /** @description Sessions without an answer. */
+            /** @description Number of sessions without an answer. */
             missing: number;
         };
-        /** @description Why a participant withdrew. */
+        /** @description A participant's withdrawal. */
         Withdraw: {
-            /** @description Kept in the audit trail. */
+            /** @description Why the participant withdrew; stored in the audit trail. */
             reason: string;
         };
-        /** @description A withdrawal for reading. */
+        /** @description A withdrawal, as it is shown. */
         WithdrawalLine: {
-            /** @description The personal account of whoever recorded it, where somebody was signed in. */
+            /** @description The personal account of the person who recorded it, if signed in. */
             account?: string | null;
-            /** @description When, by the server's wall clock. */
+            /** @description When it was recorded, by the server's wall clock. */
             at: string;
             /** @description Who recorded it. */
             by: components["schemas"]["Role"];
-            /** @description Why. */
+            /** @description Reason for the withdrawal. */
             reason: string;
-            /** @description Comments, answers in words and notes that still stand in the database: nobody has erased them. */
+            /** @description Number of comments, answers in words and notes that nobody has erased from the database yet. */
             words_left: number;
         };
-        /** @description Something that was said. */
+        /** @description A comment or an answer in words. */
         Words: {
             /** @description Whether its words were erased. */
             erased: boolean;
-            /** @description Whether it arrived after the time in which what a surgeon's device held counted. */
+            /** @description Whether it arrived after the time in which what a surgeon's device held still counted. */
             late: boolean;
-            /** @description The question that it answers; none of a comment. */
+            /** @description The question that it answers; none for a comment. */
             question?: string | null;
-            /** @description The words, empty where they were erased. */
+            /** @description The words; empty if they were erased. */
             text: string;
         };
     };
@@ -3673,7 +3686,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Something is missing, the day is yet to come, or the protocol requires another version of the text */
+            /** @description Something is missing, the day is in the future, or the protocol requires another version of the text */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -4934,7 +4947,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is the last account that leads */
+            /** @description It is the last lead who can sign in */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5747,7 +5760,7 @@ export interface operations {
     researcher_zip: {
         parameters: {
             query?: {
-                /** @description Whether to tell which policy ran in which setting; only after unblinding. */
+                /** @description Whether to include which policy ran in which setting; only after unblinding. */
                 unblinded?: boolean;
             };
             header?: never;
@@ -5969,7 +5982,10 @@ export interface operations {
     researcher_frame: {
         parameters: {
             query?: {
-                /** @description How finely mosaics are developed. A recording of the view has its pictures as they were recorded. */
+                /**
+                 * @description The resolution at which mosaics are developed. Pictures of a recording of the view are sent as they were
+                 *     recorded.
+                 */
                 size?: "cell" | "half";
             };
             header?: never;
@@ -8488,11 +8504,11 @@ export interface operations {
     surgeon_keep_piece: {
         parameters: {
             query: {
-                /** @description Session that the comment was said in. */
+                /** @description Session in which the comment was spoken. */
                 session: components["schemas"]["SessionId"];
-                /** @description How far the recording had come at the piece's end, milliseconds. */
+                /** @description Length of the recording up to the end of this piece, milliseconds. */
                 through_ms: number;
-                /** @description Why the recording ended, on its last piece. */
+                /** @description Why the recording ended; only with its last piece. */
                 ended?: "released" | "limit" | "microphone-lost" | "left";
             };
             header?: never;
@@ -8789,7 +8805,7 @@ export interface operations {
     stream_live: {
         parameters: {
             query?: {
-                /** @description The role to be served as, of those that the browser holds; else the one that may see least. */
+                /** @description The role to be served as, of those that the browser holds; by default, the one that may see least. */
                 role?: components["schemas"]["Role"];
             };
             header?: never;
@@ -9707,7 +9723,7 @@ export interface operations {
     accounts_page: {
         parameters: {
             query?: {
-                /** @description Path of the page to go on to. */
+                /** @description Path of the page to open after signing in. */
                 next?: string;
             };
             header?: never;

@@ -1,26 +1,26 @@
 //! Agreement between repeats: the intraclass correlation ICC(A,1) of McGraw & Wong (1996, Psychological Methods 1:30),
 //! which is ICC(2,1) of Shrout & Fleiss (1979, Psychological Bulletin 86:420): two-way, absolute agreement, of a single
-//! rating. On ordinal ratings it is weighted kappa with quadratic weights, but for terms that vanish with the number of
-//! subjects (Fleiss & Cohen 1973, Educational and Psychological Measurement 33:613).
+//! rating. On ordinal ratings it equals weighted kappa with quadratic weights, except for terms that vanish with the
+//! number of subjects (Fleiss & Cohen 1973, Educational and Psychological Measurement 33:613).
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::distributions::f_quantile;
 
-/// How far repeats agree.
+/// Agreement of repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Agreement {
-    /// ICC(A,1), at most 1; negative where repeats differ more than subjects.
+    /// ICC(A,1), at most 1; negative if repeats differ more than subjects.
     pub icc: f64,
-    /// Lower end of its 95 % interval; none where repeats agree without any difference.
+    /// Lower end of its 95 % interval; none if repeats agree exactly.
     pub low: Option<f64>,
-    /// Upper end.
+    /// Upper end of its 95 % interval; none if repeats agree exactly.
     pub high: Option<f64>,
 }
 
-/// The agreement within `subjects`, each with the same two or more repeats. `None` of fewer than two subjects or
-/// repeats, and where all values are equal.
+/// The agreement within `subjects`, each with the same two or more repeats. `None` for fewer than two subjects or
+/// repeats, and if all values are equal.
 #[must_use]
 pub fn agreement(subjects: &[Vec<f64>]) -> Option<Agreement> {
     let repeats = subjects.first()?.len();
@@ -39,7 +39,7 @@ pub fn agreement(subjects: &[Vec<f64>]) -> Option<Agreement> {
     let all: f64 = subjects.iter().flatten().map(|value| (value - grand).powi(2)).sum();
     let between_subjects: f64 = k * subject_means.iter().map(|mean| (mean - grand).powi(2)).sum::<f64>();
     let between_repeats: f64 = n * repeat_means.iter().map(|mean| (mean - grand).powi(2)).sum::<f64>();
-    // Values that differ by rounding alone are equal.
+    // Values that differ only by rounding are equal.
     let scale = subjects.iter().flatten().map(|value| value * value).sum::<f64>();
     if all <= scale * 1e-24 {
         return None;

@@ -1,6 +1,6 @@
-//! The distributions that p values and intervals need: chi-square and F.
+//! The distributions for p values and intervals: chi-square and F.
 
-/// Terms after which a series or continued fraction has long converged.
+/// Number of terms after which a series or continued fraction has certainly converged.
 const TERMS: u32 = 500;
 /// Relative change below which a series has converged.
 const PRECISION: f64 = 1e-16;

@@ -1,5 +1,5 @@
-//! Friedman's test (1937, Journal of the American Statistical Association 32:675): whether treatments differ, each
-//! block's values ranked by themselves.
+//! Friedman's test (1937, Journal of the American Statistical Association 32:675): whether treatments differ. The
+//! values are ranked within each block.
 
 use std::collections::BTreeMap;
 
@@ -12,29 +12,29 @@ use utoipa::ToSchema;
 use super::distributions::chi_square_above;
 use super::ranks::doubled_ranks;
 
-/// Steps that the exact distribution may take; beyond, permutations are drawn.
+/// Limit on the steps of the exact distribution; beyond it, permutations are drawn.
 const MOST_STEPS: usize = 4_000_000;
-/// Most treatments whose permutations are all written down.
+/// Most treatments for which all permutations are enumerated.
 const MOST_TREATMENTS: usize = 6;
-/// Permutations that are drawn.
+/// Number of permutations that are drawn.
 const DRAWS: usize = 9_999;
 
-/// What Friedman's test found.
+/// Result of Friedman's test.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Friedman {
     /// The statistic, corrected for ties.
     pub chi_square: f64,
-    /// Degrees of freedom: treatments less one.
+    /// Degrees of freedom: treatments minus one.
     pub df: usize,
-    /// p from the chi-square distribution, which is rough for few blocks.
+    /// p from the chi-square distribution, a rough approximation for few blocks.
     pub p_chi_square: f64,
     /// p over the permutations of each block's ranks.
     pub p_permutation: f64,
-    /// How it was computed.
+    /// How `p_permutation` was computed.
     pub permutation: PermutationMethod,
     /// Kendall's W, 0..=1: how far the blocks agree on an order.
     pub kendalls_w: f64,
-    /// The mean rank of each treatment, 1 for the least value.
+    /// The mean rank of each treatment; rank 1 is the lowest value.
     pub mean_ranks: Vec<f64>,
 }
 
@@ -44,12 +44,12 @@ pub struct Friedman {
 pub enum PermutationMethod {
     /// Over all permutations.
     Exact,
-    /// Over 9999 permutations that were drawn.
+    /// Over 9999 randomly drawn permutations.
     MonteCarlo,
 }
 
-/// Tests `blocks` of three or more treatments each. Permutations are drawn from `seed` where there are too many to take
-/// all. `None` of fewer than two blocks, of fewer than three treatments, and where no block has a difference.
+/// Tests `blocks` of three or more treatments each. If there are too many permutations to take all, some are drawn from
+/// `seed`. `None` for fewer than two blocks or three treatments, and if no block has a difference.
 #[must_use]
 pub fn friedman(blocks: &[Vec<f64>], seed: u64) -> Option<Friedman> {
     let treatments = blocks.first()?.len();
@@ -76,13 +76,13 @@ pub fn friedman(blocks: &[Vec<f64>], seed: u64) -> Option<Friedman> {
 }
 
 /// Kendall's W of `blocks`, corrected for ties (Kendall & Babington Smith 1939, Annals of Mathematical Statistics
-/// 10:275); `None` where no block has a difference.
+/// 10:275); `None` if no block has a difference.
 #[must_use]
 pub fn concordance<'a>(blocks: impl IntoIterator<Item = &'a Vec<f64>>) -> Option<f64> {
     concordance_of(&blocks.into_iter().map(|block| doubled_ranks(block)).collect::<Vec<_>>())
 }
 
-/// The spread of the rank sums as a share of the greatest that these ranks allow: that of blocks that all agree.
+/// The spread of the rank sums, divided by the greatest spread that these ranks allow, when all blocks agree.
 fn concordance_of(ranks: &[Vec<i64>]) -> Option<f64> {
     let treatments = ranks.first()?.len() as i64;
     let blocks = ranks.len() as i64;
@@ -103,7 +103,7 @@ fn spread(sums: &[i64], mean: i64) -> i64 {
     sums.iter().map(|sum| (sum - mean).pow(2)).sum()
 }
 
-/// The share of permutations of each block's ranks whose rank sums spread at least as far as these.
+/// The share of permutations of each block's ranks whose rank sums spread at least as much as these.
 fn permutation_p(ranks: &[Vec<i64>], seed: u64) -> (f64, PermutationMethod) {
     match exact_p(ranks) {
         Some(p) => (p, PermutationMethod::Exact),
@@ -119,8 +119,8 @@ fn exact_p(ranks: &[Vec<i64>]) -> Option<f64> {
     let mean = (treatments as i64 + 1) * ranks.len() as i64;
     let observed = spread(&sums(ranks), mean);
 
-    // The probability of each set of rank sums, in rising order: all treatments are alike, so their order tells
-    // nothing of what comes next.
+    // The probability of each set of rank sums, in rising order. All treatments are alike here, so the order of the
+    // sums does not affect what comes next.
     let mut states = BTreeMap::from([(vec![0; treatments], 1.0)]);
     let mut steps = 0;
     for block in ranks {
@@ -145,7 +145,7 @@ fn exact_p(ranks: &[Vec<i64>]) -> Option<f64> {
     Some(as_far.map(|(_, probability)| probability).sum::<f64>().min(1.0))
 }
 
-/// Each order of `ranks` that differs from the others, with its probability.
+/// Each distinct order of `ranks`, with its probability.
 fn orders_of(ranks: &[i64]) -> BTreeMap<Vec<i64>, f64> {
     let mut orders = BTreeMap::from([(Vec::new(), (ranks.to_vec(), 1.0))]);
     for _ in 0..ranks.len() {
@@ -178,6 +178,6 @@ pub(super) fn drawn_p(ranks: &[Vec<i64>], seed: u64) -> f64 {
         }
         as_far += usize::from(spread(&sums(&drawn), mean) >= observed);
     }
-    // The order that was observed is one of the permutations (Phipson & Smyth 2010).
+    // The observed order is one of the permutations (Phipson & Smyth 2010).
     (as_far + 1) as f64 / (DRAWS + 1) as f64
 }

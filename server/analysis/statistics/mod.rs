@@ -1,5 +1,6 @@
-//! The statistics of an analysis beside those of evaluations: summaries, tests over more than two policies, trends and
-//! agreement. Values are numbers of any unit; a block is a surgeon's or session's values, one for each treatment.
+//! The statistics of an analysis, in addition to those of evaluations: summaries, tests over more than two policies,
+//! trends and agreement. Values are numbers of any unit; a block holds a surgeon's or session's values, one for each
+//! treatment.
 
 mod agreement;
 mod distributions;

@@ -1,11 +1,11 @@
-//! Ranks within a block, doubled so that they are whole numbers also where equal values share their mean rank.
+//! Ranks within a block, doubled so that they are whole numbers even if equal values share their mean rank.
 
-/// How far two values may differ in proportion to their size and still count as equal: means of the same ratings,
-/// summed in another order, differ by rounding.
+/// Relative difference up to which two values count as equal: means of the same ratings, summed in another order,
+/// differ by rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Twice the rank of each of `values`, 2 for the least if nothing is equal to it. The ranks of a block sum up to
-/// k (k + 1), doubled as they are.
+/// Twice the rank of each of `values`: 2 for the lowest if no other equals it. The doubled ranks of a block of k values
+/// sum to k (k + 1).
 pub fn doubled_ranks(values: &[f64]) -> Vec<i64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));

@@ -3,16 +3,16 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// What a sample is in short.
+/// Summary of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Summary {
-    /// Values there are.
+    /// Number of values.
     pub n: usize,
-    /// Mean; none of nothing.
+    /// Mean; none without values.
     pub mean: Option<f64>,
-    /// Median; none of nothing.
+    /// Median; none without values.
     pub median: Option<f64>,
-    /// Standard deviation of the sample (divided by n - 1); none of fewer than two.
+    /// Standard deviation of the sample (divided by n - 1); none for fewer than two values.
     pub sd: Option<f64>,
 }
 
@@ -26,7 +26,7 @@ pub fn summary(values: &[f64]) -> Summary {
     Summary { n, mean, median: median(values), sd }
 }
 
-/// The median: of an even number, the mean of the two in the middle.
+/// The median; for an even number of values, the mean of the two in the middle. `None` without values.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();

@@ -1,4 +1,4 @@
-//! The statistics beside what SciPy says of the same values: `tests/vectors/analysis.py`.
+//! Compares the statistics with SciPy's for the same values: `tests/vectors/analysis.py`.
 
 use serde::Deserialize;
 
@@ -74,7 +74,7 @@ fn friedmans_test_agrees_with_scipy_and_with_counting() {
             assert_eq!(found.permutation, PermutationMethod::Exact, "{name}");
             assert_near(found.p_permutation, p, name);
         } else {
-            // Five standard errors of a p that was drawn, and what chi-square is off by at this size.
+            // Allows five standard errors of a drawn p, and the error of chi-square at this size.
             assert_eq!(found.permutation, PermutationMethod::MonteCarlo, "{name}");
             assert!((found.p_permutation - case.p_chi_square).abs() < 0.04, "{name}: {found:?}");
         }

@@ -1,5 +1,5 @@
 //! Page's test for a trend (1963, Journal of the American Statistical Association 58:216): whether values rise or fall
-//! from one treatment to the next, each block's values ranked by themselves.
+//! from one treatment to the next. The values are ranked within each block.
 
 use std::collections::BTreeMap;
 
@@ -14,21 +14,21 @@ const MOST_TREATMENTS: usize = 8;
 /// Most blocks for which p is exact.
 const MOST_BLOCKS: usize = 100;
 
-/// What Page's test found.
+/// Result of Page's test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Trend {
     /// Page's L: the sum over treatments of place times rank sum.
     pub l: f64,
-    /// What L is on average where there is no trend.
+    /// Mean of L if there is no trend.
     pub expected: f64,
     /// Two-sided p.
     pub p: f64,
-    /// How it was computed.
+    /// How `p` was computed.
     pub method: Method,
 }
 
-/// Tests `blocks` for a trend in either direction over their three or more treatments, which stand in order. `None` of
-/// fewer than two blocks, of fewer than three treatments, and where no block has a difference.
+/// Tests `blocks` for a trend in either direction over their three or more treatments, which are in order. `None` for
+/// fewer than two blocks or three treatments, and if no block has a difference.
 #[must_use]
 pub fn trend(blocks: &[Vec<f64>]) -> Option<Trend> {
     let treatments = blocks.first()?.len();
@@ -79,9 +79,9 @@ fn exact_p(ranks: &[Vec<i64>], distance: i64, expected: i64) -> f64 {
     as_far.map(|(_, probability)| probability).sum::<f64>().min(1.0)
 }
 
-/// The probability of each weighted sum of a block over all orders of its ranks.
+/// The probability of each weighted sum of a block, over all orders of its ranks.
 fn distribution(ranks: &[i64]) -> BTreeMap<i64, f64> {
-    // For each set of ranks used so far, written as bits: the sums that they may have at the first places.
+    // For each set of ranks used so far, as bits: the sums that they can have in the first places.
     let mut by_set: BTreeMap<usize, BTreeMap<i64, f64>> = BTreeMap::from([(0, BTreeMap::from([(0, 1.0)]))]);
     for place in 1..=ranks.len() {
         let share = 1.0 / (ranks.len() + 1 - place) as f64;
@@ -99,7 +99,7 @@ fn distribution(ranks: &[i64]) -> BTreeMap<i64, f64> {
     by_set.into_values().next().unwrap_or_default()
 }
 
-/// Two-sided p from the normal distribution with the variance of L over permutations, ties included.
+/// Two-sided p from the normal distribution, with the variance of L over permutations, including ties.
 fn approximate_p(ranks: &[Vec<i64>], deviation: i64) -> f64 {
     let treatments = ranks.first().map_or(0, Vec::len) as f64;
     let places = treatments * (treatments * treatments - 1.0) / 12.0;

@@ -11,7 +11,7 @@ use image::{ImageBuffer, ImageFormat, Luma};
 use crate::files::replace;
 use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
 
-/// Why a calibration, or a maker's table, cannot be used or saved. Names the file, and says what to do.
+/// Why a calibration, or a maker's table, cannot be used or saved. The message names the file, and says what to do.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct CalibrationFault(String);
@@ -31,7 +31,7 @@ const CAMERA_BITS: u8 = 10;
 /// Reads the calibration in the file `path`, or the current one of the folder `path`.
 ///
 /// # Errors
-/// When it cannot be read, or makes no sense.
+/// If it cannot be read, or is invalid.
 pub fn read(path: &Path) -> Result<Calibration, CalibrationFault> {
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
     let text = fs::read_to_string(&path)
@@ -45,15 +45,15 @@ pub fn read(path: &Path) -> Result<Calibration, CalibrationFault> {
 /// The calibration of `path` if one is given, else that of a typical unit.
 ///
 /// # Errors
-/// When it cannot be read, or makes no sense.
+/// If it cannot be read, or is invalid.
 pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, CalibrationFault> {
     path.map_or_else(|| Ok(Calibration::default()), read)
 }
 
-/// Refuses a calibration whose references per pixel do not fit frames of `size`.
+/// Refuses a calibration whose references per pixel do not fit frames of `size`. `of` names the frames in the message.
 ///
 /// # Errors
-/// When they do not fit.
+/// If they do not fit.
 pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
     match (calibration.size(), size) {
         (Some(taken), Some(size)) if taken != size => Err(format!(
@@ -70,20 +70,20 @@ pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usiz
     }
 }
 
-/// Refuses a calibration that does not fit a camera whose mosaics are of `size`, if it delivers
-/// any: in size, or in scale.
+/// Refuses a calibration that does not fit, in size or in scale, a camera with mosaics of `size` (`None` if it delivers
+/// no mosaics).
 ///
 /// # Errors
-/// When it does not fit.
+/// If it does not fit.
 pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
     check_size(calibration, "the camera's picture", size)?;
     if size.is_some() { check_scale(calibration) } else { Ok(()) }
 }
 
-/// Refuses a calibration for other samples than cameras give.
+/// Refuses a calibration whose bit depth is not that of the cameras' samples.
 ///
 /// # Errors
-/// When it does not fit.
+/// If it does not fit.
 pub fn check_scale(calibration: &Calibration) -> Result<(), CalibrationFault> {
     if calibration.bit_depth != CAMERA_BITS {
         return Err(format!(
@@ -112,8 +112,7 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
 /// if there is none yet.
 ///
 /// # Errors
-/// When it cannot be read, or when it is gone while earlier versions are still there: a new one
-/// would take their names.
+/// If it cannot be read, or if it is missing while earlier versions are still there: a new one would take their names.
 pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
     if folder.join(CURRENT).exists() {
         return read(folder);
@@ -132,11 +131,11 @@ pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
     .into())
 }
 
-/// Saves `calibration` in `folder` as the current one; the one before stays there under its
-/// version's name. `changed` names the references that are new. Returns the file's path.
+/// Saves `calibration` in `folder` as the current one; the previous one stays there under its version's name. `changed`
+/// names the references that are new. Returns the file's path.
 ///
 /// # Errors
-/// When the folder cannot be written.
+/// If the folder cannot be written.
 pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, CalibrationFault> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;

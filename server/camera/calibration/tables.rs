@@ -5,11 +5,11 @@ use std::path::Path;
 use super::CalibrationFault;
 use crate::imaging::{BANDS, Band};
 
-/// Bands of the responses in `path`: a line per wavelength with nm and 16 responses; a heading may
-/// come first. Centre and width are those of each response's main peak at half its height.
+/// Reads the bands from the responses in `path`: a line per wavelength with nm and 16 responses; a heading may come
+/// first. Centre and width are those of each response's main peak at half its height.
 ///
 /// # Errors
-/// When the table cannot be read or has no peak in a band.
+/// If the table cannot be read or has no peak in a band.
 pub fn bands(path: &Path) -> Result<[Band; BANDS], CalibrationFault> {
     let rows = rows(path, BANDS + 1)?;
     let rising = rows.windows(2).all(|pair| pair[0][0] < pair[1][0]);
@@ -27,10 +27,10 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], CalibrationFault> {
     bands.try_into().map_err(|_| CalibrationFault("16 bands".to_owned()))
 }
 
-/// The correction in `path`: 16 lines of 16.
+/// Reads the correction in `path`: 16 lines of 16 numbers.
 ///
 /// # Errors
-/// When the table cannot be read or has another shape.
+/// If the table cannot be read or has another shape.
 pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], CalibrationFault> {
     let rows = rows(path, BANDS)?;
     if rows.len() != BANDS {
@@ -39,7 +39,7 @@ pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], CalibrationFault
     Ok(std::array::from_fn(|row| std::array::from_fn(|column| rows[row][column] as f32)))
 }
 
-/// Lines of `columns` finite numbers; a first line that holds none is a heading.
+/// Reads lines of `columns` finite numbers. A first line without any number is a heading.
 fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, CalibrationFault> {
     let failed = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
     let reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_path(path);

@@ -39,7 +39,7 @@ impl Clip {
         Self::with(path, MOST)
     }
 
-    /// Opens a video of which at most `most` pictures are kept.
+    /// Opens a video. At most `most` of its pictures are kept.
     fn with(path: &Path, most: usize) -> Result<Self, FootageError> {
         let failed = |error: &dyn std::fmt::Display| FootageError::unreadable(path, error);
         let mut video = Video::open(path, FPS, WIDTH, HEIGHT)?;
@@ -68,7 +68,8 @@ impl Clip {
                 let width = *width;
                 let height = *height;
                 let image = Image { pixels: &mut data[..], width, pitch: 3 * width, height, format: PixelFormat::RGB };
-                // The JPEG is our own and of this very size; should it fail, the previous picture stays.
+                // The JPEG is our own and has exactly this size. If decoding fails nevertheless, the previous picture
+                // stays.
                 let _ = decompressor.decompress(&jpeg, image);
             }
         }
@@ -110,7 +111,7 @@ impl Drop for Clip {
     }
 }
 
-/// The pictures that the loader has put and the clip takes.
+/// The pictures that the loader adds and the clip takes.
 struct Shelf {
     held: Mutex<Held>,
     changed: Condvar,
@@ -157,7 +158,7 @@ struct Loader {
 }
 
 impl Loader {
-    /// Plays `video` into the shelf, over and over where it is longer than the window.
+    /// Puts the pictures of `video` on the shelf, over and over if the video is longer than the window.
     fn run(mut self, mut video: Video) {
         loop {
             for picture in &mut video {
@@ -228,14 +229,14 @@ mod tests {
         let mut most = 0;
         let mut numbers = Vec::new();
         for step in 1..=steps {
-            // A decoder that is behind makes the clip wait; here the clip waits for it.
+            // While the decoder is behind, a clip shows the same picture. So the test waits for the decoder.
             let behind = |held: &mut Held| !held.whole && clip.index + 1 >= held.pictures.len();
             let held = clip.shelf.changed.wait_while(clip.shelf.lock(), behind).unwrap();
             most = most.max(held.pictures.len());
             drop(held);
 
             let gray = clip.at(Duration::from_secs(1) * step / FPS).data[0];
-            // To the nearest, for the JPEG may be off by one level.
+            // Rounded to the nearest, because the JPEG may be off by one level.
             numbers.push((i32::from(gray) - 16 + 2) / 4);
         }
         (numbers, most)

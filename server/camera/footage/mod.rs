@@ -1,7 +1,6 @@
-//! Footage as a camera: makes sharp pictures into a live focal-time scan, as simulated scans are in the
-//! literature (Budd et al., MICCAI 2023). A window walks over the picture, the optimal focal power walks,
-//! and the window is blurred by a Gaussian whose standard deviation grows with the distance between
-//! focal power and optimum.
+//! Footage as a camera: turns sharp pictures into a live focal-time scan, in the way of simulated scans in the
+//! literature (Budd et al., MICCAI 2023). A window walks over the picture, the optimal focal power walks, and the
+//! window is blurred by a Gaussian whose standard deviation grows with the distance between focal power and optimum.
 
 mod clip;
 mod defocus;
@@ -30,11 +29,11 @@ use reel::Reel;
 
 /// Share of the footage's width and height that the window shows.
 const WINDOW: f64 = 0.75;
-/// Steps a second of the walks: the rate at which their speeds were measured.
+/// Steps per second of the walks: the rate at which their speeds were measured.
 const RATE: f64 = 25.0;
 /// Walk of the optimal focal power: 0.012 a frame at 25 frames a second, remembered for 60 frames.
 const FOCUS: Habit = Habit { range: (0.0, 1.0), speed: 0.012 * RATE, memory: 60.0 / RATE };
-/// Blur when focal power is off by the whole range: standard deviation in pixels, drawn once a camera.
+/// Blur when focal power is off by the whole range: standard deviation in pixels, drawn once per camera.
 const BLURS: (f64, f64) = (2.0, 8.0);
 
 /// Footage seen through a lens.
@@ -49,7 +48,7 @@ struct Footage {
 /// Plays a video, an image or a folder of images as a camera.
 ///
 /// # Errors
-/// When it cannot be read, holds no pictures or too small ones, or the video decoder is missing.
+/// If it cannot be read, holds no pictures or too small ones, or the video decoder is missing.
 pub fn open(path: &std::path::Path, settings: CameraSettings) -> Result<impl Camera + use<>, FootageError> {
     let mut reel = Reel::open(path)?;
     let first = reel.at(Duration::ZERO)?;

@@ -5,10 +5,10 @@ use std::io::BufRead;
 use image::codecs::pnm::PnmDecoder;
 use image::{DynamicImage, ImageDecoder, ImageError};
 
-/// Bytes beyond which a picture is implausible, and the stream damaged.
+/// Most bytes of a picture. One that claims more is implausible: the stream is damaged.
 const MOST_BYTES: u64 = 1 << 28;
 
-/// Why a stream holds no further picture though it goes on.
+/// Why the next picture of a stream cannot be read, although the stream has not ended.
 #[derive(Debug, thiserror::Error)]
 pub enum PnmError {
     /// The stream broke off or failed.
@@ -22,10 +22,10 @@ pub enum PnmError {
     TooLarge(u64),
 }
 
-/// The next picture of `stream`, which is left right after it; `None` at the stream's end.
+/// Reads the next picture of `stream` and not a byte more; `None` at the stream's end.
 ///
 /// # Errors
-/// When the stream fails, or what follows is not a whole picture.
+/// If the stream fails, or what follows is not a whole picture.
 pub fn next_pnm(stream: &mut impl BufRead) -> Result<Option<DynamicImage>, PnmError> {
     if stream.fill_buf()?.is_empty() {
         return Ok(None);

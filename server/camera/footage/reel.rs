@@ -74,10 +74,10 @@ impl Stills {
     }
 }
 
-/// Begins to read the picture in `file` by its contents: its name may be wrong about the format.
+/// Begins to read the picture in `file`. The contents decide on the format, because the name may be wrong.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
     ImageReader::open(file).and_then(ImageReader::with_guessed_format)
 }
@@ -89,7 +89,7 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
 
     if is_mosaic(&picture) {
         // A mosaic's colours would have to be marked as estimated, which footage's are not.
-        let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import a scan of such";
+        let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import it as part of a scan";
         return Err(FootageError::unreadable(file, reason));
     }
 
@@ -104,13 +104,13 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
 }
 
-/// Whether `path` has the name of a picture.
+/// Whether `path` has the file extension of a picture.
 pub(crate) fn is_picture(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// The pictures in a folder, by name.
+/// The pictures in a folder, sorted by name.
 pub(crate) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let unreadable = |error: std::io::Error| FootageError::unreadable(folder, error);
     let entries = std::fs::read_dir(folder).map_err(unreadable)?;

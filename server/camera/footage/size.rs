@@ -6,7 +6,7 @@ use super::video::FootageError;
 
 /// Largest width in pixels: the blur can keep up with it in real time.
 pub(super) const WIDTH: usize = 1024;
-/// See [`WIDTH`].
+/// Largest height in pixels, for the same reason.
 pub(super) const HEIGHT: usize = 384;
 /// Least width and height in pixels.
 pub(super) const LEAST: usize = 64;

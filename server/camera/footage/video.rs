@@ -16,16 +16,16 @@ pub enum FootageError {
     Unreadable {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The reason, in words.
         reason: String,
     },
     /// The decoder is missing.
     #[error("cannot start `ffmpeg`, which decodes videos ({0}); install it, on Debian with `apt install ffmpeg`")]
     NoDecoder(std::io::Error),
-    /// A folder without pictures.
+    /// The folder holds no pictures.
     #[error("there is no picture (PNG, JPEG or TIFF) in {}", .0.display())]
     Empty(PathBuf),
-    /// Pictures too small to hold a patch and to move about in.
+    /// The pictures are too small to hold a patch and a window that moves.
     #[error("{} is {width}x{height} pixels, but at least {least}x{least} are needed", path.display())]
     TooSmall {
         /// The file.
@@ -53,11 +53,11 @@ pub struct Video {
 }
 
 impl Video {
-    /// Starts decoding `path` at `fps` pictures a second, each scaled down to at most `width` x `height`
-    /// pixels, its aspect kept.
+    /// Starts decoding `path` at `fps` pictures a second, each scaled down to at most `width` x `height` pixels, with
+    /// its aspect ratio kept.
     ///
     /// # Errors
-    /// When the file or the decoder is missing, or the file holds no video.
+    /// If the file or the decoder is missing, or the file holds no video.
     pub fn open(path: &Path, fps: u32, width: usize, height: usize) -> Result<Self, FootageError> {
         check(path)?;
         let scale = format!(
@@ -91,7 +91,7 @@ impl Iterator for Video {
 
 impl Drop for Video {
     fn drop(&mut self) {
-        // Either fails only if the decoder has already ended by itself.
+        // These fail only if the decoder has already ended by itself.
         let _ = self.decoder.kill();
         let _ = self.decoder.wait();
     }
@@ -114,7 +114,7 @@ fn check(path: &Path) -> Result<(), FootageError> {
 /// The decoder with the file at `path` as its input; the caller adds what to do with it.
 #[must_use]
 pub fn ffmpeg(path: &Path) -> Command {
-    // The decoder would take anything before a colon in a bare name for a protocol.
+    // The decoder would treat anything before a colon in a bare name as a protocol.
     let mut name = OsString::from("file:");
     name.push(path);
 

@@ -25,17 +25,17 @@ const FAKE_PACKET: i32 = 16_000;
 /// Which camera to open, and how to set it up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
-    /// Identity, or address.
+    /// Identity, or network address.
     pub id: String,
-    /// Pixel format, if not the best that the camera has.
+    /// Pixel format; `None` for the best that the camera has.
     format: Option<PixelFormat>,
     width: Option<i32>,
     height: Option<i32>,
-    /// Bytes of a GigE Vision packet, unless negotiated.
+    /// Bytes of a GigE Vision packet; `None` to negotiate.
     packet: Option<i32>,
-    /// Exposure time, microseconds.
+    /// Exposure time, microseconds; `None` for the camera's own.
     exposure: Option<f64>,
-    /// Gain, in the camera's own units.
+    /// Gain, in the camera's own units; `None` for the camera's own.
     gain: Option<f64>,
     fps: f64,
 }
@@ -95,14 +95,14 @@ pub enum DeviceError {
 pub enum Arrival {
     /// A whole frame.
     Whole(Buffer),
-    /// A frame with parts missing.
+    /// A frame with parts missing; holds the camera's number of it.
     Incomplete(u64),
     /// Nothing came in time.
     Nothing,
 }
 
 impl Device {
-    /// Connects to the camera asked for, sets it up and starts it.
+    /// Connects to the camera of `setup`, sets it up and starts it.
     pub fn open(setup: &Setup) -> Result<Self, DeviceError> {
         let camera = connect(&setup.id)?;
 
@@ -114,7 +114,7 @@ impl Device {
         let (width, height) = set_region(&camera, setup)?;
         camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
 
-        // A camera that cannot do one of these runs as it is: exposure and rate can still be set by hand.
+        // A camera that does not support one of these still runs: exposure and rate can still be set by hand.
         let _ = camera.set_exposure_time_auto(Auto::Off);
         let _ = camera.set_gain_auto(Auto::Off);
 
@@ -200,8 +200,8 @@ impl Drop for Device {
     }
 }
 
-/// Opens the camera `id`. A camera on this very machine answers on every network interface, and Aravis
-/// would then wait for its packets on the wrong one; by its address it is found on the loopback.
+/// Opens the camera `id`. A camera on this same machine answers on every network interface, and Aravis may then wait
+/// for its packets on the wrong one. So such a camera is opened again, by the loopback address.
 fn connect(id: &str) -> Result<::aravis::Camera, glib::Error> {
     let camera = ::aravis::Camera::new(Some(id))?;
     let device = camera.device().and_then(|device| device.downcast::<GvDevice>().ok());
@@ -211,7 +211,7 @@ fn connect(id: &str) -> Result<::aravis::Camera, glib::Error> {
         return Ok(camera);
     }
 
-    // A camera has one controller at a time.
+    // A camera has one controller at a time, so the first must be closed.
     drop(camera);
     ::aravis::Camera::new(Some("127.0.0.1"))
 }
@@ -261,8 +261,7 @@ fn set_frame_rate(camera: &::aravis::Camera, fps: f64) {
     }
 }
 
-/// Sets the packet size. Large packets cost less, so by default Aravis finds the largest that come
-/// through.
+/// Sets the packet size. Large packets cost less, so by default Aravis finds the largest that gets through.
 fn negotiate_packet(camera: &::aravis::Camera, wanted: Option<i32>) -> Result<Option<u32>, DeviceError> {
     if !camera.is_gv_device() {
         return Ok(None);

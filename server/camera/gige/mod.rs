@@ -36,8 +36,8 @@ impl GigeCamera {
     /// (microseconds), `gain`. With `list` as the source, the error lists the cameras that answer.
     ///
     /// # Errors
-    /// [`CameraError::BadSource`] when it cannot be used right now; says why. It recovers from later
-    /// failures by itself.
+    /// [`CameraError::BadSource`], with the reason, if it cannot be used right now. It recovers from later failures by
+    /// itself.
     pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
         let setup = Setup::parse(source, settings.fps)?;
         if setup.id == "list" {
@@ -68,8 +68,8 @@ impl GigeCamera {
         Ok(Self { size, shared, thread: Some(thread) })
     }
 
-    /// When the last packet of the frame that [`Camera::next_frame`] gave last was in: the time of the
-    /// transfer, which the link determines, ends here. For measurements.
+    /// When the last packet of the latest frame from [`Camera::next_frame`] had arrived. The time of the transfer,
+    /// which depends on the link, ends here. For measurements.
     #[must_use]
     pub fn whole_at(&self) -> Option<Moment> {
         self.shared.whole_at()
@@ -96,8 +96,7 @@ impl Camera for GigeCamera {
 
 impl Drop for GigeCamera {
     fn drop(&mut self) {
-        // A thread that is looking for a lost camera ends by itself within seconds; waiting for it is of
-        // no use.
+        // A thread that is looking for a lost camera ends by itself within seconds, so there is no need to wait for it.
         let streaming = self.shared.stop();
         if let Some(thread) = self.thread.take().filter(|_| streaming) {
             let _ = thread.join();
@@ -108,7 +107,7 @@ impl Drop for GigeCamera {
 /// A camera that can be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// Identity, to open it by.
+    /// Identity, by which it can be opened.
     pub id: String,
     /// Maker and model.
     pub model: String,

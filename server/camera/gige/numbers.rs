@@ -3,7 +3,7 @@
 /// GigE Vision counts frames from 1 to this number, and then again from 1.
 const LAST_NUMBER: u64 = 65_535;
 
-/// Frames from the camera's number `seen` to `now`; 1 where its counting was interrupted.
+/// Frames from the camera's number `seen` to `now`; 1 if its counting was interrupted.
 pub const fn steps(seen: Option<u64>, now: u64) -> u64 {
     match seen {
         Some(seen) if now > seen => now - seen,

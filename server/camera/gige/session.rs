@@ -1,4 +1,4 @@
-//! A camera's streaming from one loss to the next: unpacks frames, counts lost ones, changes settings.
+//! Streaming from a camera until it is lost: unpacks frames, counts lost ones, changes settings.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,24 +14,24 @@ use crate::imaging::MosaicFrame;
 
 /// The thread checks for requests at least this often.
 const LOOK: Duration = Duration::from_millis(50);
-/// A camera that sends nothing for this long, beyond its exposure, is lost; a slow one may take the time
-/// of three frames.
+/// A camera that sends nothing for this long, beyond its exposure, counts as lost. A slow one may take the time of
+/// three frames.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// A camera's streaming from one loss to the next.
+/// Streaming from a camera until it is lost.
 pub(super) struct Session<'a> {
     shared: &'a Shared,
     device: Device,
     /// Our number of the latest frame.
     number: &'a mut u64,
-    /// The changes made to the camera's settings, the latest of each: a camera that comes back has lost
+    /// The latest change of each setting. They are made again when a lost camera comes back, because it has forgotten
     /// them.
     changes: &'a mut Vec<(Setting, f64)>,
     /// The camera's number of the latest frame.
     seen: Option<u64>,
-    /// Exposure time of the camera; zero where it does not report it.
+    /// Exposure time of the camera; zero if it does not report it.
     exposure: Duration,
-    /// Time between frames; zero where the camera does not report it.
+    /// Time between frames; zero if the camera does not report it.
     period: Duration,
     /// Whether only incomplete frames come.
     torn: bool,
@@ -40,8 +40,8 @@ pub(super) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Streaming from `device`. Our numbers continue from `number`, and `changes` made to the settings
-    /// before are made again.
+    /// Prepares streaming from `device`. Our frame numbers continue from `number`, and the earlier `changes` of
+    /// settings are made again.
     pub fn new(shared: &'a Shared, device: Device, number: &'a mut u64, changes: &'a mut Vec<(Setting, f64)>) -> Self {
         let pool = MosaicPool::new(device.width, device.height);
         let mut session = Self {
@@ -65,7 +65,7 @@ impl<'a> Session<'a> {
         session
     }
 
-    /// Streams until the camera is lost or the thread is to end; returns the reason.
+    /// Streams until the camera is lost or the thread should end; returns the reason.
     pub fn stream(mut self) -> String {
         let mut last = self.shared.clock.now();
         let mut whole = last;
@@ -87,7 +87,7 @@ impl<'a> Session<'a> {
                     self.tell_torn(last.since(whole) > self.silence());
                 }
                 Arrival::Nothing if self.shared.clock.now().since(last) > self.silence() => {
-                    return "no frames come from the camera: check its power, cable and trigger".into();
+                    return "the camera sends no frames: check its power, cable and trigger".into();
                 }
                 Arrival::Nothing => {}
             }

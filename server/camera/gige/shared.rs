@@ -65,7 +65,7 @@ impl Shared {
         }
     }
 
-    /// When the last packet of the frame taken last was in.
+    /// When the last packet of the frame taken last had arrived.
     pub fn whole_at(&self) -> Option<Moment> {
         self.state().taken
     }
@@ -132,7 +132,7 @@ impl Shared {
         state.condition = condition;
     }
 
-    /// Waits `time`, or until the thread is to end; returns whether it is to end.
+    /// Waits for `time`, or until the thread should end. Returns whether it should end.
     pub(super) fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed

@@ -10,21 +10,20 @@ const WINDOW: Duration = Duration::from_secs(4);
 
 /// Maps a camera's time stamps to the monotonic clock.
 ///
-/// The first packet of a frame leaves the camera when its exposure has ended, and is then delayed by a
-/// varying time. The least difference between arrival and stamp over the last seconds is therefore that
-/// of a frame that was hardly delayed, and a stamp plus that difference is the end of its exposure
-/// without the jitter of network and machine.
+/// The first packet of a frame leaves the camera when its exposure has ended, and is then delayed by a varying time. So
+/// the least difference between arrival and stamp over the last seconds is that of a frame that was hardly delayed. A
+/// stamp plus that difference is the end of its exposure, without the jitter of network and machine.
 #[derive(Debug, Default)]
 pub struct Timestamps {
-    /// Arrival of each stamp and its difference; differences rise, so the front is the window's least.
+    /// Arrival of each stamp and its difference; differences rise, so the first is the least of the window.
     differences: VecDeque<(Moment, i128)>,
     last: Option<Moment>,
 }
 
 impl Timestamps {
-    /// The moment of `stamp` (nanoseconds of the camera's clock), whose frame began to arrive at
-    /// `arrived`. Never later than `arrived`, except to come after the frame before; a camera without a
-    /// clock gets `arrived`.
+    /// The moment of `stamp` (nanoseconds of the camera's clock), whose frame began to arrive at `arrived`. Never later
+    /// than `arrived`, unless it has to be, to come after the frame before. For a camera without a clock it is
+    /// `arrived`.
     pub fn moment(&mut self, stamp: u64, arrived: Moment) -> Moment {
         let moment = self.undelayed(stamp, arrived);
 
@@ -61,8 +60,8 @@ impl Timestamps {
     }
 }
 
-/// The moment at which a frame began to arrive that Aravis noted at `noted`, nanoseconds of the wall's
-/// clock.
+/// The moment at which a frame began to arrive. `noted` is the time that Aravis noted for it, in nanoseconds of the
+/// wall clock.
 pub fn arrival(noted: u64, clock: &dyn Clock) -> Moment {
     let wall = u64::try_from(clock.wall().as_nanosecond()).unwrap_or_default();
     // The monotonic clock is read last. A pause between the two makes the arrival late, which `Timestamps`
@@ -123,7 +122,7 @@ mod tests {
         assert_eq!(Timestamps::default().moment(0, at(5)), at(5));
     }
 
-    /// A clock whose reader is held up for 30 ms after each look.
+    /// A clock whose reader is held up for 30 ms after each reading.
     struct Slow(ManualClock);
 
     impl Clock for Slow {

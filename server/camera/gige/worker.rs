@@ -9,7 +9,7 @@ use super::shared::{Shared, words};
 /// Time between two attempts to find a lost camera.
 const RETRY: Duration = Duration::from_millis(300);
 
-/// Streams from `device`, and from the same camera opened anew when it is lost, until told to stop.
+/// Streams from `device` until told to stop. If the camera is lost, opens it again.
 pub fn run(shared: &Shared, setup: &Setup, device: Device) {
     let mut number = 0;
     let mut changes = Vec::new();

@@ -20,20 +20,20 @@ pub struct ScanFolder {
     pub(super) whole_bytes: u64,
 }
 
-/// A picture that is not as it was stored.
+/// A picture that differs from what was stored, or cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damage {
-    /// The picture's file, from the scan's folder on.
+    /// The picture's file, relative to the scan's folder.
     pub file: String,
     /// What is wrong, as a sentence.
     pub reason: String,
 }
 
 impl ScanFolder {
-    /// Reads the description of the scan in `path`; pictures are read when they are asked for.
+    /// Reads the description of the scan in `path`. Pictures are only read when they are asked for.
     ///
     /// # Errors
-    /// When there is no scan, or what describes it cannot be read or makes no sense.
+    /// If there is no scan, or its description cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self, ScanError> {
         let file = path.join(HEADER);
         if !file.is_file() {
@@ -49,8 +49,7 @@ impl ScanFolder {
         Ok(folder)
     }
 
-    /// Reads every whole line. A last line without its end was being written when the power failed,
-    /// and does not count.
+    /// Reads every whole line. A last line without its end was being written when the power failed, and is left out.
     fn read_poses(&mut self) -> Result<(), ScanError> {
         let file = self.path.join(POSES);
         if !file.exists() {
@@ -83,20 +82,22 @@ impl ScanFolder {
 
         if let Some(first) = self.poses.values().next().filter(|first| (first.width, first.height) != (width, height)) {
             return Err(format!(
-                "pose {number} is {width}x{height} pixels, pose {} {}x{}",
+                "pose {number} is {width}x{height} pixels, but pose {} is {}x{}",
                 first.pose, first.width, first.height
             ));
         }
 
         let fits = |corner: usize, length: usize| corner.checked_add(PATCH_SIDE).is_some_and(|end| end <= length);
         if width < LEAST_SIDE || height < LEAST_SIDE || !fits(patch.0, width) || !fits(patch.1, height) {
-            return Err(format!("a patch at {patch:?} does not lie in {width}x{height} pixels of at least 64x64"));
+            return Err(format!(
+                "the patch at {patch:?} does not fit into {width}x{height} pixels, or these are fewer than 64x64"
+            ));
         }
 
         let mut powers: Vec<FocalPower> = pose.images.iter().map(|image| image.focal_power).collect();
         powers.sort_by(|a, b| a.get().total_cmp(&b.get()));
         if powers != self.header.focal_powers {
-            return Err(format!("pose {number} has not exactly one picture for each focal power"));
+            return Err(format!("pose {number} does not have exactly one picture for each focal power"));
         }
 
         // A scan from elsewhere must not name files outside its folder.
@@ -138,7 +139,7 @@ impl ScanFolder {
     /// The folder, if no pose is missing.
     ///
     /// # Errors
-    /// When one is.
+    /// If a pose is missing.
     pub fn whole(self) -> Result<Self, ScanError> {
         let missing = self.missing();
         if missing.is_empty() {
@@ -147,10 +148,10 @@ impl ScanFolder {
         Err(ScanError::Missing { path: self.path, missing, of: self.header.poses })
     }
 
-    /// Reads a picture of `pose`: whole gray levels.
+    /// Reads a picture of `pose`. Its gray levels are whole numbers.
     ///
     /// # Errors
-    /// When it cannot be read, or is not the picture that was stored.
+    /// If it cannot be read, or is not the picture that was stored.
     pub fn picture(&self, pose: &Pose, image: &Image) -> Result<GrayImage, ScanError> {
         let path = self.path.join(&image.file);
         let bytes = fs::read(&path).map_err(ScanError::unreadable(&path))?;
@@ -168,7 +169,8 @@ impl ScanFolder {
         }
     }
 
-    /// Checks every picture of `pose` against its checksum; also says how many bytes they have.
+    /// Checks every picture of `pose` against its checksum. Returns the bytes of the undamaged pictures, and the
+    /// damage.
     #[must_use]
     pub fn check(&self, pose: &Pose) -> (u64, Vec<Damage>) {
         let mut bytes = 0;
@@ -193,7 +195,7 @@ fn check_header(header: &Header) -> Result<(), String> {
         return Err(format!("its format is {format:?}, not {FORMAT:?}"));
     }
     if *version != VERSION {
-        return Err(format!("it is of version {version}; this program reads version {VERSION}"));
+        return Err(format!("its version is {version}; this program reads version {VERSION}"));
     }
     if !(1..=MOST_POSES).contains(poses) {
         return Err(format!("it has {poses} poses; a scan has 1 to {MOST_POSES}"));

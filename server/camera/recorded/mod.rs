@@ -1,5 +1,5 @@
-//! Recorded focal-time scans on disk: at each pose of the camera one picture for each of some discrete
-//! focal powers. `docs/scans.md` describes the format for others.
+//! Recorded focal-time scans on disk: at each pose of the camera, one picture for each of several focal powers.
+//! `docs/scans.md` describes the format for others.
 
 mod folder;
 mod player;
@@ -19,7 +19,7 @@ use crate::lens::FocalPower;
 
 /// Name of the file that says what was to be recorded.
 pub const HEADER: &str = "scan.json";
-/// Name of the file that gets a line for every pose once its pictures are stored.
+/// Name of the file that gets a line for each pose once the pose's pictures are stored.
 pub const POSES: &str = "poses.jsonl";
 /// Value of [`Header::format`].
 pub const FORMAT: &str = "parfocal-scan";
@@ -52,9 +52,9 @@ pub struct Header {
     pub seed: u64,
     /// In which order each pose's focal powers were taken.
     pub order: Order,
-    /// Number of poses that make it whole.
+    /// Number of poses in the complete scan.
     pub poses: usize,
-    /// The focal powers of each pose, rising.
+    /// The focal powers of each pose, in rising order.
     pub focal_powers: Vec<FocalPower>,
 }
 
@@ -78,12 +78,11 @@ pub struct Pose {
     pub width: usize,
     /// Height of its pictures, pixels.
     pub height: usize,
-    /// Upper left corner of the 32x32 patch at the centre of the content area, pixels rightwards and
-    /// downwards.
+    /// Upper left corner of the 32x32 patch at the centre of the content area, pixels from the left and from the top.
     pub patch: (usize, usize),
     /// The focal power of the stack at which the patch has the greatest mean gradient magnitude.
     pub optimum: FocalPower,
-    /// The best focal power, where a simulation knows it.
+    /// The best focal power; `None` unless a simulation knows it.
     pub truth: Option<FocalPower>,
     /// Its pictures in the order in which they were taken.
     pub images: Vec<Image>,
@@ -103,7 +102,7 @@ impl Pose {
 pub struct Image {
     /// Focal power it was taken at.
     pub focal_power: FocalPower,
-    /// Its file, from the scan's folder on.
+    /// Its file, relative to the scan's folder.
     pub file: String,
     /// SHA-256 of the file, in hexadecimal.
     pub sha256: String,
@@ -120,7 +119,7 @@ pub enum ScanError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error.
         error: io::Error,
     },
     /// The description of the scan is invalid.
@@ -137,7 +136,7 @@ pub enum ScanError {
     Missing {
         /// The scan's folder.
         path: PathBuf,
-        /// Numbers of the poses.
+        /// Numbers of the missing poses.
         missing: Vec<usize>,
         /// Number of poses it should have.
         of: usize,
@@ -153,7 +152,7 @@ pub enum ScanError {
     Picture {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error.
         error: DecodeError,
     },
     /// The folder holds something else.
@@ -187,7 +186,7 @@ pub enum ScanError {
     Unwritable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error.
         error: io::Error,
     },
 }

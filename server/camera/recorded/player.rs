@@ -10,13 +10,13 @@ use crate::camera::{Camera, CameraSettings};
 use crate::imaging::{GrayImage, RgbImage};
 use crate::lens::FocalPower;
 
-/// Poses a second: the paper's frame rate of scans.
+/// Poses per second: the paper's frame rate of scans.
 const RATE: u128 = 25;
 
 /// Plays the recorded scan in `path`, which must be whole, as a camera.
 ///
 /// # Errors
-/// When there is no scan, or poses are missing.
+/// If there is no scan, or poses are missing.
 pub fn open(path: &Path, settings: CameraSettings) -> Result<impl Camera + use<>, ScanError> {
     let scan = ScanFolder::open(path)?.whole()?;
     let name = format!("recorded scan {} (a recording of: {})", base_name(path), scan.header().camera);

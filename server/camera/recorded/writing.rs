@@ -1,6 +1,5 @@
-//! Writes a recorded scan's folder. A pose's pictures appear under their name all at once, when all
-//! are stored, and only then does the pose get its line: however the recording ends, what is there is
-//! whole and the rest is missing.
+//! Writes a recorded scan's folder. A pose's pictures get their final name all at once, when all are stored. Only then
+//! does the pose get its line. So however the recording ends, each pose is either whole or missing.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -17,11 +16,11 @@ use crate::files::{replace, write_through};
 use crate::imaging::{GrayImage, PatchArea};
 use crate::lens::FocalPower;
 
-/// A scan being recorded. One process at a time.
+/// A scan that is being recorded, by one process at a time.
 #[derive(Debug)]
 pub struct Recording {
     folder: ScanFolder,
-    /// Locked as long as this lives.
+    /// The file of lines, locked as long as this value lives.
     journal: File,
 }
 
@@ -36,7 +35,7 @@ pub struct Shot {
     pub patch: PatchArea,
     /// The focal power at which the patch is sharpest in the stack.
     pub optimum: FocalPower,
-    /// The best focal power, where a simulation knows it.
+    /// The best focal power; `None` unless a simulation knows it.
     pub truth: Option<FocalPower>,
 }
 
@@ -45,7 +44,7 @@ impl Recording {
     /// the same `header` (apart from the software's version).
     ///
     /// # Errors
-    /// When the folder holds anything else, is being recorded into, or cannot be written.
+    /// If the folder holds anything else, another process records into it, or it cannot be written.
     pub fn open(path: &Path, header: &Header) -> Result<Self, ScanError> {
         fs::create_dir_all(path).map_err(|error| unwritable(path, 0, error))?;
 
@@ -86,7 +85,7 @@ impl Recording {
     /// Stores a pose.
     ///
     /// # Errors
-    /// When it cannot be written; then no part of it is left.
+    /// If it cannot be written. Then no part of it is left.
     pub fn store(&mut self, shot: &Shot) -> Result<(), ScanError> {
         let name = format!("pose{:04}", shot.pose);
         let partial = self.folder.path().join(format!(".{name}.partial"));
@@ -108,7 +107,7 @@ impl Recording {
         let write = |(power, picture): &(FocalPower, GrayImage)| -> io::Result<Image> {
             let png = png(picture)?;
 
-            // Three digits name the file, or all digits where three do not tell the powers apart.
+            // The file is named by three decimals of the power, or by all digits if three do not tell the powers apart.
             let told = if unlike.len() == shot.images.len() { rounded(power.get()) } else { power.get().to_string() };
             let file = format!("{name}_f{told}.png");
 
@@ -134,7 +133,7 @@ impl Recording {
         Ok(pose)
     }
 
-    /// Gives `pose` its line, or leaves the file as it was.
+    /// Writes the line of `pose`. If that fails, the file stays as it was.
     fn note(&self, pose: &Pose) -> io::Result<()> {
         let mut journal = &self.journal;
         let before = journal.metadata()?.len();
@@ -146,7 +145,7 @@ impl Recording {
         })
     }
 
-    /// Removes what a killed recording left half done.
+    /// Removes what a killed recording left unfinished.
     fn tidy_up(&self) -> Result<(), ScanError> {
         let unwritable = |error| self.unwritable(error);
         self.journal.set_len(self.folder.whole_bytes).map_err(unwritable)?;

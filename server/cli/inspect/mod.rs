@@ -1,4 +1,4 @@
-//! `parfocal inspect`: what imaging and the focus metrics make of pictures and mosaics in files.
+//! `parfocal inspect`: content area, patch and focus metrics of pictures and mosaics in files.
 
 mod overlay;
 mod report;
@@ -36,8 +36,8 @@ pub struct Arguments {
     /// Treat 16-bit gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
-    /// Size of the pictures that --out saves of mosaics: one pixel a mosaic cell, two by two, or one a sample. Values
-    /// and lengths are those of the cells at every size
+    /// Size of the pictures that --out saves of mosaics: one pixel per mosaic cell, two by two per cell, or one per
+    /// sample. Values and lengths are those of the cells at every size
     #[arg(long, value_enum, default_value_t, requires = "out")]
     size: Size,
     /// Calibration of the sensor that took the mosaics: a TOML file, or a folder of `parfocal calibrate`; a typical
@@ -46,11 +46,10 @@ pub struct Arguments {
     calibration: Option<PathBuf>,
 }
 
-/// Inspects every file. One that cannot be inspected is named on standard error; the others are
-/// still inspected.
+/// Inspects every file. If one cannot be inspected, standard error says so, and the others are still inspected.
 ///
 /// # Errors
-/// When a file could not be inspected, the calibration not read, or a result not written.
+/// If a file could not be inspected, the calibration could not be read, or a result could not be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut inspector = Inspector::new(arguments)?;
     let mut reports = Vec::new();
@@ -79,20 +78,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is kept from file to file.
+/// State kept from file to file.
 struct Inspector<'a> {
     mosaic: bool,
     out: Option<&'a Path>,
     size: Size,
     developer: Developer,
     calibration: Calibration,
-    /// Its title, where it was asked for.
+    /// The calibration's title, if `--calibration` was given.
     titled: Option<String>,
     /// Names already given to overlays.
     taken: HashSet<OsString>,
 }
 
-/// A picture as it is inspected.
+/// A decoded picture: `rgb` for the overlay, `gray` for the metrics.
 struct Seen {
     kind: Kind,
     rgb: RgbImage,
@@ -188,7 +187,7 @@ impl<'a> Inspector<'a> {
                 let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
                 self.developer.develop(&frame, Size::Cell, &mut seen.rgb, &mut seen.gray);
                 if self.size != Size::Cell {
-                    // Gray stays that of the cells as policies see it.
+                    // The gray picture stays that of the cells, as policies see it.
                     self.developer.develop(&frame, self.size, &mut seen.rgb, &mut GrayImage::default());
                 }
                 seen

@@ -29,14 +29,14 @@ const GLYPHS: [(char, u16); 16] = [
     ('R', 0o65655),
 ];
 
-/// The picture with what `report` says of it drawn in. The picture may be a whole number of times as
-/// large as the report's lengths.
+/// Draws the content of `report` into the picture. The picture may be larger than the report's lengths by a whole
+/// factor.
 pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
     let times = (rgb.width / report.width.max(1)).max(1);
     let mut canvas = Canvas { scale: (rgb.width / 400).max(1), picture: rgb };
 
     if let Some(area) = &report.content_area {
-        // Whole numbers are pixels' centres.
+        // Whole numbers are pixel centres.
         let enlarged = |place: f64| (place + 0.5) * times as f64 - 0.5;
         let radius = area.radius * times as f64;
         canvas.circle(&ContentArea { x: enlarged(area.x), y: enlarged(area.y), radius, ..*area });
@@ -51,7 +51,7 @@ pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
     image::RgbImage::from_raw(width as u32, height as u32, data).unwrap_or_default()
 }
 
-/// A gray picture in colour's form.
+/// A gray picture as RGB.
 pub(super) fn from_gray(gray: &GrayImage) -> RgbImage {
     let data = gray.data.iter().flat_map(|value| [value.round() as u8; 3]).collect();
     RgbImage { width: gray.width, height: gray.height, data }
@@ -64,7 +64,7 @@ struct Canvas {
 }
 
 impl Canvas {
-    /// Colours a pixel; none where it is outside of the picture.
+    /// Colours a pixel; does nothing outside the picture.
     fn dot(&mut self, x: usize, y: usize, colour: [u8; 3]) {
         if x < self.picture.width && y < self.picture.height {
             let start = 3 * (y * self.picture.width + x);

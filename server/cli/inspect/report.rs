@@ -1,4 +1,4 @@
-//! What `parfocal inspect` says of one file, as JSON or as a line of a table.
+//! The result of `parfocal inspect` for one file, as JSON or as a line of a table.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::imaging::{ContentArea, PatchArea};
 
-/// What a file holds.
+/// The kind of picture in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Kind {
@@ -26,7 +26,7 @@ pub(super) struct Report {
     pub patch: PatchArea,
     pub mgm: f64,
     pub mlr: f64,
-    /// The calibration of a mosaic, where one was asked for.
+    /// Title of the calibration. `None` if the file is not a mosaic or `--calibration` was not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<String>,
 }
@@ -41,7 +41,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// All reports, a line each under a heading; nothing where there is none.
+/// All reports, one line each below a heading; empty if there are none.
 pub(super) fn table(reports: &[Report]) -> String {
     if reports.is_empty() {
         return String::new();

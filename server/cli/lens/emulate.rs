@@ -74,7 +74,7 @@ impl Arguments {
     }
 }
 
-/// Serves an emulated driver until Ctrl-C or an order to end.
+/// Serves an emulated driver until Ctrl-C or SIGTERM.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut emulator = Emulator::start(arguments.model(), Arc::new(SystemClock))?;
     emulator.set_temperature(arguments.temperature);
@@ -119,7 +119,7 @@ fn typed_lines() -> mpsc::UnboundedReceiver<String> {
     lines
 }
 
-/// Does what `line` says; returns the answer, or why it was not done.
+/// Carries out the command in `line`. Returns the answer, or the reason why it was not done.
 fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
     let words: Vec<_> = line.split_whitespace().collect();
     match words.as_slice() {
@@ -146,7 +146,7 @@ fn glass(emulator: &Emulator) -> String {
     format!("glass at {power:.4}, {:.3} dpt", least + power * (most - least))
 }
 
-/// The number behind the prefix that marks an emulated unit.
+/// The serial number: the prefix that marks an emulated unit, then `text`.
 fn parse_serial(text: &str) -> Result<[u8; 8], String> {
     if text.is_empty() || text.len() > 4 || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
         return Err("must be one to four letters and digits".into());
@@ -168,7 +168,7 @@ fn parse_millis(text: &str) -> Result<Duration, String> {
     Ok(Duration::from_secs_f64(parse_within(text, 0.0, 10_000.0)? / 1000.0))
 }
 
-/// A hysteresis in dioptres, as the unit counts it.
+/// A hysteresis given in dioptres, in the unit of [`Model`].
 fn parse_play(text: &str) -> Result<f64, String> {
     let play = text.parse().ok().and_then(Model::play_of);
     play.ok_or_else(|| format!("must be a number from 0 to {}", LENS_DIOPTRES.1 - LENS_DIOPTRES.0))

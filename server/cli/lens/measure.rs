@@ -39,7 +39,7 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// What is printed as JSON. Times in milliseconds, focal powers of 0..=1.
+/// What is printed as JSON. Times in milliseconds, focal powers from 0 to 1.
 #[derive(Debug, Serialize)]
 struct Report {
     #[serde(flatten)]
@@ -49,7 +49,7 @@ struct Report {
     down: Times,
     between: (f64, f64),
     frames: usize,
-    /// Scatter about the fit, as a share of the step.
+    /// Root mean square deviation from the fit, as a fraction of the step.
     rms: f64,
 }
 

@@ -42,7 +42,7 @@ enum Action {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When the lens cannot be used or does not obey.
+/// If the lens cannot be used or does not obey.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.action {
         Action::Info { which } => info(which),

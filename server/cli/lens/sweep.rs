@@ -1,4 +1,4 @@
-//! `parfocal lens sweep`: asked against read back over the range, as a table and a plot.
+//! `parfocal lens sweep`: requested positions against those read back, over the range, as a table and a plot.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ pub struct Arguments {
     plot: Option<PathBuf>,
 }
 
-/// One stop.
+/// One stop of the sweep: focal powers from 0 to 1, and dioptres.
 #[derive(Debug, Serialize)]
 struct Stop {
     asked: f64,
@@ -82,7 +82,7 @@ fn table(stops: &[Stop]) -> String {
     text
 }
 
-/// Read back over asked, both in dioptres; the line is where they agree.
+/// Plots positions read back over those requested, both in dioptres; the line is where they agree.
 fn plot(stops: &[Stop]) -> String {
     const SIDE: f64 = 400.0;
     const MARGIN: f64 = 50.0;

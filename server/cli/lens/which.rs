@@ -1,4 +1,4 @@
-//! Which lens a command is for, and moving it.
+//! The options that choose a lens, and functions that move it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use crate::cli::output::Failure;
 use crate::clock::SystemClock;
 use crate::lens::{self, FocalPower, Lens, LensInfo};
 
-/// Which lens, and how to tell about it.
+/// The lens to use, and the output format.
 #[derive(Debug, clap::Args)]
 pub struct Which {
     /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or
@@ -33,14 +33,14 @@ impl Which {
     }
 }
 
-/// Where a lens stands (see docs/scripting.md).
+/// The position of a lens (see docs/scripting.md).
 #[derive(Debug, Serialize)]
 pub struct Position {
     pub focal_power: f64,
     pub dioptre: f64,
 }
 
-/// Sends the lens to `target`, lets it settle, and reads back where it stands.
+/// Moves the lens to `target`, lets it settle, and reads back its position.
 pub fn go(lens: &mut dyn Lens, target: FocalPower) -> Result<Position, Failure> {
     lens.set(target)?;
     std::thread::sleep(settled_after(lens));
@@ -48,7 +48,7 @@ pub fn go(lens: &mut dyn Lens, target: FocalPower) -> Result<Position, Failure> 
     Ok(Position { focal_power: read_back.get(), dioptre: dioptre(&lens.info()?, read_back) })
 }
 
-/// Four times the settling time leaves 1/160 000 of a step.
+/// How long to wait after a command: four times the settling time leaves 1/160 000 of a step.
 fn settled_after(lens: &dyn Lens) -> Duration {
     let dynamics = lens.dynamics();
     dynamics.delay + dynamics.settling * 4

@@ -25,7 +25,7 @@ pub struct Arguments {
 /// Saves the cube: raw counts, the bands in order of wavelength.
 ///
 /// # Errors
-/// When the frame cannot be read, or the files cannot be written.
+/// If the frame cannot be read, or the files cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
@@ -47,8 +47,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-/// The samples as 16 bit, little-endian, band interleaved by line: of each row of cells all of one band, then all of
-/// the next.
+/// The samples as 16 bit, little-endian, band interleaved by line: for each row of cells all values of one band, then
+/// all of the next.
 fn line_by_line(mosaic: &MosaicFrame, order: &[usize]) -> Vec<u8> {
     let width = mosaic.width();
     let mut bytes = Vec::with_capacity(2 * mosaic.samples().len());

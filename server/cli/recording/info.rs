@@ -9,7 +9,7 @@ use super::view_info;
 use crate::cli::output::{Failure, print};
 use crate::recording::{AnyRecording, Header, Recording};
 
-/// Bytes of a sample when four of 10 bit are packed into five bytes.
+/// Bytes per sample when four samples of 10 bit are packed into five bytes.
 const PACKED: f64 = 1.25;
 
 /// Arguments of `parfocal recording info`.
@@ -33,20 +33,20 @@ struct Info {
     frames: usize,
     seconds: f64,
     fps: Option<f64>,
-    /// Frames that the camera numbered but that are not here, those lost by the recorder included.
+    /// Frames that the camera numbered but that are missing here, including those that the recorder lost.
     frames_missing: u64,
     /// Bytes of the frames on disk.
     bytes: u64,
-    /// The same beside the samples packed at 10 bit.
+    /// `bytes` divided by the size of the samples packed at 10 bit; `None` without frames.
     share_of_packed: Option<f64>,
-    /// What is wrong with frames that cannot be read.
+    /// Descriptions of the frames that cannot be read.
     damaged: Vec<String>,
 }
 
 /// Looks at the recording and checks every frame.
 ///
 /// # Errors
-/// When there is no recording; when frames are damaged, after reporting them.
+/// If there is no recording. If frames are damaged, after reporting them.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folder = &arguments.folder;
     match AnyRecording::open(folder)? {
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Prints `info` as asked; fails where something is damaged.
+/// Prints `info` in the requested format; fails if something is damaged.
 fn tell<I: Serialize>(
     arguments: &Arguments,
     info: &I,

@@ -1,4 +1,4 @@
-//! `parfocal recording`: hyperspectral recordings, made, looked at, and turned into what other programs read.
+//! `parfocal recording`: records hyperspectral video, checks it, and converts it for other programs.
 
 mod cube;
 mod info;
@@ -33,7 +33,7 @@ enum Action {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When a recording cannot be made, read or saved as something else.
+/// If a recording cannot be made, read or saved as something else.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.action {
         Action::Record(arguments) => record::run(arguments),

@@ -1,4 +1,4 @@
-//! `parfocal recording record`: camera, lens and control loop without a server, and every frame on disk.
+//! `parfocal recording record`: runs camera, lens and control loop without a server, and stores every frame.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
 use crate::recording::{CALIBRATION, Ended, FORMAT, Header, Progress, Recorder, VERSION, Writer};
 
-/// How often to look whether to stop.
+/// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(20);
-/// How long the first frame, or the next one, is waited for.
+/// Longest wait for the first or next frame.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Arguments of `parfocal recording record`.
@@ -53,7 +53,7 @@ pub struct Arguments {
 /// Records until the time is up, Ctrl-C, or a failure.
 ///
 /// # Errors
-/// When the folder exists, a device fails, or the disk is full; what was recorded before is kept.
+/// If the folder exists, a device fails, or the disk is full; what was recorded before is kept.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.out.exists() {
         return Err(format!("{} exists; choose a new folder for the recording", arguments.out.display()).into());

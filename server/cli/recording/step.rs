@@ -1,4 +1,4 @@
-//! `parfocal recording step`: what a policy sees in a recording, and what it would have asked of the lens.
+//! `parfocal recording step`: what a policy sees in a recording, and which focal powers it would have requested.
 
 use std::io;
 use std::path::PathBuf;
@@ -32,8 +32,7 @@ pub struct Arguments {
 /// Writes the table.
 ///
 /// # Errors
-/// When there is no such recording or policy, a frame is damaged, or the table cannot be written; then there is no
-/// table.
+/// If there is no such recording or policy, a frame is damaged, or the table cannot be written. No table is left then.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     if recording.rows().is_empty() {

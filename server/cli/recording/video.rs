@@ -13,7 +13,7 @@ use crate::files::replace;
 use crate::imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
 use crate::recording::Recording;
 
-/// Endings of video files that `ffmpeg` chooses a format by.
+/// File endings of videos; `ffmpeg` chooses the format by them.
 const VIDEOS: [&str; 4] = ["mp4", "mkv", "mov", "avi"];
 
 /// Arguments of `parfocal recording video`.
@@ -30,10 +30,10 @@ pub struct Arguments {
     /// End so many seconds after the first frame; at the last frame if left out.
     #[arg(long, value_name = "S")]
     to: Option<f64>,
-    /// Size of the pictures: one pixel a mosaic cell, two by two, or one a sample.
+    /// Size of the pictures: one pixel per mosaic cell, two by two per cell, or one per sample.
     #[arg(long, value_enum, default_value_t = Size::Cell)]
     size: Size,
-    /// What a folder gets: developed pictures (png), or the raw mosaics with 16 bit a sample (tiff).
+    /// Content of the folder: developed pictures (png), or the raw mosaics with 16 bit per sample (tiff).
     #[arg(long, value_enum, default_value_t = Pictures::Png)]
     pictures: Pictures,
 }
@@ -49,7 +49,7 @@ enum Pictures {
 /// Saves the video or the pictures.
 ///
 /// # Errors
-/// When a frame cannot be read, `ffmpeg` is missing or fails, or a file cannot be written.
+/// If a frame cannot be read, `ffmpeg` is missing or fails, or a file cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
 }
 
-/// Numbers of the frames within the span asked for.
+/// Numbers of the frames within the requested span.
 fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Failure> {
     let rows = recording.rows();
     let first = rows.first().map_or(0, |row| row.time);
@@ -88,7 +88,7 @@ fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Fa
     Ok(frames)
 }
 
-/// Makes pictures for people.
+/// Develops mosaics into pictures for people.
 struct Studio {
     developer: Developer,
     size: Size,
@@ -100,7 +100,7 @@ impl Studio {
     }
 }
 
-/// Pipes the frames into `ffmpeg`, each for as long as it was the latest.
+/// Pipes the frames into `ffmpeg`, each repeated for as long as it was the latest.
 fn save_video(
     arguments: &Arguments,
     recording: &Recording,
@@ -128,7 +128,7 @@ fn save_video(
         }
         let Some(input) = encoder.as_mut().and_then(|encoder| encoder.stdin.as_mut()) else { break };
 
-        // It has ended early if it takes no more; then it says why.
+        // If a write fails, `ffmpeg` has ended early, and its error output says why.
         if (shown..until).any(|_| input.write_all(&picture.data).is_err()) {
             break;
         }

@@ -17,13 +17,13 @@ pub(super) struct ViewInfo {
     frames: usize,
     seconds: f64,
     fps: Option<f64>,
-    /// Frames that the camera numbered but of which no picture is here.
+    /// Frames that the camera numbered but that have no picture here.
     frames_missing: u64,
     /// Bytes of the pictures.
     bytes: u64,
-    /// The sizes of the pictures, smallest first; empty where an earlier version did not note them.
+    /// The sizes of the pictures, smallest first; empty if an earlier version did not record them.
     sizes: Vec<SizeInfo>,
-    /// What is wrong with pictures that cannot be read.
+    /// Descriptions of the pictures that cannot be read.
     pub(super) damaged: Vec<String>,
 }
 
@@ -66,7 +66,7 @@ fn seconds(rows: &[ViewRow]) -> f64 {
     span as f64 / 1e9
 }
 
-/// The same in words.
+/// `info` in words.
 pub(super) fn describe(info: &ViewInfo) -> String {
     let ViewInfo { header, frames, seconds, bytes, .. } = info;
     let mut text = String::new();

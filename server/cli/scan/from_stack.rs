@@ -1,4 +1,4 @@
-//! `parfocal scan from-stack`: pictures of one still scene in order of focus as a scan.
+//! `parfocal scan from-stack`: makes a scan from pictures of one still scene in order of focus.
 
 use std::path::PathBuf;
 
@@ -14,9 +14,9 @@ use crate::scans::stack::FocalStack;
 use crate::scans::stack::check::check;
 use crate::scans::stack::optics::Optics;
 
-/// Poses unless it is said otherwise: 20 s at 25 a second.
+/// Default number of poses: 20 s at 25 per second.
 const POSES: usize = 500;
-/// Most planes that a pose sees unless it is said otherwise: as far apart as the paper's step.
+/// Default limit on the planes that a pose sees: they are as far apart as the paper's step.
 const PLANES: usize = 21;
 
 /// Arguments of `parfocal scan from-stack`.
@@ -51,7 +51,7 @@ pub struct Arguments {
 /// Makes the scan.
 ///
 /// # Errors
-/// When the pictures are not a focal stack, or the scan cannot be stored.
+/// If the pictures are not a focal stack, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into())?;
     for note in check(&stack)? {
@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-/// A checksum of what the stack shows, so that another one is not taken for it.
+/// A checksum of the stack's content, so that another stack is not mistaken for it.
 fn digest(stack: &FocalStack) -> String {
     let mut hash = Sha256::new();
     for plane in stack.planes() {

@@ -1,4 +1,4 @@
-//! `parfocal scan import`: a folder of pictures named by pose and focal power as a scan.
+//! `parfocal scan import`: makes a scan from a folder of pictures named by pose and focal power.
 
 use std::path::PathBuf;
 
@@ -18,10 +18,10 @@ pub struct Arguments {
     camera: Option<String>,
 }
 
-/// Imports.
+/// Imports the pictures.
 ///
 /// # Errors
-/// When the pictures are not a scan, or it cannot be stored.
+/// If the pictures are not a scan, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let imported = Imported::look(&arguments.folder)?;
     let progress = bar(imported.len(), 0);

@@ -13,7 +13,7 @@ use crate::plot::{Axis, Plot};
 use crate::scans::stack::optics::Optics;
 use crate::scans::stack::{FocalStack, Plane};
 
-/// Most poses whose focus curves are shown.
+/// Most poses whose focus curves are used.
 const SHOWN: usize = 3;
 
 /// Arguments of `parfocal scan info`.
@@ -45,7 +45,7 @@ struct Info {
     height: usize,
     bytes: u64,
     optimum: Optimum,
-    /// What the optic does, where poses have enough focal powers to tell.
+    /// Figures of the optic; `None` if the poses have too few focal powers or pictures are damaged.
     optics: Option<Optics>,
     deviation: Option<Deviation>,
     missing: Vec<usize>,
@@ -61,21 +61,21 @@ struct Optimum {
     step: f64,
 }
 
-/// How far the optimum found in the pictures lies from the one that a simulation knows.
+/// Distance of the optimum found in the pictures from the one that a simulation knows.
 #[derive(Debug, Serialize)]
 struct Deviation {
     mean: f64,
     max: f64,
     /// The pose of `max`.
     worst_pose: usize,
-    /// Share of poses within one step of the focal powers.
+    /// Fraction of poses within one step of the focal powers.
     within_step: f64,
 }
 
 /// Looks at the scan and checks every picture.
 ///
 /// # Errors
-/// When there is no scan; when poses are missing or pictures damaged, after reporting them.
+/// If there is no scan. If poses are missing or pictures are damaged, after reporting them.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scan = ScanFolder::open(&arguments.folder)?;
     let progress = bar(scan.poses().len(), 0);
@@ -137,7 +137,7 @@ fn optimum(path: &[f64]) -> Optimum {
     Optimum {
         min: path.iter().copied().reduce(f64::min).unwrap_or_default(),
         max: path.iter().copied().reduce(f64::max).unwrap_or_default(),
-        // Not by `sum`, to which nothing adds up to -0.
+        // Not with `sum`, which gives -0 for no values.
         step: steps.fold(0.0, |sum, step| sum + step) / (path.len().max(2) - 1) as f64,
     }
 }
@@ -204,7 +204,7 @@ fn table(rows: &[(&str, String)]) -> String {
     })
 }
 
-/// An optic's figures, in lines; `unit` names the unit of the pictures' positions.
+/// An optic's figures, one per line; `unit` names the unit of the pictures' positions.
 pub(super) fn optics(optics: &Optics, unit: &str) -> String {
     let mut rows = Vec::new();
     if let Some(blur) = optics.blur_per_unit {
@@ -225,14 +225,14 @@ pub(super) fn optics(optics: &Optics, unit: &str) -> String {
     text
 }
 
-/// A curve as a line of bars, from 0 to its greatest value.
+/// A curve as a line of bars, from 0 to its maximum.
 fn bars(curve: &[f64]) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = curve.iter().copied().fold(1e-9, f64::max);
     curve.iter().map(|value| BARS[((7.99 * value / most) as usize).min(7)]).collect()
 }
 
-/// The optic's figures, from some of the poses.
+/// The optic's figures, measured on some of the poses.
 fn optics_of(scan: &ScanFolder) -> Option<Optics> {
     let poses: Vec<_> = scan.poses().values().collect();
     let shown = poses.iter().step_by(poses.len().div_ceil(SHOWN).max(1));
@@ -249,7 +249,7 @@ fn optics_of(scan: &ScanFolder) -> Option<Optics> {
     (!found.is_empty()).then(|| Optics::together(found))
 }
 
-/// The optimum over the poses in black, the truth behind it where it is known.
+/// Plots the optimum over the poses in black, and the truth behind it if it is known.
 fn picture(scan: &ScanFolder) -> String {
     let truth: Option<Vec<f64>> = scan.poses().values().map(|pose| Some(pose.truth?.get())).collect();
     let path = path(scan);

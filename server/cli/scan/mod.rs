@@ -1,4 +1,4 @@
-//! `parfocal scan`: recorded focal-time scans, recorded, looked at and imported.
+//! `parfocal scan`: records focal-time scans, checks them, and makes them from pictures.
 
 mod from_stack;
 mod import;
@@ -29,7 +29,7 @@ enum Action {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When a scan cannot be read, recorded or imported.
+/// If a scan cannot be read, recorded or imported.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.action {
         Action::Record(arguments) => record::run(arguments),

@@ -1,4 +1,5 @@
-//! `parfocal scan record`: from the phantom, each pose held still, or from a bench of camera, lens and stepper.
+//! `parfocal scan record`: records from the phantom, held still at each pose, or from a bench of camera, lens and
+//! stepper.
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -57,7 +58,7 @@ pub struct Arguments {
 /// Records until all poses are stored, Ctrl-C, or a failure.
 ///
 /// # Errors
-/// When something fails; the poses before it are kept.
+/// If something fails; the poses before it are kept.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let interrupt = Interrupt::listen("stopping after this pose".to_owned())?;
     let progress = bar(arguments.poses, 0);
@@ -79,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     match outcome {
         Ok(()) => print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(done))),
-        // The stepper's command is interrupted by the same key.
+        // Ctrl-C also interrupts the stepper's command.
         Err(RecordError::Stopped | RecordError::Stepper(_)) if interrupt.asked() => print(&format!(
             "stopped: {done} of {} poses are saved in {out}; run the same command again to continue\n",
             arguments.poses
@@ -158,7 +159,7 @@ fn asker(
 ) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
     let (sender, lines) = channel();
 
-    // Ends with the process: reading a terminal cannot be cut short.
+    // The thread ends with the process: reading a terminal cannot be interrupted.
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
             if sender.send(line).is_err() {
@@ -169,8 +170,7 @@ fn asker(
     let typed = std::io::stdin().is_terminal();
 
     move |pose| {
-        // An Enter from before the question, from a key that bounces or was pressed too early, does not
-        // answer it.
+        // An Enter from before the question (a bouncing key, or one pressed too early) does not answer it.
         while typed && lines.try_recv().is_ok() {}
         progress.suspend(|| tell(format_args!("pose {pose} of {poses}: move the camera there, then press Enter")));
         loop {

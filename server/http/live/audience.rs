@@ -1,4 +1,4 @@
-//! The audience at the other end of a live stream.
+//! The audience of a live stream, by role.
 
 use std::sync::Arc;
 
@@ -9,21 +9,21 @@ use crate::control::ControlStatus;
 use crate::http::App;
 use crate::live::EncodedFrame;
 
-/// The audience decides what may be sent: one implementation a role, each with types of its own.
+/// Decides what may be sent to an audience: each implementation has its own types.
 pub trait Audience: Send + Sync + 'static {
-    /// What goes with each picture.
+    /// What is sent with each picture.
     type Header: Serialize + Send;
-    /// The session under way.
+    /// The session under way, as this audience may see it.
     type Session: Serialize + Send + Sync + 'static;
     /// The state of the devices.
     type Status: Serialize + PartialEq + Send;
 
-    /// Whether a recording of the view keeps what this page gets.
+    /// Whether a recording of the view keeps the size of pictures that this page gets.
     const LEADS: bool;
 
-    /// What goes with `frame`, which is `age_ms` old.
+    /// What is sent with `frame`, which is `age_ms` milliseconds old.
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> Self::Header;
-    /// Where the session is followed.
+    /// Source of the session's changes.
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
     /// The state of the devices.
     fn status(status: &ControlStatus, app: &App) -> Self::Status;

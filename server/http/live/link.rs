@@ -1,7 +1,7 @@
-//! The size of a viewer's pictures: what its screen can show, as far as its link carries it.
+//! The size of a viewer's pictures: the size that its screen can show, if its link is fast enough for it.
 //!
-//! The link is judged by one thing, the time from sending a picture to hearing that it was drawn. That holds
-//! the link and the browser, and nothing of what the server does, so the size tells nothing about a policy.
+//! The link is judged only by the time from sending a picture to its acknowledgement by the page. That time covers
+//! the link and the browser but none of the server's own work, so the size tells nothing about a policy.
 
 use std::time::Duration;
 
@@ -9,47 +9,47 @@ use crate::clock::Moment;
 use crate::imaging::Size;
 
 /// A size is kept while its pictures are drawn within this time, on average. As a viewer has one picture in
-/// flight, it then gets at least ten a second, and sees none that is much older than 150 ms.
+/// flight, it then gets at least ten a second, and none is much older than 150 ms.
 const LIMIT: Duration = Duration::from_millis(100);
 
-/// A picture may take so many times as long as one of the next smaller size: its JPEG has about so many times
-/// the bytes.
+/// How many times longer a picture may take than one of the next smaller size: its JPEG has about this many
+/// times the bytes.
 const GROWTH: u32 = 3;
 
 /// Weight of a new picture's time in the average: a single late one is forgiven.
 const WEIGHT: f64 = 0.25;
 
-/// What the average begins with at a size. A first picture that takes over 250 ms is then too late.
+/// Initial value of the average at a new size. With it, a first picture that takes over 250 ms is too late.
 const UNKNOWN: Duration = Duration::from_millis(50);
 
 /// Pictures drawn at a size before a larger one is tried.
 const ENOUGH: u32 = 5;
 
-/// How long a size is kept before a larger one is tried that failed, or that is not expected to be quick
-/// enough. A distant server delays every picture, whatever its size. Doubles with each failure.
+/// How long a size is kept before we try a larger one that failed before or is not expected to be fast enough. We try
+/// it because a distant server delays every picture, regardless of its size. Doubles with each failure.
 const FIRST_WAIT: Duration = Duration::from_secs(10);
 const LONGEST_WAIT: Duration = Duration::from_mins(10);
 
-/// A picture that does not come within this time, while those of the cells do, will not.
+/// A larger size whose next picture does not come within this time is given up.
 pub(super) const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Up to this many screen pixels show one pixel of the picture before a larger size is wanted, in quarters.
+/// A larger size is wanted if more screen pixels than this show one pixel of the picture; in quarters, so 5 means 1.25.
 const STRETCH: u64 = 5;
 
 /// What is known of one viewer's screen and link.
 #[derive(Debug)]
 pub(super) struct Link {
-    /// The largest size that the camera's pictures have.
+    /// The largest size of the camera's pictures.
     largest: Size,
     /// The size that the screen can show.
     wanted: Size,
-    /// The size that the link carries, as far as that has been tried.
+    /// The largest size for which the link has been fast enough so far.
     carried: Size,
-    /// Average time from sending to drawing at the present size.
+    /// Weighted average of the time from sending a picture to its acknowledgement, at the current size.
     mean: Duration,
-    /// Pictures drawn at the present size.
+    /// Pictures drawn at the current size.
     drawn: u32,
-    /// When the present size began.
+    /// When `carried` last changed.
     since: Moment,
     /// Whether a larger size has failed.
     failed: bool,
@@ -57,7 +57,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// A viewer of whom nothing is known yet: it gets the smallest size.
+    /// The link of a viewer about which nothing is known yet: it gets the smallest size.
     pub(super) const fn new(largest: Size, now: Moment) -> Self {
         Self {
             largest,
@@ -76,13 +76,14 @@ impl Link {
         self.carried.min(self.wanted)
     }
 
-    /// Whether it carries the size that the screen can show.
+    /// Whether the link is fast enough for the size that the screen can show.
     pub(super) fn carries_all(&self) -> bool {
         self.carried >= self.wanted && self.mean <= LIMIT
     }
 
-    /// The whole picture, which is `cells` wide, covers `width` pixels of the screen, as the page says. Any number
-    /// will do: too large a one gets the largest size, and only as far as the page's own link carries it.
+    /// Notes that the whole picture, `cells` wide, covers `width` pixels of the screen, as the page says. The number
+    /// need not be trusted: one that is too large gets at most the largest size, and only if the page's own link is
+    /// fast enough.
     pub(super) fn screen(&mut self, width: u32, cells: usize) {
         let pixels = |size: Size| (size.per_cell() * cells) as u64;
         let enough = |size: &Size| 4 * u64::from(width) <= STRETCH * pixels(*size);
@@ -91,7 +92,7 @@ impl Link {
         self.change(|link| link.wanted = size.min(link.largest));
     }
 
-    /// A picture was drawn, `took` after it had been sent.
+    /// Notes that a picture was drawn, `took` after it was sent.
     pub(super) fn drawn(&mut self, now: Moment, took: Duration) {
         self.mean = self.mean.mul_f64(1.0 - WEIGHT) + took.mul_f64(WEIGHT);
         self.drawn = self.drawn.saturating_add(1);
@@ -105,13 +106,13 @@ impl Link {
                 self.since = now;
             }
         } else if self.carried >= self.wanted && now.since(self.since) >= self.wait {
-            // This size has been carried for long: what failed before says nothing any more.
+            // The link has carried this size for a long time, so earlier failures no longer count.
             self.failed = false;
             self.wait = FIRST_WAIT;
         }
     }
 
-    /// No picture of the present size came.
+    /// Notes that no picture of the current size came in time.
     pub(super) fn missed(&mut self, now: Moment) {
         self.fall(now);
     }
@@ -130,7 +131,7 @@ impl Link {
         self.change(|link| link.carried = size.smaller());
     }
 
-    /// Makes a change, and forgets the average if it changes the size.
+    /// Makes a change, and resets the average if it changes the size.
     fn change(&mut self, change: impl FnOnce(&mut Self)) {
         let before = self.size();
         change(self);
@@ -145,16 +146,16 @@ impl Link {
 mod tests {
     use super::*;
 
-    /// Pixels of a cell picture's row.
+    /// Width of a cell picture, pixels.
     const CELLS: usize = 512;
 
-    /// A viewer whose link takes `delay` ms, and a ms for each `bytes_per_ms`.
+    /// A viewer whose link takes `delay` ms for each picture, plus 1 ms for each `bytes_per_ms` bytes.
     struct Viewer {
         link: Link,
         now: Moment,
         delay: f64,
         bytes_per_ms: f64,
-        /// Each size's picture, bytes.
+        /// Bytes of a picture of each size.
         bytes: [f64; 3],
         /// Times from sending to drawing, ms, in order.
         took: Vec<f64>,
@@ -168,7 +169,7 @@ mod tests {
             Self { link, now, delay, bytes_per_ms, bytes: [20e3, 60e3, 180e3], took: Vec::new() }
         }
 
-        /// Watches for `seconds`; the sizes that it saw, each change once.
+        /// Watches for `seconds`; returns the sizes in order, one entry per change.
         fn watch(&mut self, seconds: u64) -> Vec<Size> {
             let end = self.now + Duration::from_secs(seconds);
             let mut sizes = vec![self.link.size()];
@@ -223,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_distant_server_is_no_slow_link() {
-        // 70 ms for whatever picture: the larger sizes are tried in time, and kept.
+        // 70 ms for every picture: the larger sizes are tried in time, and kept.
         let mut viewer = Viewer::new(2048, 70.0, 100_000.0);
         assert_eq!(viewer.watch(5), [Size::Cell]);
         assert_eq!(viewer.watch(60), [Size::Cell, Size::Half, Size::Full]);
@@ -236,7 +237,7 @@ mod tests {
         viewer.bytes_per_ms = 300.0;
         assert_eq!(viewer.watch(2), [Size::Half, Size::Cell]);
 
-        // After 10, 30, 70, 150, 310 and 630 seconds, each time for a moment.
+        // It tries after 10, 30, 70, 150, 310 and 630 seconds, each time for a moment.
         let changes = viewer.watch(900).len() - 1;
         assert_eq!(changes, 12);
 

@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 pub(super) enum Said {
     /// This frame is on screen.
     Drawn { frame: u64 },
-    /// Whether the page can be seen.
+    /// Whether the page is visible.
     Visible { visible: bool },
-    /// The whole picture, parts outside the view included, covers so many pixels of the screen from left to right.
+    /// The whole picture, including the parts outside the view, covers this many pixels of the screen from left to
+    /// right.
     Screen { width: u32 },
 }
 
@@ -27,18 +28,20 @@ pub(super) enum Told<S, T> {
     Beat,
 }
 
-/// Ends the connection, for a reason.
+/// The message that closes the connection, with a code and a reason.
 pub(super) fn close(code: u16, reason: &'static str) -> Message {
     Message::Close(Some(CloseFrame { code, reason: reason.into() }))
 }
 
-/// A text message.
+/// `told` as a text message; `None` if it cannot be serialised.
 pub(super) fn tell(told: &impl Serialize) -> Option<Message> {
-    let text = serde_json::to_string(told).inspect_err(|error| tracing::error!(%error, "state cannot be told")).ok()?;
+    let text = serde_json::to_string(told)
+        .inspect_err(|error| tracing::error!(%error, "state could not be serialised"))
+        .ok()?;
     Some(Message::Text(text.into()))
 }
 
-/// A frame's message: header length, header, JPEG.
+/// The message of a frame: header length, header, JPEG; `None` if the header cannot be packed.
 pub(super) fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
     let header = serde_json::to_vec(header).ok()?;
     let length = u16::try_from(header.len()).ok()?;
@@ -49,7 +52,7 @@ pub(super) fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
     Some(message.freeze())
 }
 
-/// Milliseconds with one decimal.
+/// `age` in milliseconds, rounded to one decimal.
 pub(super) fn tenth_millis(age: Duration) -> f64 {
     (age.as_secs_f64() * 1e4).round() / 10.0
 }

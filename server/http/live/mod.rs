@@ -1,11 +1,10 @@
 //! `/live`: the WebSocket that carries pictures and state to one page.
 //!
-//! Binary messages are frames: a header's length (u16, little-endian), the header (JSON), the JPEG.
-//! Text messages are JSON with a `type`: `session` when the session changes, `status` when the
-//! devices' state does, `beat` now and then, so that a page can tell a silently broken link from one
-//! with nothing to say. The page answers each frame that it has drawn, and only then gets the next,
-//! which is by then the latest: so no queue forms anywhere, however slow the link. A page that says
-//! it is hidden gets no frames.
+//! Binary messages are frames: the length of the header (u16, little-endian), the header (JSON), the JPEG.
+//! Text messages are JSON with a `type`: `session` when the session changes, `status` when the devices' state
+//! does, and `beat` every few seconds, so that a page can tell a silently broken link from one with nothing to
+//! say. The page acknowledges each frame that it has drawn. Only then does it get the next, which is the latest
+//! at that time. So no queue forms anywhere, however slow the link. A page that says it is hidden gets no frames.
 
 mod audience;
 mod link;
@@ -53,23 +52,23 @@ use operator::ForOperator;
 use surgeon::ForSurgeon;
 use tablets::OpenTablet;
 
-/// A page that has been silent for two of these is gone.
+/// Interval of heartbeats. A page that stays silent through two of them is gone.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 
-/// A message that has not left by then never will.
+/// A connection is dropped if sending a message takes longer than this.
 const SEND_LIMIT: Duration = Duration::from_secs(10);
 
-/// The code of a connection that is closed because the surgeon's link opens this no more. Of the codes for private
-/// use, like HTTP's 403.
+/// Close code for a surgeon's page whose link is no longer valid here. It is one of the codes for private use, chosen
+/// to resemble HTTP's 403.
 const LINK_OVER: u16 = 4403;
 
-/// Pages send acknowledgements, nothing longer.
+/// Largest message from a page, bytes: pages send nothing longer than acknowledgements.
 const LARGEST_REQUEST: usize = 1024;
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct LiveQuery {
-    /// The role to be served as, of those that the browser holds; else the one that may see least.
+    /// The role to be served as, of those that the browser holds; by default, the one that may see least.
     role: Option<Role>,
 }
 
@@ -111,7 +110,7 @@ async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
     }
 }
 
-/// Comes when a page with `pass` may see the screens no more; never for a page without one.
+/// Resolves when a page with `pass` is no longer admitted; never for a page without a pass.
 fn is_over(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
     let app = AppState::clone(app);
     match pass {
@@ -120,32 +119,32 @@ fn is_over(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
     }
 }
 
-/// The page has left.
+/// Error: the page has left or is silent.
 struct Left;
 
-/// A frame on its way.
+/// A frame that was sent and is not yet acknowledged.
 struct InFlight {
     number: u64,
     size: Size,
     sent_at: Moment,
 }
 
-/// The connection to one page: what is known of it, and what it must still be sent.
+/// The connection to one page: what is known about the page, and what must still be sent to it.
 struct Desk<A: Audience> {
     app: AppState,
-    /// Set while the page can be seen.
+    /// Set while the page is visible.
     watcher: Option<Watcher>,
-    /// The next size, until its first frame is there.
+    /// The viewers of a larger size, until its first frame arrives.
     coming: Option<Watcher>,
     /// The frame sent and not yet drawn.
     in_flight: Option<InFlight>,
-    /// The last frame sent: those of a larger size take longer, and none may follow a later one.
+    /// Number of the last frame sent. Frames of a larger size take longer, and none may follow a later frame.
     last: u64,
-    /// Width in cells of the last frame sent, and pixels of the screen that it covers; none before they are known.
+    /// Width in cells of the last frame sent, and (`screen`) pixels of the screen that it covers; `None` until known.
     cells: Option<usize>,
     screen: Option<u32>,
     link: Link,
-    /// When a frame of a larger size must have come.
+    /// Deadline for the next frame of a larger size.
     due: Instant,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
@@ -153,17 +152,17 @@ struct Desk<A: Audience> {
     told: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
     heartbeat: tokio::time::Interval,
-    /// Comes when a surgeon's page may see the screens no more.
+    /// Resolves when a surgeon's page is no longer admitted.
     over: BoxFuture<'static, Error>,
-    /// What lets a surgeon's page in.
+    /// The link by which a surgeon's page was let in.
     pass: Option<Pass>,
-    /// What lets a page in that shows no link.
+    /// The sign-in of a page that holds its role only by a personal account.
     token: Option<Token>,
-    /// Where the operator sees a surgeon's tablet.
+    /// The operator's entry for a surgeon's tablet.
     tablet: Option<OpenTablet>,
-    /// Heartbeats since the page was last heard.
+    /// Heartbeats since the page last sent anything.
     silent: u32,
-    /// The message that goes out next, before any other.
+    /// The message to send next, before any other.
     next: Option<Message>,
 }
 
@@ -201,13 +200,13 @@ impl<A: Audience> Desk<A> {
         }
     }
 
-    /// The same for a surgeon's tablet.
+    /// The same desk, for a surgeon's tablet.
     fn of_tablet(mut self, tablet: OpenTablet) -> Self {
         self.tablet = Some(tablet);
         self
     }
 
-    /// The next message for the page; `Ok(None)` never comes before one is due.
+    /// Waits for the next message for the page. Never returns `Ok(None)`.
     async fn next_message(&mut self, socket: &mut WebSocket) -> Result<Option<Message>, Left> {
         if let Some(message) = self.next.take() {
             return Ok(Some(message));
@@ -215,7 +214,7 @@ impl<A: Audience> Desk<A> {
 
         loop {
             let message = tokio::select! {
-                _ = &mut self.over => Some(close(LINK_OVER, "the link opens this no more")),
+                _ = &mut self.over => Some(close(LINK_OVER, "the link is no longer valid")),
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
                 heard = socket.recv() => match heard {
                     Some(Ok(message)) => {
@@ -263,24 +262,24 @@ impl<A: Audience> Desk<A> {
                 self.screen = Some(width);
                 self.look_at_screen();
             }
-            Err(_) => return Ok(Some(close(close_code::POLICY, "this is no message of a page"))),
+            Err(_) => return Ok(Some(close(close_code::POLICY, "unknown message"))),
         }
 
         Ok(None)
     }
 
-    /// Tells the operator how the surgeon's tablet is.
+    /// Updates the operator's entry for the surgeon's tablet.
     fn note_tablet(&self) {
         if let Some(tablet) = &self.tablet {
             tablet.note(self.screen, self.watcher.is_some(), self.link.carries_all());
         }
     }
 
-    /// The page has drawn `frame`, and gets the next.
+    /// Notes that the page has drawn `frame`; it may then get the next one.
     fn drawn(&mut self, frame: u64) {
         let Some(sent) = self.in_flight.take_if(|sent| sent.number == frame) else { return };
         let now = self.app.clock.now();
-        // While a larger size is coming, the one before says nothing about it.
+        // While a larger size is coming, a frame of the previous size says nothing about it.
         if sent.size == self.link.size() {
             self.link.drawn(now, now.since(sent.sent_at));
         }
@@ -297,8 +296,9 @@ impl<A: Audience> Desk<A> {
         }
     }
 
-    /// Joins the viewers of the size that suits the page now. Until a larger size's first frame is there, the page gets
-    /// those of the size before; a smaller one is soon there, and the size before was too slow.
+    /// Joins the viewers of the size that suits the page now. Until the first frame of a larger size arrives, the page
+    /// gets frames of the previous size. A smaller size replaces the previous one at once: it arrives soon, and the
+    /// previous one was too slow.
     fn follow_link(&mut self) {
         let size = self.link.size();
         let Some(watcher) = &mut self.watcher else { return };
@@ -315,7 +315,7 @@ impl<A: Audience> Desk<A> {
     }
 
     fn session(&mut self) -> Option<Message> {
-        // The page of a tablet that may not see this session is about to be closed.
+        // The tablet may not see this session; its connection is about to be closed.
         if self.pass.is_some_and(|pass| admit(&self.app, pass).is_err()) {
             return None;
         }
@@ -337,8 +337,8 @@ impl<A: Audience> Desk<A> {
         message
     }
 
-    /// Waits for the next frame of a visible page; waits forever for a hidden one. One of a larger size must come until
-    /// it is due. Dropping the future loses nothing.
+    /// Waits for the next frame for a visible page; waits forever for a hidden one. A frame of a larger size must come
+    /// before `due`. Dropping the future loses nothing.
     async fn next_frame(watcher: &mut Option<Watcher>, coming: &mut Option<Watcher>, due: Instant) -> Next {
         let Some(watcher) = watcher else { return std::future::pending().await };
         let waits = coming.as_ref().unwrap_or(watcher).size() != Size::Cell;
@@ -406,7 +406,7 @@ impl<A: Audience> Desk<A> {
         if self.silent > 2 {
             return Err(Left);
         }
-        // Browsers answer pings by themselves and tell the page nothing of them.
+        // Browsers answer pings themselves without telling the page, so the page gets a message as well.
         self.next = tell(&Told::<&A::Session, &A::Status>::Beat);
         Ok(Some(Message::Ping(Bytes::new())))
     }
@@ -417,7 +417,7 @@ fn join<A: Audience>(app: &AppState, size: Size) -> Watcher {
     if A::LEADS { app.live.lead(size) } else { app.live.watch(size) }
 }
 
-/// The next frame of a size that is coming, if one is.
+/// The next frame of the size `coming`; waits forever if there is none.
 async fn next_of(coming: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
     match coming {
         Some(coming) => coming.next().await,
@@ -425,14 +425,14 @@ async fn next_of(coming: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
     }
 }
 
-/// What comes of waiting for a frame.
+/// Result of waiting for a frame.
 enum Next {
     Frame(Arc<EncodedFrame>),
-    /// The first of another size.
+    /// The first frame of a larger size.
     Changed(Arc<EncodedFrame>),
     /// A larger size did not come in time.
     Missed,
-    /// None will come any more.
+    /// No more frames will come.
     Ended,
 }
 

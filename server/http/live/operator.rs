@@ -1,7 +1,7 @@
-//! What the operator's and the researcher's pages get on `/live`: the surgeon's, and what the loop
-//! does. While a session is under way not even they are told which policy runs, nor what gives it
-//! away: how the focal power moves (fixed never, hill-climbers by 0.05 each frame), how long a step
-//! takes, the metric, by its scale, and the belief, which few have.
+//! What the operator's and the researcher's pages get on `/live`: what the surgeon's page gets, and what the loop
+//! does. While a session is under way, even they do not get the policy, nor anything that gives it away: how the
+//! focal power moves (`fixed` never, hill-climbers by 0.05 each frame), how long a step takes, the metric (by its
+//! scale), and the belief, which few policies have.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,28 +25,29 @@ use crate::trial::view::OperatorView;
 /// An operator's or researcher's page.
 pub(super) struct ForOperator;
 
-/// What goes with each picture.
+/// What is sent with each picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct OperatorFrame {
     #[serde(flatten)]
     picture: SurgeonFrame,
-    /// Why the lens was held, if it was; not for the policy's sake while a session is under way.
+    /// Why the lens was held, if it was; while a session is under way, never a reason that lies with the policy.
     held: Option<Hold>,
-    /// What the loop did with the frame; each null while a session is under way.
+    /// What the loop did with the frame; every field is null while a session is under way.
     #[serde(flatten)]
     seen: Seen,
 }
 
-/// What tells policies apart.
+/// The values that could reveal the policy.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 struct Seen {
     /// Focal power asked for after this frame.
     asked: Option<FocalPower>,
-    /// Focal power that the frame was exposed at.
+    /// Focal power at which the frame was exposed.
     measured: Option<FocalPower>,
     /// The policy's focus metric.
     metric: Option<f64>,
-    /// Probability of each of equally wide slices of 0..=1 to hold the optimum, where the policy has a belief.
+    /// The policy's belief, if it has one: for equally wide slices of 0..=1, the probability that each holds the
+    /// optimum.
     belief: Option<Arc<[f32]>>,
 }
 
@@ -61,13 +62,13 @@ impl Seen {
     }
 }
 
-/// The loop's state.
+/// Status of the control loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct OperatorStatus {
     camera: CameraHealth,
     camera_offer: CameraOffer,
     lens: LensHealth,
-    /// Policy in charge, if one is and it may be told.
+    /// Policy in charge, if there is one and it may be told.
     policy: Option<PolicyName>,
     /// Last focal power asked for; not while a session is under way.
     focal_power: Option<FocalPower>,
@@ -80,15 +81,15 @@ pub(super) struct OperatorStatus {
     telemetry_dropped: u64,
     /// Median latency from exposure to lens command, microseconds; not while a session is under way.
     latency_p50_micros: Option<u32>,
-    /// 99th percentile of the same.
+    /// 99th percentile of that latency.
     latency_p99_micros: Option<u32>,
-    /// How the loop stands to other programs on the machine.
+    /// Priority of the loop compared with other programs on the machine.
     priority: Priority,
-    /// When the server's certificate ends, after which the page cannot reach it.
+    /// When the server's certificate expires. The page cannot reach the server after that.
     certificate_until: Option<Timestamp>,
 }
 
-/// A [`Standing`], and what it means and what to do in words.
+/// A [`Standing`], with what it means and what to do, in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Priority {
     standing: Standing,
@@ -121,8 +122,8 @@ impl OperatorStatus {
     }
 }
 
-/// A hold that has lasted for `held_for`, and the words for it, as far as they may be told while a
-/// session is under way.
+/// The parts of a hold, which has lasted for `held_for`, and of its message that may be shown while a session is under
+/// way.
 fn told_in_session(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
     match permission::hold_told(hold.caused_by_policy(), held_for) {
         HoldTold::Fully => (Some(hold), message.cloned()),
@@ -142,7 +143,7 @@ impl Audience for ForOperator {
     const LEADS: bool = false;
 
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
-        // Asked once: a session may begin meanwhile.
+        // Ask only once: a session may begin between two questions.
         let blinded = app.blinded();
         let (age, seen) = if blinded { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
         let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));

@@ -1,5 +1,5 @@
 //! What a surgeon's page gets on `/live`. These types have no field for a policy, its focal power,
-//! metric or timing, and their form is the same whatever runs.
+//! metric or timing, and their form is the same for every policy.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ use crate::trial::view::SurgeonView;
 /// A surgeon's page.
 pub(super) struct ForSurgeon;
 
-/// What goes with each picture.
+/// What is sent with each picture.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct SurgeonFrame {
-    /// Frame's number.
+    /// Number of the frame.
     frame: u64,
-    /// The server's run that counted it.
+    /// Number of the server's run in which the frame was counted.
     run: i64,
-    /// Milliseconds from the end of the exposure to sending; in whole hundreds for who must not know the policy.
+    /// Milliseconds from the end of the exposure to sending; in whole hundreds for those who must not know the policy.
     age: f64,
     /// Width of the picture in pixels.
     width: usize,
@@ -35,10 +35,10 @@ pub(super) struct SurgeonFrame {
     per_cell: usize,
     /// Whether the colours are estimated from bands that hold no red.
     estimated: bool,
-    /// Where the focus is looked for, in cells.
+    /// The patch that is brought into focus, in cells.
     #[schema(value_type = Object)]
     patch: PatchArea,
-    /// The bright circle, in cells, if one is seen.
+    /// The bright circle, in cells, if one is detected.
     area: Option<Circle>,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Circle {
 }
 
 impl SurgeonFrame {
-    /// What goes with `picture`, which is `age` milliseconds old.
+    /// What is sent with `picture`, which is `age` milliseconds old.
     pub(super) fn new(picture: &Picture, age: f64, app: &App) -> Self {
         Self {
             frame: picture.number,
@@ -67,23 +67,23 @@ impl SurgeonFrame {
     }
 }
 
-/// The devices as a surgeon needs to know them.
+/// The state of the devices, as far as a surgeon needs to know it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub(super) struct SurgeonStatus {
-    /// Whether the picture is not of the real world.
+    /// Whether the pictures come from a simulated camera.
     camera_simulated: bool,
-    /// Whether no real glass moves.
+    /// Whether the lens is simulated.
     lens_simulated: bool,
-    /// What is the matter, if anything: the same words whatever runs.
+    /// What is wrong, if anything; the words are the same for every policy.
     notice: Option<&'static str>,
-    /// When the server's certificate ends, after which the page cannot reach it.
+    /// When the server's certificate expires. The page cannot reach the server after that.
     #[schema(value_type = Option<String>)]
     certificate_until: Option<Timestamp>,
 }
 
 impl SurgeonStatus {
-    /// Tells of devices that fail, whatever policy runs. A policy that fails is the operator's business: a notice that
-    /// came with one policy alone would tell it from the others.
+    /// Reports devices that fail, whatever policy runs. A policy that fails is reported only to the operator: a notice
+    /// that comes with only one policy would tell it from the others.
     fn new(status: &ControlStatus, certificate_until: Option<Timestamp>) -> Self {
         let notice = match status.held {
             Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
@@ -101,7 +101,7 @@ impl SurgeonStatus {
 }
 
 /// A picture's age in whole hundreds of milliseconds. The exact age includes the policy's own time, from
-/// hundredths of a millisecond to some milliseconds on a busy machine, and would tell policies apart; a
+/// hundredths of a millisecond to some milliseconds on a busy machine, and would tell policies apart. A
 /// page needs to know only whether the picture is older than half a second.
 pub(super) fn coarse(age_ms: f64) -> f64 {
     (age_ms / 100.0).floor() * 100.0

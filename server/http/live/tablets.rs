@@ -1,5 +1,5 @@
-//! The surgeon's pages that are open, by what they say of themselves: for the operator, who sees whether a tablet is
-//! there, awake and well connected.
+//! The surgeon's pages that are open, with what they report about themselves. The operator sees from this whether a
+//! tablet is there, awake and well connected.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,7 +12,7 @@ pub struct OpenTablets(Arc<Mutex<Pages>>);
 
 #[derive(Debug, Default)]
 struct Pages {
-    /// Pages so far.
+    /// Pages opened so far.
     count: u64,
     open: BTreeMap<u64, Tablet>,
 }
@@ -24,7 +24,7 @@ impl OpenTablets {
         self.pages().open.values().cloned().collect()
     }
 
-    /// A page has come whose browser calls itself `user_agent`.
+    /// Adds a page; `user_agent` is what its browser calls itself.
     pub(super) fn enter(&self, user_agent: &str) -> OpenTablet {
         let mut pages = self.pages();
         pages.count += 1;
@@ -41,7 +41,7 @@ impl OpenTablets {
     }
 }
 
-/// A page's entry; leaves when dropped.
+/// A page's entry; removed when dropped.
 #[derive(Debug)]
 pub(super) struct OpenTablet {
     tablets: OpenTablets,
@@ -49,7 +49,7 @@ pub(super) struct OpenTablet {
 }
 
 impl OpenTablet {
-    /// Notes how the page is now.
+    /// Updates the page's state.
     pub(super) fn note(&self, picture_width: Option<u32>, visible: bool, carries_all: bool) {
         if let Some(tablet) = self.tablets.pages().open.get_mut(&self.number) {
             tablet.picture_width = picture_width;

@@ -3,7 +3,7 @@
 /// Shortest wavelength of a [`Spectrum`] in nm.
 const FIRST_NM: u32 = 380;
 
-/// Values of a [`Spectrum`].
+/// Number of values in a [`Spectrum`].
 const SAMPLES: usize = 401;
 
 /// Step of the tables below in nm.

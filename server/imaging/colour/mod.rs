@@ -1,9 +1,8 @@
 //! Colour: the matrix from 16 white-balanced bands to linear sRGB.
 //!
-//! Nothing above 600 nm is sensed, so the reds shown are inferred: they are those of the reflectances
-//! of the fit (smooth ones and perfused tissue) that agree best with what is sensed from 460 to
-//! 600 nm. Colours are shown as under D65, whatever the light in use, because the white reference
-//! takes that light out.
+//! Nothing above 600 nm is sensed, so the reds shown are inferred: they are those of the reflectances of the fit
+//! (smooth ones and perfused tissue) that agree best with what is sensed from 460 to 600 nm. Colours are shown as under
+//! D65, whatever the light in use, because the white reference removes that light.
 
 mod cie;
 mod reflectances;
@@ -15,10 +14,9 @@ use super::calibration::{BANDS, Band};
 use cie::Spectrum;
 pub(super) use srgb::Encoder;
 
-/// Standard deviation of a band's noise that the fit assumes, as a share of white. It keeps the
-/// matrix from telling neighbouring bands apart by their noise: with less, noise in the shown red
-/// grows (3.2 times a band's at 0.012, 2.3 times at 0.02); with more, colours of tissue go further
-/// from what the eye sees.
+/// Standard deviation of a band's noise that the fit assumes, as a share of white. It keeps the matrix from telling
+/// neighbouring bands apart by their noise: with less, noise in the shown red grows (3.2 times a band's at 0.012, 2.3
+/// times at 0.02); with more, colours of tissue differ more from what the eye sees.
 const BAND_NOISE: f64 = 0.02;
 
 type BandMatrix = SMatrix<f64, BANDS, BANDS>;
@@ -75,7 +73,8 @@ mod tests {
     use super::*;
     use crate::imaging::Calibration;
 
-    /// Linear sRGB, by way of the default sensor's bands and by the eye's own functions.
+    /// Linear sRGB of a reflectance: through the default sensor's bands, and through the eye's colour-matching
+    /// functions.
     fn both_ways(spectrum: &Spectrum) -> ([f64; 3], [f64; 3]) {
         let bands = Calibration::default().bands;
         let seen = responses(&bands, spectrum);

@@ -15,7 +15,7 @@ fn encode(linear: f64) -> f64 {
 pub(crate) struct Encoder(Box<[u8; 1 << 16]>);
 
 impl Encoder {
-    /// Multiplies a linear component of 0..=1 into an index.
+    /// Factor that turns a linear component of 0..=1 into an index.
     pub(crate) const SCALE: f32 = 4095.0;
 
     #[allow(clippy::large_stack_arrays, reason = "64 KiB, once, on its way to the heap")]

@@ -7,16 +7,16 @@ use rand_chacha::ChaCha8Rng;
 
 use super::edges::Edge;
 
-/// Triples of candidates that are tried.
+/// Number of triples of candidates that are tried.
 const ATTEMPTS: usize = 32;
 
 /// Fits per attempt, each over the inliers of the one before.
 const REFINEMENTS: usize = 3;
 
-/// Pixels from the circle up to which a candidate is an inlier.
+/// Largest distance of an inlier from the circle, in pixels.
 const INLIER: f64 = 3.0;
 
-/// The same candidates always give the same circle.
+/// Fixed, so that the same candidates always give the same circle.
 const SEED: u64 = 0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub(super) struct Circle {
     pub radius: f64,
 }
 
-/// The circle that `valid` accepts with the highest sum of its inliers' scores, and that sum.
+/// Of the circles that `valid` accepts, the one with the highest sum of its inliers' scores; and that sum.
 pub(super) fn find(edges: &[Edge], valid: impl Fn(&Circle) -> bool) -> Option<(Circle, f64)> {
     if edges.len() < 3 {
         return None;
@@ -54,9 +54,9 @@ fn attempt(edges: &[Edge], mut inliers: Vec<Edge>) -> Option<(Circle, f64)> {
     found
 }
 
-/// The circle with the least sum of (x^2 + y^2 - 2ax - 2by - c)^2 (Kasa's fit), which goes through
-/// all points where there are three; `None` for points on a line. About the points' mean, c is the
-/// mean of x^2 + y^2 and two unknowns are left.
+/// The circle with the least sum of (x^2 + y^2 - 2ax - 2by - c)^2 (Kasa's fit). It goes through all points if there are
+/// three. `None` for points on a line. With the points' mean as the origin, c is the mean of x^2 + y^2, so two unknowns
+/// are left.
 fn fit(points: &[Edge]) -> Option<Circle> {
     let count = points.len() as f64;
     let mean = points.iter().map(|point| Vector2::new(point.x, point.y) / count).sum::<Vector2<f64>>();

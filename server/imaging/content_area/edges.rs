@@ -6,16 +6,16 @@ use crate::imaging::frame::GrayImage;
 /// Strips across the picture.
 const STRIPS: u32 = 16;
 
-/// Candidates at most: two a strip.
+/// Most candidates: two per strip.
 pub(super) const CANDIDATES: f64 = 2.0 * STRIPS as f64;
 
-/// Gray levels a pixel of gradient at which an edge counts as strong.
+/// Gradient at which an edge counts as strong, in gray levels per pixel.
 const STRONG_GRADIENT: f64 = 20.0;
 
-/// Degrees off the direction to the picture's centre at which an edge counts as askew.
+/// Angle between a gradient and the direction to the picture's centre at which an edge counts as askew, in degrees.
 const ASKEW: f64 = 30.0;
 
-/// Gray levels outside of the edge that count as bright.
+/// Gray level outside of the edge that counts as bright.
 const BRIGHT: f64 = 25.0;
 
 /// Pixels next to the left and right border that never count.
@@ -29,11 +29,11 @@ const LEAST_SCORE: f64 = 0.03;
 pub(super) struct Edge {
     pub x: f64,
     pub y: f64,
-    /// 0..=1.
+    /// Score as an edge that faces the centre and is dark outside, 0..=1.
     pub score: f64,
 }
 
-/// Every candidate that scores enough; at most one a side of a strip.
+/// All candidates that score enough: at most one per side of a strip.
 pub(super) fn find(gray: &GrayImage) -> Vec<Edge> {
     if gray.width <= 2 * BORDER || gray.height < 3 {
         return Vec::new();
@@ -85,8 +85,7 @@ fn best(gray: &GrayImage, y: usize, columns: impl Iterator<Item = usize>) -> Opt
     found
 }
 
-/// How strongly the point is an edge that faces the picture's centre, 0..=1; 0 where that is less
-/// than `least`.
+/// How strongly the point is an edge that faces the picture's centre, 0..=1. May return 0 if that is at most `least`.
 fn edge_score(gray: &GrayImage, x: usize, y: usize, least: f64) -> f64 {
     let (across, down) = gradient(gray, x, y);
     let strength = across.hypot(down);

@@ -19,7 +19,7 @@ const CENTRE_WITHIN: f64 = 0.2;
 /// Range of the radius, in widths of the picture.
 const RADIUS: (f64, f64) = (0.2, 0.8);
 
-/// Finds the content area of `gray`; `None` where there is no circle, or too little of one to tell.
+/// Finds the content area of `gray`; `None` if there is no circle, or too little of it to be sure.
 ///
 /// The same picture always gives the same answer.
 #[must_use]

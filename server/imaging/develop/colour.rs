@@ -1,15 +1,15 @@
-//! Colour: that of the cells, lit by the luminance of each pixel.
+//! Colour: each pixel gets the colour of the cells around it, and its own luminance.
 //!
-//! The 16 samples of a cell lie at 16 places, so at an edge they would disagree in brightness, and
-//! that would look like colour. So the samples are first brought to their cell's mean luminance.
-//! Differences below three sixteenths of that mean stay, so that where there is no strong edge the
-//! colours are the cells' own; from nine sixteenths on nothing stays.
+//! The 16 samples of a cell lie at 16 places. At an edge they differ in brightness, which would look like colour. So
+//! the samples are first brought to their cell's mean luminance. Differences below three sixteenths of that mean are
+//! kept, so that the colours are the cells' own where there is no strong edge. Of a difference from nine sixteenths on,
+//! nothing is kept.
 //!
-//! A pixel gets its surroundings' colour, made lighter or darker. sRGB's encoding of light c is
-//! 1.055 c^(1/2.4) - 0.055, but for the darkest colours: light times r makes the encoding, plus an
-//! offset, times r^(1/2.4). So luma plus that offset, and chroma, each divided by the encoding of
-//! the cell's luminance, are what a cell's pixels have in common, and what is enlarged; times the
-//! encoding of a pixel's own luminance they give the pixel.
+//! A pixel gets its surroundings' colour, made lighter or darker. sRGB encodes light c as 1.055 c^(1/2.4) - 0.055,
+//! except in the darkest colours. So when light is multiplied by r, the encoding plus an offset is multiplied by
+//! r^(1/2.4). Luma plus that offset, and chroma, are each divided by the encoding of the cell's luminance. These shares
+//! are the same for all pixels of a cell, and they are what is enlarged. Times the encoding of a pixel's own luminance,
+//! they give the pixel.
 
 use multiversion::multiversion;
 
@@ -26,22 +26,22 @@ use crate::imaging::ycc::{CHROMA, LUMA};
 /// Rows of cells that are kept.
 const KEPT: usize = 4;
 
-/// The offset of sRGB's encoding, of 255.
+/// The offset of sRGB's encoding, on the scale of 255.
 const ENCODING_OFFSET: i16 = 14;
 
-/// Parts of an 8-bit step in which luma and chroma are found.
+/// Parts of an 8-bit step in which luma and chroma are computed.
 const PARTS: i16 = 8;
 
 /// The encoding of white, with its offset, in [`PARTS`].
 const ENCODED_WHITE: f32 = 8.0 * (255.0 + ENCODING_OFFSET as f32);
 
-/// The number that stands for a share of 1: times an encoding, of 65536, it leaves [`PARTS`].
+/// The number that stands for a share of 1. Its product with an encoding, divided by 65536, is in [`PARTS`].
 const SHARE: f32 = 8192.0;
 
 /// The number that stands for the encoding of white.
 const ENCODED: f32 = ENCODED_WHITE * 65_536.0 / SHARE;
 
-/// Level, below black, from which light is counted: ratios would be noise in the dark.
+/// Level from which light is counted. It is below black, because ratios would be noise in the dark.
 const FLOOR: f32 = (BLACK - 31) as f32;
 
 /// Luma and both chromas.
@@ -62,9 +62,9 @@ pub(super) struct Colour {
     rgb: Vec<u8>,
     gray: Vec<f32>,
     colours: [Vec<f32>; 3],
-    /// Shares of luma and chroma, a value a cell, and one more on either side.
+    /// Shares of luma and chroma: one value per cell, and one more on either side.
     cells: [Vec<i16>; COMPONENTS],
-    /// The same, enlarged across; a row of cells each.
+    /// The same, enlarged across; one row per row of cells.
     shares: [Ring<i16>; COMPONENTS],
     /// Encoded luminance of two rows of pixels.
     encoded: Ring<i16>,
@@ -93,8 +93,8 @@ impl Colour {
         }
     }
 
-    /// Makes ready for pictures of `cells` cells a row, `per_cell` pixels each, and a chroma value
-    /// for every `step` of them, 1 or 2, along either side.
+    /// Prepares for pictures of `cells` cells per row and `per_cell` pixels along each side of a cell, with a chroma
+    /// value for every `step` (1 or 2) pixels along either side.
     pub(super) fn resize(&mut self, cells: usize, per_cell: usize, step: usize) {
         self.step = step;
         let width = cells * per_cell;
@@ -129,7 +129,7 @@ impl Colour {
     ) {
         let width = CELL * means.len();
         repeat(means, per_cell, self.of_cell.row_mut(0));
-        // With two by two pixels a cell, two rows of samples share one row of pixels.
+        // With two by two pixels per cell, two rows of samples share one row of pixels.
         let shared = CELL / per_cell;
         for (row, levelled) in self.levelled.chunks_exact_mut(shared * width).enumerate() {
             excess_row(luminance.lanes(per_cell * y + row), self.of_cell.lanes(0), self.excess.lanes_mut(0));
@@ -157,8 +157,8 @@ impl Colour {
         expand(red, per_cell / self.step, self.shares[2].row_mut(y));
     }
 
-    /// Makes luma of row `row` of the pixels of the row of cells `y`, of `cells` such rows; needs
-    /// the colours of the next. Rows must be made one after another.
+    /// Makes luma of pixel row `row` in the row of cells `y`, one of `cells`. Needs the colours of the next row of
+    /// cells. Rows must be made one after another.
     pub(super) fn make_luma(
         &mut self,
         (y, cells): (usize, usize),
@@ -173,8 +173,8 @@ impl Colour {
         luma_row(shares, eighths, luminance.lanes(place), self.encoded.lanes_mut(place), luma);
     }
 
-    /// Makes blue's and red's chroma of the same row, and of the one above it if two rows share
-    /// chroma; after their luma.
+    /// Makes blue's and red's chroma of the same row, and of the one above it if two rows share chroma. Their luma must
+    /// have been made before.
     pub(super) fn make_chroma(
         &mut self,
         (y, cells): (usize, usize),
@@ -226,7 +226,7 @@ fn repeat(means: &[u16], per_cell: usize, out: &mut [u16]) {
     }
 }
 
-/// How far the luminance of each pixel lies from its cell's mean, where that is far.
+/// How much of each pixel's distance from its cell's mean is to be subtracted: nothing if the distance is small.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn excess_row(luminance: &[Lanes<i16>], means: &[Lanes<u16>], excess: &mut [Lanes<i16>]) {
     for ((excess, luminance), means) in excess.iter_mut().zip(luminance).zip(means) {
@@ -262,8 +262,8 @@ fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     }
 }
 
-/// What the pixels of each cell have in common: luma with its offset, and chroma, each beside the encoding of the cell's
-/// luminance.
+/// What the pixels of each cell have in common: luma with its offset, and chroma, each divided by the encoding of the
+/// cell's luminance.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn share_cells(rgb: &[u8], gray: &[f32], cells: [&mut [i16]; COMPONENTS]) {
     let [luma_shares, blue_shares, red_shares] = cells;
@@ -286,11 +286,12 @@ fn nearest(share: f32) -> i16 {
     (share.clamp(-32_767.0, 32_767.0) + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// x^(1/2.4) of a level's light above [`FLOOR`], which it must not be below; 1 for white. `times` as much, and `plus`.
+/// `times` x^(1/2.4) + `plus`, where x is the light of a level above [`FLOOR`], 1 for white. The level must not be
+/// below [`FLOOR`].
 ///
-/// A quotient of two quadratics that is within 1.1 % of it from 1/250 of white on, and 0.06 for no light. What error it
-/// has in common at a cell and at a pixel cancels out. It is divided out, so that the numerator is linear, and written
-/// for levels instead of light: fewer steps for the same number.
+/// The power is computed as a quotient of two quadratics. It is within 1.1 % from 1/250 of white on, and 0.06 for no
+/// light. An error that is the same at a cell and at a pixel cancels out. To save steps, the quotient's limit is
+/// divided out, so that the numerator is linear, and it is written for levels instead of light.
 #[inline(always)]
 fn encoding(level: f32, times: f32, plus: f32) -> f32 {
     // (a + b x + c x^2) / (d + e x + f x^2) of light x, white 1.
@@ -309,8 +310,8 @@ fn encoding(level: f32, times: f32, plus: f32) -> f32 {
 /// Luma of a row of pixels: the cells' share of it, enlarged, times the pixels' own encodings, which
 /// are kept in `encoded`.
 ///
-/// A place whose mean of all bands is white reflects all bands, whatever colour the cells around it
-/// have: towards white luma is lifted to it.
+/// A place whose mean of all bands is white reflects all bands, whatever colour the cells around it have. So where
+/// luminance nears white, luma is lifted to white.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn luma_row(
     shares: [&[Lanes<i16>]; 2],
@@ -367,7 +368,7 @@ fn luma_vector<const EIGHTHS: u8>(
     }
 }
 
-/// The least luma of a pixel of this luminance: two levels a step, up to white.
+/// The least luma of a pixel of this luminance: one step for every two levels, up to 255 at white.
 #[inline(always)]
 fn least(luminance: i16) -> i16 {
     (luminance - (WHITE as i16 - 2 * 255)) >> 1
@@ -424,13 +425,13 @@ fn pair_rows(rows: [&[i16]; 2], out: &mut [i16]) {
     }
 }
 
-/// The mean of two values, rounded down. Encodings add up to more than 16 bits.
+/// The mean of two values, rounded down. The sum of two encodings may not fit 16 bits.
 #[inline(always)]
 fn mean(one: i16, other: i16) -> i16 {
     one + ((other - one) >> 1)
 }
 
-/// From luminance to how far chroma may be from gray: towards white there is no colour.
+/// Turns luminance into the largest distance of chroma from gray. Towards white it falls to 0: no colour.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn limit_row(limits: &mut [Lanes<i16>]) {
     for limits in limits {

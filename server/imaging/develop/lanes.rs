@@ -1,5 +1,5 @@
-//! Rows are worked on in whole vectors of [`LANES`] values: loops of a fixed length, which the
-//! compiler turns into vector instructions without anything left over at a row's end.
+//! Rows are processed in whole vectors of [`LANES`] values. The compiler turns loops of this fixed length into vector
+//! instructions, and nothing is left over at a row's end.
 
 /// Values worked on at once: a 512-bit register of 16-bit values.
 pub(super) const LANES: usize = 32;
@@ -7,8 +7,8 @@ pub(super) const LANES: usize = 32;
 /// One vector.
 pub(super) type Lanes<T> = [T; LANES];
 
-/// A value between two, the second of which counts `EIGHTHS` eighths. Values must differ by less
-/// than 2^15.
+/// A value between `own` and `near`, with a weight of `EIGHTHS` (0 to 3) eighths for `near`. The two must differ by
+/// less than 2^15.
 #[inline(always)]
 pub(super) fn mixed<const EIGHTHS: u8>(own: i16, near: i16) -> i16 {
     let difference = near - own;
@@ -20,13 +20,13 @@ pub(super) fn mixed<const EIGHTHS: u8>(own: i16, near: i16) -> i16 {
     }
 }
 
-/// The mean of two values, rounded up: an instruction of its own.
+/// The mean of two values, rounded up. Processors have a single instruction for this.
 #[inline(always)]
 pub(super) fn halfway(one: u16, other: u16) -> u16 {
     ((u32::from(one) + u32::from(other) + 1) >> 1) as u16
 }
 
-/// The mean of three values, the middle one of which counts twice, to the nearest whole number or the one above it.
+/// The mean of three values with the middle one counted twice: the nearest whole number, or the one above it.
 #[inline(always)]
 pub(super) fn weighted([left, middle, right]: [u16; 3]) -> u16 {
     halfway(halfway(left, right), middle)
@@ -38,8 +38,8 @@ pub(super) fn upper_half(one: i16, other: i16) -> i16 {
     ((i32::from(one) * i32::from(other)) >> 16) as i16
 }
 
-/// For row `row` of `rows` within the row of cells `y`: the nearest other row of cells of `cells`,
-/// and by how many eighths it counts, by their centres' distances.
+/// For row `row` of the `rows` rows of the row of cells `y`: the nearest other of the `cells` rows of cells, and its
+/// weight in eighths, by the distances of the centres.
 pub(super) fn between(row: usize, rows: usize, y: usize, cells: usize) -> (usize, u8) {
     let near = if row < rows / 2 { y.saturating_sub(1) } else { (y + 1).min(cells - 1) };
     let eighths = 4 * (2 * row + 1).abs_diff(rows) / rows;

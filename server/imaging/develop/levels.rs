@@ -1,4 +1,4 @@
-//! White-balanced samples in whole numbers, small enough that four of them fit 16 bits.
+//! White-balanced samples in whole numbers, small enough that the sum of four fits 16 bits.
 
 use multiversion::multiversion;
 
@@ -12,10 +12,10 @@ use crate::imaging::reconstruct::balance::{self, PixelBalance};
 pub(super) const BLACK: u16 = 512;
 /// Level of a sample as bright as the white reference.
 pub(super) const WHITE: u16 = 8192;
-/// Highest level that is developed, a little above white. Bands saturate at different levels above
-/// white; cut here, a highlight is white in all bands, and not a colour of its own.
+/// Highest level that is developed, a little above white. Bands saturate at different levels above white. Cut at this
+/// level, a highlight is white in all bands, and gets no false colour.
 pub(super) const HIGHEST: u16 = WHITE + (WHITE - BLACK) / 16;
-/// Highest level that counts for gray: twice white, so that four of them fit 16 bits.
+/// Highest level that counts for gray: twice white, so that the sum of four fits 16 bits.
 const HIGHEST_OF_GRAY: u16 = 16_383;
 /// Levels from black to white.
 pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
@@ -36,11 +36,12 @@ pub(super) fn gray(level: i16) -> f32 {
 /// Turns samples into levels, by references per band or per pixel, and sums them up cell by cell.
 #[derive(Debug, Clone)]
 pub(super) struct Levels {
-    /// For each row of a cell: how its bands, by turns, become levels.
+    /// For each row of a cell: how its bands, which alternate along the row, become levels.
     of_bands: [BandBalance; CELL],
     /// Samples of a row of cells beyond its last whole vector.
     rest: [Lanes<u16>; CELL],
-    /// Sums of four levels, one below another, as they count for gray and as they are developed.
+    /// Sums of the four levels in each column of a row of cells: as they count for gray, and (`sums`) as they are
+    /// developed.
     of_gray: Ring<u16>,
     sums: Ring<u16>,
 }
@@ -48,20 +49,20 @@ pub(super) struct Levels {
 /// A vector's balance by references per band, in whole numbers: a level is
 /// `(((min(sample, most) - least) * factor - 2^15) * gain >> 16) + summand`.
 ///
-/// 2^15 is subtracted because there is an instruction for the upper half of a product of signed numbers that compilers
-/// find, and none of unsigned ones that they do; the summand makes up for it.
+/// 2^15 is subtracted because compilers find the instruction for the upper half of a product of signed numbers, but not
+/// that of unsigned ones. The summand makes up for it.
 #[derive(Debug, Clone, Copy)]
 struct BandBalance {
     most: Lanes<u16>,
     least: Lanes<u16>,
-    /// A power of two that brings the samples to 16 bits.
+    /// A power of two that scales the samples to the full 16 bits.
     factor: Lanes<u16>,
     gain: Lanes<i16>,
     summand: Lanes<i16>,
 }
 
 impl BandBalance {
-    /// The balance for a row of samples of the bands given by `dark` and `white`, by turns.
+    /// The balance for a row of samples of four alternating bands, whose references are `dark` and `white`.
     fn new(dark: [f32; CELL], white: [f32; CELL]) -> Self {
         let mut balance =
             Self { most: [0; LANES], least: [0; LANES], factor: [1; LANES], gain: [0; LANES], summand: [0; LANES] };
@@ -70,8 +71,8 @@ impl BandBalance {
             let gain = SPAN / (white[lane % CELL] - dark[lane % CELL]);
             let offset = f32::from(BLACK) - dark[lane % CELL] * gain;
 
-            // The first sample that makes a level above 0, and the last that stays in range however
-            // the numbers below are rounded.
+            // The smallest sample whose level is not negative, and the largest that stays in range however the numbers
+            // below are rounded.
             let highest = f32::from(HIGHEST_OF_GRAY - 2);
             let least = (-offset / gain).clamp(0.0, 65_535.0).ceil() as u16;
             let most = ((highest - offset) / gain).clamp(f32::from(least), 65_535.0).floor() as u16;
@@ -108,14 +109,13 @@ impl Levels {
         }
     }
 
-    /// Makes ready for mosaics of `width` samples a row.
+    /// Prepares for mosaics of `width` samples per row.
     pub(super) fn resize(&mut self, width: usize) {
         self.of_gray.resize(width, 1);
         self.sums.resize(width, 1);
     }
 
-    /// Makes the levels of the row of cells `y`, its cells' mean levels into `means`, and its part of
-    /// `gray`.
+    /// Makes the `levels` of the row of cells `y`, its cells' mean levels (`means`), and its row of `gray`.
     pub(super) fn make(
         &mut self,
         mosaic: &MosaicFrame,
@@ -159,7 +159,7 @@ impl Levels {
             return;
         }
 
-        // What is left of a vector, filled up.
+        // The samples beyond the last whole vector, filled up to a vector.
         for (row, rest) in samples.iter().zip(&mut self.rest) {
             let left = row.as_chunks::<LANES>().1;
             rest[..left.len()].copy_from_slice(left);
@@ -179,8 +179,8 @@ fn balance_pixels(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut 
     }
 }
 
-/// Balances four rows of samples by references per band, and sums up their levels for gray and, cut
-/// at [`HIGHEST`], as they are developed.
+/// Balances four rows of samples by references per band, and sums up their levels twice: for gray, and cut at
+/// [`HIGHEST`], as they are developed.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn balance_rows(
     balances: &[BandBalance; CELL],

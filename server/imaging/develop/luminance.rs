@@ -1,13 +1,13 @@
-//! Luminance at every sample: what each sample says of the mean of all bands at its own place.
+//! Luminance at every sample: the mean of all bands at the sample's place, estimated from its one band.
 //!
-//! A sample senses one band, so its level must be turned into the mean that all bands would have
-//! there. The samples of the same band around it, and the mean of all bands at those places, tell
-//! how the two go together: where a surface is only lit more or less, they stay in proportion;
-//! where something white is added, they differ by a constant. [`SHARES`] stand between the two.
+//! A sample senses one band, so its level must be turned into the mean that all bands would have there. The samples of
+//! the same band around it, and the mean of all bands at those places, show how the two are related. If a surface is
+//! only lit more or less, they stay in proportion. If something white is added, they differ by a constant. [`SHARES`]
+//! is a compromise between the two.
 //!
-//! That is wrong where bands change quickly beside one another, at the edge between two colours:
-//! the error then differs from sample to sample and shows as a maze. Detail that changes from
-//! sample to sample is therefore kept only as far as coarser detail is there too.
+//! This fails where that relation changes quickly, at the edge between two colours. The error then differs from sample
+//! to sample and looks like a maze. Detail that changes from sample to sample is therefore kept only as far as coarser
+//! detail is there too.
 //!
 //! The idea of carrying the mean of all bands over to each sample is that of Mihoubi, Losson,
 //! Mathon, Macaire: "Multispectral demosaicing using pseudo-panchromatic image", IEEE Transactions
@@ -19,31 +19,32 @@ use super::lanes::{LANES, Lanes, between, halfway, mixed, upper_half, weighted};
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
 use super::ring::{Ring, same_bands};
 
-/// Shares of a band's own mean and of the mean of all bands in what a band's deviation is in proportion to. With the
-/// first alone a band deviates in proportion to its level; with the second alone all bands deviate by the same amount.
+/// A band's deviation is taken to be in proportion to a weighted sum of the band's own mean and the mean of all bands.
+/// These are the two weights. With the first alone a band deviates in proportion to its level; with the second alone
+/// all bands deviate by the same amount.
 const SHARES: [i16; 2] = [2, 1];
 
-/// Least sum of [`SHARES`] by which a deviation is divided: that of a band 64 levels above black, where the mean of all
-/// bands is black.
+/// Least weighted sum (see [`SHARES`]) by which a deviation is divided: that of a band 64 levels above black, while the
+/// mean of all bands is black.
 const LEAST: i16 = 128;
 
-/// A sample from here on may be saturated, so that it cannot tell that its place is darker than the
-/// places around it.
+/// A sample of this level or above may be saturated, so it does not show that its place is darker than the places
+/// around it.
 const SATURATED: u16 = WHITE - 16;
 
-/// Largest detail, so that four of them fit 16 bits.
+/// Largest detail, so that the sum of four fits 16 bits.
 const MOST_DETAIL: i16 = 8191;
 
 /// Mean detail that noise alone makes, in levels.
 const NOISE: f32 = SPAN / 1000.0;
 
-/// Rows of cells that are kept of what a row is made from, and of what is made from it.
+/// Rows of cells that are kept of each intermediate result that the next rows need.
 const KEPT: usize = 4;
 
 /// Makes luminance from the levels of a mosaic whose cells have `cell` x `cell` values.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Luminance {
-    /// 4 for the sensor's mosaic; 2 for the means of its blocks of two by two.
+    /// Values along a cell's side: 4 for the sensor's mosaic; 2 for the means of its blocks of two by two.
     cell: usize,
     width: usize,
     height: usize,
@@ -54,14 +55,14 @@ pub(super) struct Luminance {
     /// Levels and means, smoothed across over the same band's values.
     smooth_levels: Ring<u16>,
     smooth_means: Ring<u16>,
-    /// What a value says beyond that mean, and the same smoothed across.
+    /// How far the mean of all bands at each value lies from `mean`; and the same, smoothed across.
     detail: Ring<i16>,
     smooth_detail: Ring<i16>,
     /// The mean with the coarse part of the detail.
     coarse: Ring<i16>,
     /// The rest of the detail.
     fine: Ring<i16>,
-    /// The share of the fine detail that is kept, a row of cells each.
+    /// The share of the fine detail that is kept, of 32767; one row per row of cells.
     trust: Ring<i16>,
     result: Ring<i16>,
     lines: Lines,
@@ -75,12 +76,12 @@ struct Lines {
     /// Absolute detail summed down the columns of a row of cells.
     coarse: Ring<u16>,
     fine: Ring<u16>,
-    /// A value a cell, and one more on either side.
+    /// One value per cell, and one more on either side.
     cells: Vec<i16>,
 }
 
 impl Luminance {
-    /// Makes ready for pictures of `width` x `height` values, `cell` x `cell` of them a cell.
+    /// Prepares for pictures of `width` x `height` values, `cell` x `cell` of them per cell.
     pub(super) fn resize(&mut self, cell: usize, width: usize, height: usize) {
         self.cell = cell;
         self.width = width;
@@ -115,7 +116,7 @@ impl Luminance {
         self.result.lanes(y)
     }
 
-    /// Makes the means around the row of cells `y`; needs the levels of the next.
+    /// Makes the means around the row of cells `y`. Needs the levels of the next row.
     pub(super) fn make_means(&mut self, levels: &Ring<u16>, y: usize) {
         let cell = self.cell;
         let step = cell as isize;
@@ -143,7 +144,7 @@ impl Luminance {
         }
     }
 
-    /// Makes the detail of the row of cells `y`; needs the means of the next.
+    /// Makes the detail of the row of cells `y`. Needs the means of the next row.
     pub(super) fn make_detail(&mut self, levels: &Ring<u16>, y: usize) {
         let cell = self.cell;
         let step = cell as isize;
@@ -159,8 +160,8 @@ impl Luminance {
         }
     }
 
-    /// Parts the detail of the row of cells `y` into coarse and fine, and finds how far to trust
-    /// the fine part; needs the detail of the next.
+    /// Splits the detail of the row of cells `y` into coarse and fine, and finds how far to trust the fine part. Needs
+    /// the detail of the next row.
     pub(super) fn part(&mut self, y: usize) {
         let cell = self.cell;
         if cell == 4 {
@@ -175,7 +176,7 @@ impl Luminance {
         expand(cells, cell, self.trust.row_mut(y));
     }
 
-    /// [`part_rows`] of the row of cells `y`, of `ROWS` rows of values.
+    /// [`part_rows`] for the row of cells `y`, which has `ROWS` rows of values.
     fn part_cells<const ROWS: usize, const AROUND: usize>(&mut self, y: usize) {
         let first = ROWS * y;
         let last = self.height - 1;
@@ -188,7 +189,7 @@ impl Luminance {
         part_rows::<ROWS, AROUND>(around, detail, mean, parts, sums);
     }
 
-    /// Makes the luminance of the row of cells `y`; needs the parts of the next.
+    /// Makes the luminance of the row of cells `y`. Needs the parts of the next row.
     pub(super) fn join(&mut self, y: usize) {
         for row in 0..self.cell {
             let place = self.cell * y + row;
@@ -200,8 +201,8 @@ impl Luminance {
     }
 }
 
-/// Enlarges a row of one value a cell to `per_cell` values a cell, 1, 2 or 4, linearly between the
-/// cells' centres. The first and last of `cells` are beside the row, and are set here.
+/// Enlarges a row of one value per cell to `per_cell` values (1, 2 or 4) per cell, linearly between the cells' centres.
+/// The first and the last of `cells` lie beside the row, and are set here.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn expand(cells: &mut [i16], per_cell: usize, out: &mut [i16]) {
     let count = cells.len() - 2;
@@ -238,7 +239,7 @@ fn mean_of_five(near: [&[Lanes<u16>]; 5], out: &mut [Lanes<u16>]) {
     }
 }
 
-/// The same down the columns, for four rows from the eight around them.
+/// Like [`mean_of_five`], but down the columns: makes four rows from the eight around them.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn sum_rows(near: [&[Lanes<u16>]; 8], out: [&mut [Lanes<u16>]; 4]) {
     let count = out[0].len();
@@ -267,8 +268,7 @@ fn mean_of(first: u16, inner: u16, last: u16) -> u16 {
     (halfway(first, last) + inner + 2) >> 2
 }
 
-/// The mean of three values, the middle one of which counts twice. Of neighbours it covers two
-/// values.
+/// The mean of three values with the middle one counted twice. For neighbours, it covers two values.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn smooth(near: [&[Lanes<u16>]; 3], out: &mut [Lanes<u16>]) {
     let near = near.map(|values| &values[..out.len()]);
@@ -294,9 +294,9 @@ fn smooth_of([left, here, right]: [i16; 3]) -> i16 {
     (left + 2 * here + right + 2) >> 2
 }
 
-/// The detail of a row: how far the mean of all bands at each value lies from that around it. `band`
-/// and `all` are the levels of the value's band and the means of all bands, smoothed across, in the
-/// row of cells above, here and below.
+/// The detail of a row: how far the mean of all bands at each value lies from the mean `around` it. `band` and `all`
+/// are the levels of the value's band and the means of all bands, smoothed across, in the row of cells above, here and
+/// below.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn detail_row(
     levels: &[Lanes<u16>],
@@ -329,20 +329,19 @@ fn detail_row(
     }
 }
 
-/// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle
-/// NaN.
+/// The whole number nearest to `value`, which must fit 16 bits. Cheaper than a cast, which must handle NaN.
 #[inline(always)]
 fn rounded(value: f32) -> i16 {
-    // 1.5 * 2^23: a number of either sign then stands in the lowest bits.
+    // 1.5 * 2^23: a number of either sign is then in the lowest bits.
     (value + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// Rows to be made.
+/// Rows that are to be written.
 type Rows<'a, const ROWS: usize> = [&'a mut [Lanes<i16>]; ROWS];
 
-/// Parts the detail of a row of cells, `ROWS` rows of values, into a smooth part, added to the mean, and the rest, and
-/// sums the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and in the
-/// one above and below them: `AROUND` rows.
+/// Splits the detail of a row of cells (`ROWS` rows of values) into a smooth part, which is added to the mean, and the
+/// rest. Sums the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and
+/// in the one above and below them: `AROUND` rows.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn part_rows<const ROWS: usize, const AROUND: usize>(
     around: [&[Lanes<i16>]; AROUND],
@@ -379,8 +378,7 @@ fn part_rows<const ROWS: usize, const AROUND: usize>(
     }
 }
 
-/// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside
-/// that of both.
+/// How far fine detail is trusted in each cell, of 32767: the share of the coarse detail's energy in that of both.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn trust_row(cell: usize, doubt: f32, coarse: &[u16], fine: &[u16], trust: &mut [i16]) {
     let least = (NOISE * (cell * cell) as f32).powi(2);

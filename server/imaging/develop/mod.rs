@@ -1,9 +1,9 @@
 //! Development: a mosaic's picture at any [`Size`].
 //!
-//! At the size of the cells, [`Reconstructor`] makes it. At the larger ones luminance comes from
-//! every sample, colour from the cells, and the picture is made as JPEG stores it, so that neither
-//! red, green and blue of each pixel are made nor turned back. Everything is made in one pass from
-//! top to bottom, a row of cells at a time, and keeps only the rows that the next ones need.
+//! At the size of the cells, [`Reconstructor`] makes it. At the larger sizes luminance comes from every sample and
+//! colour from the cells. The picture is made in luma and chroma, as JPEG stores it, which saves a conversion to red,
+//! green and blue and back. One pass makes everything from top to bottom, a row of cells at a time, and keeps only the
+//! rows that the next ones need.
 
 mod colour;
 mod lanes;
@@ -21,9 +21,9 @@ use levels::Levels;
 use luminance::Luminance;
 use ring::Ring;
 
-/// Rows of cells of which levels are kept: those that one step reads, and the one that it makes.
+/// Rows of cells whose levels are kept: those that one step reads, and the one that it makes.
 const KEPT: usize = 6;
-/// Rows of cells that must be begun before the luminance of one is finished, and its pixels.
+/// How many rows of cells below a row must have been begun before its luminance, and its pixels, can be finished.
 const AHEAD_OF_LUMINANCE: usize = 4;
 const AHEAD_OF_PIXELS: usize = 5;
 
@@ -35,7 +35,7 @@ pub struct Developer {
     levels: Levels,
     /// Levels of the samples.
     samples: Ring<u16>,
-    /// Means of blocks of two by two of them.
+    /// Mean levels of blocks of two by two samples.
     blocks: Ring<u16>,
     /// Mean levels of the cells.
     means: Ring<u16>,
@@ -43,12 +43,12 @@ pub struct Developer {
     colour: Colour,
 }
 
-/// A developed picture as it is best encoded as JPEG: the form in which it was made.
+/// A developed picture in the form in which it was made. JPEG is best encoded from this form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Developed {
-    /// Of [`Size::Cell`].
+    /// A picture of [`Size::Cell`].
     Rgb(RgbImage),
-    /// Of the larger sizes.
+    /// A picture of a larger size.
     Ycc(YccImage),
 }
 
@@ -74,7 +74,7 @@ impl Developer {
         }
     }
 
-    /// What makes pictures of one value a cell, by the same calibration.
+    /// The reconstructor of the same calibration, which makes pictures of one pixel per cell.
     #[must_use]
     pub const fn reconstructor(&self) -> &Reconstructor {
         &self.reconstructor
@@ -83,9 +83,9 @@ impl Developer {
     /// Makes the picture of `mosaic` at `size` into `rgb` (sRGB), and the gray picture of its cells
     /// (0..=255) into `gray`; resizes both as needed.
     ///
-    /// Gray is the same at every size, to a twentieth of a level, but that at the larger sizes a
-    /// sample counts as at most twice as bright as white. References per pixel apply to mosaics of
-    /// their own size, as for [`Reconstructor::reconstruct`].
+    /// Gray is the same at every size to within a twentieth of a level, with one exception: at the larger sizes a
+    /// sample counts as at most twice as bright as white. References per pixel apply to mosaics of their own size, as
+    /// for [`Reconstructor::reconstruct`].
     pub fn develop(&mut self, mosaic: &MosaicFrame, size: Size, rgb: &mut RgbImage, gray: &mut GrayImage) {
         if size == Size::Cell {
             return self.reconstructor.reconstruct(mosaic, rgb, gray);
@@ -107,8 +107,8 @@ impl Developer {
         }
     }
 
-    /// Makes the same pictures, but that of a larger size as JPEG stores it: with a chroma value for
-    /// two by two pixels, which takes less time than one in RGB.
+    /// Like [`Self::develop`], but makes a picture of a larger size as JPEG stores it, with one chroma value for two by
+    /// two pixels. That takes less time than RGB.
     pub fn develop_for_jpeg(
         &mut self,
         mosaic: &MosaicFrame,
@@ -192,8 +192,8 @@ impl Developer {
         self.colour.resize(cells, size.per_cell(), step);
     }
 
-    /// Begins the row of cells `y`, and brings the luminance of those above it as far as that allows:
-    /// that of the row [`AHEAD_OF_LUMINANCE`] above it is finished.
+    /// Begins the row of cells `y`, and continues the luminance of the rows above it as far as possible. This finishes
+    /// the luminance of the row [`AHEAD_OF_LUMINANCE`] above it.
     fn step(&mut self, mosaic: &MosaicFrame, per_cell: usize, y: usize, gray: &mut GrayImage) {
         let rows = mosaic.band_height();
         let above = |by: usize| y.checked_sub(by).filter(|&row| row < rows);
@@ -221,7 +221,7 @@ impl Developer {
         }
     }
 
-    /// Makes the colours of the row of cells that [`Self::step`] at `y` has finished.
+    /// Makes the colours of the row of cells whose luminance [`Self::step`] at `y` has finished.
     fn colour_cells(&mut self, mosaic: &MosaicFrame, per_cell: usize, y: usize) {
         let finished = y.checked_sub(AHEAD_OF_LUMINANCE).filter(|&row| row < mosaic.band_height());
         let Some(row) = finished else { return };
@@ -245,7 +245,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Makes luma of the next row, and chroma of all rows since it was last made.
+    /// Makes luma of the next row. If `chroma` is given, also makes chroma of all rows since chroma was last made.
     fn next_into(&mut self, luma: &mut [u8], chroma: Option<[&mut [u8]; 2]>) {
         let y = self.done / self.per_cell;
         let row = self.done % self.per_cell;
@@ -266,7 +266,7 @@ impl Rows<'_> {
     }
 }
 
-/// Room in `gray` for a value of each cell.
+/// Resizes `gray` to one value per cell.
 fn cell_gray(mosaic: &MosaicFrame, mut gray: GrayImage) -> GrayImage {
     gray.width = mosaic.band_width();
     gray.height = mosaic.band_height();

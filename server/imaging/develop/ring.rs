@@ -5,10 +5,10 @@ use super::lanes::{LANES, Lanes};
 /// Values beside a row, on either side, that filters may read: a whole vector, so that rows begin where a vector does.
 pub(super) const MARGIN: usize = LANES;
 
-/// Values of a margin that filters do read, and that are filled: more than the side of a mosaic cell.
+/// Values of a margin that filters really read, and that are therefore filled: more than the side of a mosaic cell.
 const FILLED: usize = 8;
 
-/// Bytes of a cache line. Vectors that lie across two of them take twice as long to read.
+/// Bytes of a cache line. A vector that lies across two lines takes twice as long to read.
 const LINE: usize = 64;
 
 /// The latest rows of a picture that is made from top to bottom.
@@ -18,14 +18,14 @@ const LINE: usize = 64;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ring<T> {
     values: Vec<T>,
-    /// Values before the first row, which begins where a line of the cache does.
+    /// Unused values before the first row, so that the row begins at a cache line.
     skipped: usize,
     width: usize,
     rows: usize,
 }
 
 impl<T: Copy + Default> Ring<T> {
-    /// Makes room for `rows` rows of `width` values; keeps its memory where it is large enough.
+    /// Makes room for `rows` rows of `width` values; keeps its memory if that is large enough.
     pub(super) fn resize(&mut self, width: usize, rows: usize) {
         self.width = width;
         self.rows = rows;
@@ -34,7 +34,7 @@ impl<T: Copy + Default> Ring<T> {
         self.skipped = self.values.as_ptr().align_offset(LINE).min(spare);
     }
 
-    /// Values from one row to the next: whole vectors, and one on either side.
+    /// Values from one row to the next: the whole vectors of a row, and a margin on either side.
     const fn stride(&self) -> usize {
         self.whole() + 2 * MARGIN
     }
@@ -66,7 +66,7 @@ impl<T: Copy + Default> Ring<T> {
         self.padded_mut(y)[MARGIN..][..whole].as_chunks_mut().0
     }
 
-    /// The vectors of row `y`, begun `by` values further right, at most [`MARGIN`] to either side.
+    /// The vectors of row `y`, starting `by` values further right (left if negative), at most [`MARGIN`].
     pub(super) fn shifted(&self, y: usize, by: isize) -> &[Lanes<T>] {
         self.padded(y)[MARGIN.saturating_add_signed(by)..][..self.whole()].as_chunks().0
     }
@@ -87,7 +87,7 @@ impl<T: Copy + Default> Ring<T> {
         self.some_mut(y).map(|row| row[MARGIN..][..whole].as_chunks_mut().0)
     }
 
-    /// The same with their margins.
+    /// The vectors of the `N` rows from `y` on, with their margins.
     pub(super) fn padded_rows_mut<const N: usize>(&mut self, y: usize) -> [&mut [Lanes<T>]; N] {
         self.some_mut(y).map(|row| row.as_chunks_mut().0)
     }
@@ -112,8 +112,8 @@ impl<T: Copy + Default> Ring<T> {
 
     /// Fills the margins of row `y` with the row's first and last `period` values, over and over.
     ///
-    /// `period` divides [`FILLED`]. With the side of a mosaic cell as its period, a place in the margin gets a value of
-    /// the band that would be there.
+    /// `period` divides [`FILLED`]. If the period is the side of a mosaic cell, each place in the margin gets a value
+    /// of the band that would be there.
     pub(super) fn fill_margins(&mut self, y: usize, period: usize) {
         let end = MARGIN + self.width;
         let row = self.padded_mut(y);
@@ -124,8 +124,8 @@ impl<T: Copy + Default> Ring<T> {
     }
 }
 
-/// The row `y` of `rows`, or beyond the first and the last one the nearest that holds the same bands,
-/// where `cell` rows are a row of cells.
+/// Row `y`. If that is outside the picture's `rows` rows, the nearest row that holds the same bands. A row of cells has
+/// `cell` rows.
 pub(super) fn same_bands(y: isize, rows: usize, cell: usize) -> usize {
     let phase = y.rem_euclid(cell as isize) as usize;
     match usize::try_from(y) {

@@ -22,7 +22,7 @@ use crate::imaging::frame::CELL;
 /// Cells worked on at once: a 256-bit register holds 16 samples, a row of each.
 pub(super) const CELLS: usize = 4;
 const SAMPLES: usize = CELL * CELLS;
-/// Places of four cells' red, green and blue in a vector of all outputs: two cells of each in either half.
+/// Indices of four cells' red, green and blue in a vector of all outputs. Each half of the vector holds two cells.
 const PIXELS: [usize; 3 * CELLS] = [0, 2, 4, 1, 3, 5, 8, 10, 12, 9, 11, 13];
 /// Largest sum of the absolute integer weights of an output: even after rounding, the sum of the
 /// largest samples still fits 32 bits.
@@ -36,13 +36,14 @@ const WEIGHT_SUM: f32 = 32_750.0;
 #[derive(Debug, Clone)]
 pub(super) struct Kernel {
     weights: [[[i16; SAMPLES]; CELL]; 4],
-    /// Factors and offsets as the outputs lie in two vectors: twice two cells of one output and two of the next.
+    /// Factors and offsets in the order of the outputs in two vectors. Each half of a vector holds two cells of one
+    /// output, then two of the next.
     factors: [[f32; 8]; 2],
     offsets: [[f32; 8]; 2],
 }
 
 impl Kernel {
-    /// The integer form of `mix`; `None` where the processor has no AVX2 or FMA.
+    /// The integer form of `mix`; `None` if the processor lacks AVX2 or FMA.
     pub(super) fn new(mix: &Mix<4>) -> Option<Self> {
         let able = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
         able.then(|| {
@@ -65,7 +66,7 @@ impl Kernel {
         })
     }
 
-    /// Makes a row of pixels and of gray values from the four rows of samples of as many cells.
+    /// Makes a row of pixels and of gray values from the four rows of samples of its cells.
     pub(super) fn row(
         &self,
         encoder: &Encoder,
@@ -78,15 +79,15 @@ impl Kernel {
     }
 }
 
-/// The factor that turns an output's weights into integers. It makes the largest weight a whole
-/// number exactly, and so all of them where they are equal, as gray's often are.
+/// The factor that turns an output's weights into integers. It makes the largest weight exactly a whole number. If all
+/// weights are equal, as gray's often are, all of them are exact.
 fn scale(weights: [f32; CELL * CELL]) -> f32 {
     let largest = weights.iter().fold(1e-30f32, |largest, weight| largest.max(weight.abs()));
     let sum = weights.iter().map(|weight| weight.abs()).sum::<f32>().max(1e-30);
     (WEIGHT_SUM / sum * largest).floor() / largest
 }
 
-// No closures in here: one that is passed on is compiled without these instructions, and then not inlined.
+// No closures in here: a closure that is passed on is compiled without these instructions, so it is not inlined.
 #[target_feature(enable = "avx2,fma")]
 fn row(
     kernel: &Kernel,
@@ -115,7 +116,7 @@ fn row(
         let blue_gray =
             _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_hadd_epi32(sums[2], sums[3])), factors[1], offsets[1]);
 
-        // Below 0 becomes 0, above 65535 that; then, in each half: two cells' red, green, blue, gray.
+        // Clamps to 0..=65535. Each half then holds two cells' red, green, blue and gray.
         let packed = _mm256_packus_epi32(_mm256_cvtps_epi32(red_green), _mm256_cvtps_epi32(blue_gray));
         let indices: [u16; SAMPLES] = reinterpreted(packed);
 
@@ -129,10 +130,10 @@ fn row(
     }
 }
 
-/// Numbers as vectors, or vectors as numbers.
+/// Reinterprets numbers as vectors, or vectors as numbers.
 #[inline(always)]
 fn reinterpreted<A: Copy, B>(from: A) -> B {
     const { assert!(size_of::<A>() == size_of::<B>()) }
-    // SAFETY: both have one size, and every bit pattern is a valid number or vector of numbers.
+    // SAFETY: both have the same size, and every bit pattern is a valid number or vector of numbers.
     unsafe { std::mem::transmute_copy(&from) }
 }

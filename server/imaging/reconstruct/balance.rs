@@ -13,8 +13,8 @@ pub(in crate::imaging) const WHITE: f32 = DARK + 16_384.0;
 /// than a cast.
 const LOW_BITS: f32 = 8_388_608.0;
 
-/// A pixel that sees less of white than this share of its band's mean has no balance of its own,
-/// which would show noise.
+/// If a pixel's span from dark to white is below this share of its band's mean span, the pixel gets the band's gain:
+/// its own would amplify noise.
 const LEAST_SPAN: f32 = 0.1;
 
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
@@ -27,7 +27,7 @@ pub(in crate::imaging) struct PixelBalance {
 }
 
 impl PixelBalance {
-    /// The balance by the references of `calibration`, if one of them is per pixel and they are of one size.
+    /// The balance by the references of `calibration`. `None` if none of them is per pixel, or if their sizes differ.
     pub(super) fn new(calibration: &Calibration) -> Option<Self> {
         let (width, height) = calibration.size()?;
         if !calibration.fits(width, height) {
@@ -46,8 +46,7 @@ impl PixelBalance {
                 let dark = counts(&calibration.dark, &mean_dark, index);
                 let white = counts(&calibration.white, &mean_white, index);
 
-                // A dead pixel, or one outside the content area, sees next to no white: it is balanced like
-                // its band.
+                // A dead pixel, or one outside the content area, sees almost no white. It gets the gain of its band.
                 let band = band(index, width);
                 let of_band = mean_white[band] - mean_dark[band];
                 let span = if white - dark > LEAST_SPAN * of_band { white - dark } else { of_band };
@@ -60,7 +59,7 @@ impl PixelBalance {
         Some(Self { width, height, gains, offsets })
     }
 
-    /// Whether `mosaic` is of the references' size.
+    /// Whether `mosaic` has the size of the references.
     pub(super) fn fits(&self, mosaic: &MosaicFrame) -> bool {
         (mosaic.width(), mosaic.height()) == (self.width, self.height)
     }
@@ -71,8 +70,8 @@ impl PixelBalance {
         (&self.gains[places.clone()], &self.offsets[places])
     }
 
-    /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is
-    /// four rows one after another.
+    /// White-balances the samples of the row of cells `y`, from column `x` on, into `balanced`: four rows one after
+    /// another.
     #[inline(always)]
     pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [u16]) {
         let length = rows[0].len();

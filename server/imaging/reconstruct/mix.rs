@@ -14,8 +14,8 @@ pub(super) struct Mix<const K: usize> {
 }
 
 impl<const K: usize> Mix<K> {
-    /// Sums weighted by the rows of `weights`, which are for samples that are 0 for dark and 1 for
-    /// white; the samples given later are `dark` and `white` there.
+    /// Sums weighted by the rows of `weights`. These are for samples scaled to 0 for dark and 1 for white. The samples
+    /// given later are unscaled: they are `dark` for dark and `white` for white.
     pub(super) fn new(weights: [[f32; BANDS]; K], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
         let weights = weights.map(|row| std::array::from_fn(|band| row[band] / (white[band] - dark[band])));
         let offsets =
@@ -23,7 +23,7 @@ impl<const K: usize> Mix<K> {
         Self { weights, offsets }
     }
 
-    /// Mixes one row of cells, given as its four rows of samples, into `K` rows of one value a cell.
+    /// Mixes one row of cells, given as its four rows of samples, into `K` rows of one value per cell.
     #[inline(always)]
     pub(super) fn apply(&self, rows: [&[u16]; CELL], mut mixed: [&mut [f32]; K]) {
         let cells = rows.map(|row| row.as_chunks::<CELL>().0);

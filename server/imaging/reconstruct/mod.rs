@@ -20,16 +20,15 @@ use avx2::Kernel;
 use balance::PixelBalance;
 use mix::Mix;
 
-/// Makes pictures of one value a mosaic cell from mosaics, by one calibration. Keep one and reuse it.
+/// Makes pictures of one pixel per mosaic cell, by one calibration. Keep one and reuse it.
 ///
-/// Colour is made from the spectrally corrected bands. Gray is the mean of the white-balanced bands
-/// before that correction, which subtracts bands from one another and so would add noise to the focus
-/// metrics.
+/// Colour is made from the spectrally corrected bands. Gray is the mean of the white-balanced bands before that
+/// correction. The correction subtracts bands from one another, which would add noise to the focus metrics.
 #[derive(Debug, Clone)]
 pub struct Reconstructor {
     of_counts: Mixes,
-    /// For references per pixel: the balance, which clones share for it is large, and the mixes for the
-    /// balanced samples.
+    /// For references per pixel: the balance, and the mixes for the balanced samples. The balance is large, so clones
+    /// share it.
     of_balanced: Option<(Arc<PixelBalance>, Mixes)>,
     encoder: Encoder,
     lines: Lines,
@@ -40,15 +39,15 @@ pub struct Reconstructor {
 pub(super) struct Mixes {
     /// Red, green and blue, each as an index of an [`Encoder`], and gray.
     picture: Mix<4>,
-    /// The same in integers, where the processor can.
+    /// The same in integers, if the processor has AVX2 and FMA.
     kernel: Option<Kernel>,
     /// Gray alone.
     gray: Mix<1>,
 }
 
 impl Mixes {
-    /// Sums weighted by `weights`, which are for samples that are 0 for dark and 1 for white; the
-    /// samples given later are `dark` and `white` there.
+    /// Weighted sums. `weights` are for samples scaled to 0 for dark and 1 for white. The samples given later are
+    /// unscaled: they are `dark` for dark and `white` for white.
     pub(super) fn new(weights: [[f32; BANDS]; 4], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
         let picture = Mix::new(weights, dark, white);
         Self { kernel: Kernel::new(&picture), picture, gray: Mix::new([weights[3]], dark, white) }
@@ -65,8 +64,8 @@ struct Lines {
 }
 
 impl Default for Reconstructor {
-    /// The one of the default calibration, whose colour matrix is fitted once: reading a file's pictures
-    /// asks for it again and again.
+    /// The reconstructor of the default calibration. Its colour matrix is fitted only once, because reading pictures
+    /// from files asks for this reconstructor again and again.
     fn default() -> Self {
         static FITTED: LazyLock<Reconstructor> = LazyLock::new(|| Reconstructor::new(&Calibration::default()));
         FITTED.clone()
@@ -90,7 +89,7 @@ impl Reconstructor {
         }
     }
 
-    /// Makes `rgb` (sRGB) and `gray` (0..=255) from `mosaic`, one pixel a cell; resizes both as needed.
+    /// Makes `rgb` (sRGB) and `gray` (0..=255) from `mosaic`, one pixel per cell; resizes both as needed.
     ///
     /// References per pixel apply to mosaics of their own size (see [`Calibration::fits`]); for a
     /// mosaic of another size the means of their bands are used.
@@ -121,12 +120,12 @@ impl Reconstructor {
         }
     }
 
-    /// The balance by references per pixel, where there are some and they are of the size of `mosaic`.
+    /// The balance by references per pixel, if there are any and they have the size of `mosaic`.
     pub(super) fn pixel_balance(&self, mosaic: &MosaicFrame) -> Option<&PixelBalance> {
         self.of_balanced.as_ref().map(|(balance, _)| balance.as_ref()).filter(|balance| balance.fits(mosaic))
     }
 
-    /// The encoding of linear colours.
+    /// The table that encodes linear colours as sRGB.
     pub(super) const fn encoder(&self) -> &Encoder {
         &self.encoder
     }
@@ -252,8 +251,8 @@ pub(super) fn quarters(values: &[u16]) -> [&[u16]; CELL] {
     std::array::from_fn(|row| &values[row * length..][..length])
 }
 
-/// Makes one row of pixels and of gray values from four rows of samples: in integers as far as whole
-/// vectors go, in floating point for the rest.
+/// Makes one row of pixels and of gray values from four rows of samples: whole vectors in integers, the rest in
+/// floating point.
 #[inline(always)]
 pub(super) fn picture_row(
     mixes: &Mixes,

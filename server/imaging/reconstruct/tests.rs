@@ -1,4 +1,4 @@
-//! Pictures from mosaics, against closed forms.
+//! Checks pictures made from mosaics against closed forms.
 
 use super::*;
 use crate::imaging::{Reference, Scale, block_means};
@@ -54,7 +54,7 @@ fn gray_is_the_mean_of_the_bands() {
         let sum: u32 = (0..16).map(|band| u32::from(texture(left + band % 4, top + band / 4))).sum();
         let expected = 255.0 * f64::from(sum) / 16.0 / 1023.0;
 
-        // Whole-number weights: a two-thousandth part of the mean's sixteenths.
+        // Weights are whole numbers: rounding one changes it by at most 1/2000 of a sixteenth of the mean.
         assert!((f64::from(*found) - expected).abs() < 0.02, "{found} {expected}");
     }
 }
@@ -162,7 +162,7 @@ fn wider_patches_are_means_of_the_gray_picture() {
         let view = reconstructor.gray_view(&seen, area);
         assert_eq!(view.patch, reconstructor.gray_patch(&seen, area));
 
-        // The widest patch would begin 8 cells above the picture.
+        // The widest patch would begin 8 cells above the picture, so it is moved down.
         for (patch, (scale, left, top)) in view.wider.into_iter().zip([(Scale::Two, 54, 24), (Scale::Four, 22, 0)]) {
             let expected = block_means(&gray.data[top * 160 + left..], 160, scale);
             let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);

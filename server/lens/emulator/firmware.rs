@@ -9,17 +9,17 @@ use super::wire::{REQUESTS, checksum_of, framed};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Response};
 
-/// Span of the temperature limits, in °C, up to which the whole range is held; a wider span costs a
-/// little at both ends.
+/// Span of the temperature limits, in °C, up to which the lens holds its whole range. A wider span narrows the range at
+/// both ends.
 const FULL_RANGE_SPAN: f64 = 20.0;
-/// Dioptres that each further degree costs, at each end.
+/// Dioptres lost at each end for each further degree.
 const NARROWING: f64 = 0.02;
 const IMAX_HUNDREDTHS: u16 = 29_284;
-/// A request whose rest does not come within this time is dropped.
+/// An incomplete request is dropped if the next byte does not come within this time.
 const PATIENCE: Duration = Duration::from_millis(50);
 /// Focal power commands remembered for inspection.
 const REMEMBERED: usize = 8192;
-/// Additional delay of a [`Glitch::Late`] reply: longer than a driver waits.
+/// Additional delay of a [`Glitch::Late`] reply: longer than the driver waits.
 const LATE: Duration = Duration::from_millis(200);
 /// Bytes that [`Glitch::Noise`] puts before a reply.
 const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
@@ -27,9 +27,9 @@ const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
 /// A reply on its way.
 #[derive(Debug)]
 pub struct Answer {
-    /// The bytes that go over the wire.
+    /// The bytes to send.
     pub bytes: Vec<u8>,
-    /// Time until they go out.
+    /// Delay before they are sent.
     pub takes: Duration,
 }
 
@@ -46,7 +46,7 @@ pub enum Order {
     FocalPower(i16),
 }
 
-/// A driver with its lens.
+/// The firmware of a driver, with its lens.
 pub struct Firmware {
     /// Properties of the unit.
     pub model: Model,
@@ -56,19 +56,19 @@ pub struct Firmware {
     pub temperature: f64,
     /// Whether a lens is plugged into the driver.
     pub lens_present: bool,
-    /// Focal power commands carried out, in the driver's units, and when they were read.
+    /// Focal power commands carried out, in the driver's units, each with the time it was read.
     pub commands: VecDeque<(Moment, i16)>,
     /// Every order that the driver received, carried out or not.
     pub orders: VecDeque<Order>,
-    /// Whole requests that have arrived.
+    /// Number of whole requests that have arrived.
     pub requests: u64,
-    /// Glitches of the next replies, in their order.
+    /// Glitches of the next replies, in order; `None` for a good reply.
     pub glitches: VecDeque<Option<Glitch>>,
-    /// Replies made on a [`Fault::NoisyLine`].
+    /// Number of replies made under [`Fault::NoisyLine`].
     noisy_replies: usize,
     glass: Arc<Response>,
     mode: u8,
-    /// In 1/16 °C: upper, lower.
+    /// Temperature limits in 1/16 °C: upper, lower.
     limits: Option<(i16, i16)>,
     focal_power: i16,
     unreachable: bool,
@@ -112,17 +112,17 @@ impl Firmware {
         self.glass.command(now, FocalPower::MIN);
     }
 
-    /// The glass; 0..=1 stands for the whole range of the lens.
+    /// The true focal power; 0..=1 is the whole range of the lens.
     pub fn glass(&self) -> Arc<Response> {
         self.glass.clone()
     }
 
-    /// Mode of control, and the current in counts.
+    /// Mode of control, and the current, in counts.
     pub const fn mode_and_current(&self) -> (u8, i16) {
         (self.mode, self.current)
     }
 
-    /// The driver's answers to `bytes`, one a request.
+    /// The driver's answers to `bytes`, one per request.
     pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Answer> {
         if now.since(self.last_byte) > PATIENCE {
             self.buffer.clear();
@@ -152,8 +152,7 @@ impl Firmware {
         answers
     }
 
-    /// The answer to the first request in the buffer, empty where it gets none; `None` while it is
-    /// incomplete.
+    /// The answer to the first request in the buffer, empty if it gets none; `None` while the request is incomplete.
     fn next(&mut self, now: Moment) -> Option<Vec<u8>> {
         if self.buffer.is_empty() {
             return None;
@@ -259,8 +258,7 @@ impl Firmware {
         framed(&[name, &[self.status()], &max.to_be_bytes(), &min.to_be_bytes()].concat())
     }
 
-    /// Least and greatest focal power within the temperature limits, in the driver's units; zeros without
-    /// limits.
+    /// Least and greatest focal power within the temperature limits, in the driver's units; zeros without limits.
     fn range(&self) -> (i16, i16) {
         let Some((high, low)) = self.limits else { return (0, 0) };
         let lost = (f64::from(high - low) / 16.0 - FULL_RANGE_SPAN).max(0.0) * NARROWING;
@@ -313,7 +311,7 @@ impl Firmware {
         framed(&[b'E', if self.model.ascii_errors { b'0' + number } else { number }])
     }
 
-    /// `answer` as it goes over the wire, with the next glitch applied.
+    /// `answer` with the present fault and the next glitch applied.
     fn sent(&mut self, answer: Vec<u8>) -> Answer {
         let mut sent = Answer { bytes: self.damaged(answer), takes: self.model.latency };
         let glitch = self.glitches.pop_front().unwrap_or_else(|| self.noise_of_the_line());

@@ -1,9 +1,9 @@
-//! An emulated Optotune Lens Driver 4 behind a pseudo-terminal: for tests, and for trying the real driver
-//! without a bench (`parfocal lens emulate`).
+//! An emulated Optotune Lens Driver 4 behind a pseudo-terminal, for tests and for trying the driver without a bench
+//! (`parfocal lens emulate`).
 //!
-//! It shares no code with the driver's codec, not even the checksum: it was written from the protocol's
-//! description alone, so that one misreading cannot hide in both. Serial numbers begin with `EMUL`; they
-//! tell the driver that no glass moves, which every page then says.
+//! It shares no code with the driver's codec, not even the checksum. It was written only from the protocol's
+//! description, so that the same misreading cannot be in both. Its serial numbers begin with `EMUL`. By them the driver
+//! knows that there is no real lens, and every page then says so.
 
 mod firmware;
 mod pty;
@@ -23,7 +23,7 @@ use crate::clock::{Clock, Moment};
 use firmware::Firmware;
 use pty::Pty;
 
-/// An emulated driver with its lens. Gone when dropped.
+/// An emulated driver with its lens. Its port vanishes when it is dropped.
 pub struct Emulator {
     firmware: Arc<Mutex<Firmware>>,
     clock: Arc<dyn Clock>,
@@ -33,10 +33,10 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Plugs a new unit in.
+    /// Starts a new unit and plugs it in.
     ///
     /// # Errors
-    /// When the system has no pseudo-terminal left, or no room for temporary files.
+    /// If the system has no pseudo-terminal left, or no room for temporary files.
     pub fn start(model: Model, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let folder = tempfile::Builder::new().prefix("parfocal-lens-").tempdir()?;
         let serial = String::from_utf8_lossy(&model.serial).into_owned();
@@ -49,13 +49,13 @@ impl Emulator {
         Ok(emulator)
     }
 
-    /// Name of the serial port; stays the same over unplugging, as a name in `/dev/serial/by-id` does.
+    /// Path of the serial port. Unplugging does not change it, like a name in `/dev/serial/by-id`.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.link
     }
 
-    /// The folder that stands for `/dev/serial/by-id`.
+    /// The folder that replaces `/dev/serial/by-id`.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
@@ -70,7 +70,7 @@ impl Emulator {
     /// Plugs the USB cable in, which also restarts the unit.
     ///
     /// # Errors
-    /// When the system has no pseudo-terminal left.
+    /// If the system has no pseudo-terminal left.
     pub fn plug_in(&mut self) -> io::Result<()> {
         self.unplug();
         self.restart();
@@ -81,7 +81,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// Restarts the unit without an interruption of its USB connection.
+    /// Restarts the unit without interrupting its USB connection.
     pub fn restart(&self) {
         let now = self.clock.now();
         self.firmware().power_cycle(now);
@@ -92,19 +92,19 @@ impl Emulator {
         self.firmware().fault = fault;
     }
 
-    /// Schedules `glitch` for `replies` replies, after `spared` good ones; both come after all replies
-    /// for which glitches are already scheduled.
+    /// Schedules `glitch` for `replies` replies after `spared` good ones. Both follow the replies that are already
+    /// scheduled.
     pub fn glitch(&self, glitch: Glitch, spared: usize, replies: usize) {
         let befalls = std::iter::repeat_n(None, spared).chain(std::iter::repeat_n(Some(glitch), replies));
         self.firmware().glitches.extend(befalls);
     }
 
-    /// Sets the time the unit takes to answer a request, from the next one on.
+    /// Sets the time that the unit takes to answer a request, from the next one on.
     pub fn set_latency(&self, latency: Duration) {
         self.firmware().model.latency = latency;
     }
 
-    /// Heats or cools the lens.
+    /// Sets the temperature of the lens.
     pub fn set_temperature(&self, celsius: f64) {
         self.firmware().temperature = celsius;
     }
@@ -114,32 +114,32 @@ impl Emulator {
         self.firmware().lens_present = present;
     }
 
-    /// Focal power commands carried out so far, in the driver's units, each with the moment it was read
-    /// from the wire.
+    /// Focal power commands carried out, in the driver's units, each with the time it was read from the wire. Only the
+    /// latest few thousand are kept.
     #[must_use]
     pub fn commands(&self) -> Vec<(Moment, i16)> {
         self.firmware().commands.iter().copied().collect()
     }
 
-    /// Every order that the unit received so far, carried out or not.
+    /// Orders that the unit received, carried out or not. Only the latest few thousand are kept.
     #[must_use]
     pub fn orders(&self) -> Vec<Order> {
         self.firmware().orders.iter().copied().collect()
     }
 
-    /// Whole requests that have arrived so far; the reply to the latest may still be on its way.
+    /// Number of whole requests that have arrived so far. The reply to the latest may not have been sent yet.
     #[must_use]
     pub fn requests(&self) -> u64 {
         self.firmware().requests
     }
 
-    /// Mode of control, by the driver's number, and the current in counts.
+    /// Mode of control, by the driver's number, and the current, in counts.
     #[must_use]
     pub fn mode_and_current(&self) -> (u8, i16) {
         self.firmware().mode_and_current()
     }
 
-    /// The glass; 0..=1 stands for the whole range of the lens.
+    /// The true focal power; 0..=1 is the whole range of the lens.
     #[must_use]
     pub fn glass(&self) -> Arc<Response> {
         self.firmware().glass()

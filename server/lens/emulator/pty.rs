@@ -1,4 +1,4 @@
-//! The emulated driver's end of a pseudo-terminal, and the thread that serves it.
+//! The emulated unit's end of a pseudo-terminal, and the thread that serves it.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -18,11 +18,10 @@ use super::firmware::Firmware;
 use crate::clock::Clock;
 use crate::priority::{self, Place};
 
-/// Interval at which to look whether someone has opened the port: until then there is nothing to wait
-/// for.
+/// Interval for checking whether a program has opened the port: until then there is no event to wait for.
 const UNOPENED: Duration = Duration::from_millis(5);
 
-/// A pseudo-terminal with a driver behind it, until dropped.
+/// A pseudo-terminal with an emulated unit behind it. Closed when dropped.
 pub struct Pty {
     path: PathBuf,
     stop: Arc<OwnedFd>,
@@ -33,7 +32,7 @@ impl Pty {
     /// Opens a pseudo-terminal and serves `firmware` on it.
     ///
     /// # Errors
-    /// When the system has no pseudo-terminal, event descriptor or thread left.
+    /// If the system has no pseudo-terminal, event descriptor or thread left.
     pub fn open(firmware: Arc<Mutex<Firmware>>, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let driver = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&driver)?;
@@ -49,7 +48,7 @@ impl Pty {
         let stop = Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?);
         let server = Server { port: File::from(driver), stop: stop.clone(), firmware, clock };
         let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || {
-            // A real unit has a processor to itself.
+            // A real unit has its own processor.
             priority::raise(Place::Wire);
             server.run();
         })?;
@@ -108,7 +107,7 @@ impl Server {
         }
     }
 
-    /// Waits for events on the port and returns them; `None` when it is time to stop.
+    /// Waits for events on the port and returns them; `None` if the thread must stop.
     fn wait(&self) -> Option<PollFlags> {
         let mut watched = [PollFd::new(&self.port, PollFlags::IN), PollFd::new(&*self.stop, PollFlags::IN)];
         let _ = poll(&mut watched, None);

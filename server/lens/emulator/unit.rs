@@ -8,7 +8,7 @@ use crate::lens::LensDynamics;
 /// Range of the emulated lens, in dioptres.
 pub const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
 const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), settling: Duration::from_millis(15) };
-/// Half of 0.04 of the lens's 5 dioptres.
+/// Half of a hysteresis of 0.04 dioptres, as a share of the lens's 5 dioptres.
 const PLAY: f64 = 0.004;
 
 /// A fault of the emulated driver.
@@ -21,28 +21,28 @@ pub enum Fault {
     Garbage,
     /// Every reply has a wrong checksum.
     WrongChecksum,
-    /// It answers nothing and does nothing.
+    /// The driver answers nothing and does nothing.
     Silent,
-    /// It answers every request with an error, and carries none out.
+    /// The driver answers every request with an error, and carries none out.
     Errors,
-    /// Every reply with the focal power has a wrong checksum.
+    /// Every reply that contains the focal power has a wrong checksum.
     WrongReadBack,
     /// Focal power commands are ignored.
     DropsCommands,
-    /// Another kind of device, which answers everything with its own message.
+    /// Another kind of device, which answers everything with a message of its own.
     Stranger,
-    /// Every third reply suffers a [`Glitch`], each kind in turn.
+    /// Every third reply has a [`Glitch`], each kind in turn.
     NoisyLine,
 }
 
-/// What can happen to a single reply on the wire.
+/// A fault of a single reply on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Glitch {
-    /// A few bytes of noise arrive before it.
+    /// A few bytes of noise arrive before the reply.
     Noise,
-    /// Its checksum is wrong.
+    /// The reply's checksum is wrong.
     Checksum,
-    /// It comes 200 ms late.
+    /// The reply comes 200 ms late.
     Late,
 }
 
@@ -72,7 +72,7 @@ impl FromStr for Glitch {
 }
 
 impl Fault {
-    /// Every state.
+    /// Every fault.
     const ALL: [Self; 9] = [
         Self::None,
         Self::Garbage,
@@ -119,21 +119,21 @@ pub struct Model {
     pub serial: [u8; 8],
     /// Type of firmware, `A` to `F`.
     pub firmware: u8,
-    /// Time to answer a request.
+    /// Time that the unit takes to answer a request.
     pub latency: Duration,
-    /// Whether error numbers are sent as digits rather than bytes.
+    /// Whether error numbers are sent as ASCII digits instead of bytes.
     pub ascii_errors: bool,
-    /// Whether a wrong checksum is answered with `N` as old firmware does.
+    /// Whether the unit answers a wrong checksum with `N`, like old firmware.
     pub old: bool,
-    /// Dynamics of its glass.
+    /// Dynamics of the lens.
     pub glass: LensDynamics,
-    /// Half-width of its hysteresis, as a share of the lens's range.
+    /// Half-width of the lens's hysteresis, as a share of its range.
     pub play: f64,
 }
 
 impl Model {
-    /// [`Model::play`] of a hysteresis given as the dioptres between the way up and the way down; `None`
-    /// outside 0 to the whole range.
+    /// [`Model::play`] for a hysteresis in dioptres between the way up and the way down; `None` outside 0 to the whole
+    /// range.
     #[must_use]
     pub fn play_of(hysteresis: f64) -> Option<f64> {
         let range = LENS_DIOPTRES.1 - LENS_DIOPTRES.0;

@@ -1,6 +1,6 @@
-//! The protocol as the emulated driver implements it, independently of the real driver's codec.
+//! The protocol as the emulated unit implements it, independent of the real driver's codec.
 
-/// Every request except the greeting: its name, and the number of bytes between name and checksum.
+/// All requests except the greeting: name, and number of bytes between name and checksum.
 pub const REQUESTS: [(&[u8], usize); 17] = [
     (b"H", 0),
     (b"V", 1),

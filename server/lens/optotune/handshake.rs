@@ -10,29 +10,29 @@ use super::status::{FOCAL_POWER_MODE, Status, mode_name};
 use super::trouble::Trouble;
 use crate::lens::LensError;
 
-/// The settings for using the lens.
+/// How to use the lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Least dioptres to use, unless the device's own.
+    /// Least dioptres to use; `None` for the device's own limit.
     pub min_dioptre: Option<f64>,
-    /// Most dioptres to use.
+    /// Most dioptres to use; `None` for the device's own limit.
     pub max_dioptre: Option<f64>,
     /// Lens temperatures, in °C, between which focal power must be held. A wider span narrows the
     /// dioptre range.
     pub temperatures: (f64, f64),
-    /// Whether the lens keeps its state when opened and stays where it was put, instead of being without
-    /// current before and after.
+    /// Whether the lens keeps its state when opened, and its focal power when dropped. Otherwise it is left without
+    /// current before and after use.
     pub keep: bool,
 }
 
 impl Default for Settings {
-    /// The whole of the range, from room temperature to a lens warmed by its own coil.
+    /// The whole range of dioptres; temperatures from a room's to that of a lens warmed by its own coil.
     fn default() -> Self {
         Self { min_dioptre: None, max_dioptre: None, temperatures: (20.0, 40.0), keep: false }
     }
 }
 
-/// Makes the device behind `link` ready for commands.
+/// Prepares the device behind `link` for commands.
 pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
     greet(link, path)?;
     if !settings.keep && !link.is_known() {
@@ -94,8 +94,8 @@ fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
     }
 }
 
-/// Lets the lens go first, because a process that was killed may have left it under current. The
-/// driver's answer does not matter: if it cannot be used, the next steps find out why.
+/// Removes the lens's current first, because a process that was killed may have left it under current. The driver's
+/// answer does not matter: if the driver cannot be used, the next steps find out why.
 fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
     match link.relax() {
         Err(error @ (LinkError::Stopped | LinkError::Port(_))) => Err(error.into()),
@@ -107,8 +107,8 @@ fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
     }
 }
 
-/// Sets the temperature limits first: without them the driver refuses focal power mode. The last reply
-/// gives the range.
+/// Sets the temperature limits, without which the driver refuses focal power mode, and then that mode. Returns the
+/// range of focal power from the last reply.
 fn control_focal_power(link: &mut Link, settings: &Settings) -> Result<Limits, Trouble> {
     let (low, high) = settings.temperatures;
     let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };

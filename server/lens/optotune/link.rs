@@ -1,5 +1,4 @@
-//! One connection to the driver. Commands from the slot are sent at once, even while a reply is
-//! awaited.
+//! One connection to the driver. Commands from the slot are sent at once, even while it waits for a reply.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::Duration;
@@ -12,38 +11,38 @@ use super::range::Range;
 use super::shared::Shared;
 use crate::clock::Moment;
 
-/// A driver answers within a few milliseconds; USB hubs add some.
+/// Longest wait for a reply. A driver answers within a few milliseconds; USB hubs add some.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(150);
-/// Time that a command's ten bytes take over the wire. A command sent sooner after another waits in the
-/// port, where a later one cannot overtake it.
+/// Least time between two commands: the time that a command's ten bytes take over the wire. A command sent earlier
+/// would wait in the port, where a newer one could not replace it.
 const ON_THE_WIRE: Duration = Duration::from_millis(1);
-/// Times that a request is made before its failure counts. Every request that gets a reply may be
-/// repeated: it only asks, or sets what is set already.
+/// How often a request is made before it counts as failed. Every request with a reply can be repeated, because it only
+/// reads, or sets the same value again.
 const ATTEMPTS: u32 = 3;
-/// A line that has been quiet for so long will not send more about an earlier request.
+/// After the line has been quiet for this long, no more bytes of an earlier reply are expected.
 const QUIET: Duration = Duration::from_millis(10);
-/// Longest wait for a line that never gets quiet.
+/// Longest wait for the line to become quiet.
 const DRAINING: Duration = Duration::from_millis(200);
 
 /// A port with a lens driver behind it.
 pub struct Link<'a> {
     port: Port,
     shared: &'a Shared,
-    /// Set once known; from then on commands are taken from the slot.
+    /// The device's range, once known. From then on commands are taken from the slot.
     range: Option<Range>,
     sent: Option<Sent>,
     /// Whether a reply to an earlier request may still come.
     awaiting: bool,
-    /// Whether the lens is being let go, which nothing may interrupt.
+    /// Whether the lens's current is being removed at the end. Nothing may interrupt this.
     closing: bool,
     outgoing: Vec<u8>,
     incoming: Vec<u8>,
 }
 
-/// The last command that went out.
+/// The last command sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sent {
-    /// In the driver's own units.
+    /// Focal power in the driver's own units.
     pub raw: i16,
     /// Time at which it was sent.
     pub at: Moment,
@@ -52,23 +51,23 @@ pub struct Sent {
 /// Why communication with the driver failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The port failed or vanished.
+    /// The port failed or is gone.
     #[error("its port failed ({0}): plug its USB cable in")]
     Port(#[from] io::Error),
-    /// Nothing came back in time.
+    /// No bytes came back in time.
     #[error("it is silent: check its power and cable")]
     Silent,
     /// The bytes that came back are not a reply.
     #[error(transparent)]
     Wire(#[from] WireError),
-    /// The thread is to end.
+    /// The thread was told to end.
     #[error("closing")]
     Stopped,
 }
 
 impl LinkError {
-    /// Whether the line may be at fault, so that the same request may well succeed. A driver that does
-    /// not know a request may have received it damaged.
+    /// Whether the line may be the cause, so that the same request may succeed next time. A driver that reports an
+    /// unknown request may have received a damaged one.
     const fn is_of_the_line(&self) -> bool {
         match self {
             Self::Silent | Self::Wire(WireError::Checksum | WireError::Garbage) => true,
@@ -93,17 +92,17 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// From now on, takes commands from the slot and sends them within `range`.
+    /// From now on, takes commands from the slot and sends them, scaled to `range`.
     pub const fn follow_commands(&mut self, range: Range) {
         self.range = Some(range);
     }
 
-    /// Whether this is known to be the port of a lens driver.
+    /// Whether a lens driver has been connected on this port before.
     pub fn is_known(&self) -> bool {
         self.shared.state().was_connected()
     }
 
-    /// The last command that went out.
+    /// The last command sent.
     pub const fn sent(&self) -> Option<Sent> {
         self.sent
     }
@@ -116,8 +115,8 @@ impl<'a> Link<'a> {
         self.sent = Some(Sent { raw, at: now });
     }
 
-    /// Greets the driver, three times at most: the first greeting may end a request that another program
-    /// left half sent. Returns whether the reply was a lens driver's greeting.
+    /// Greets the driver, at most three times: the first greeting may only complete a request that another program left
+    /// half sent. Returns whether the reply was a lens driver's greeting.
     pub fn greet(&mut self) -> Result<bool, LinkError> {
         let mut heard = false;
         for _ in 0..ATTEMPTS {
@@ -150,8 +149,8 @@ impl<'a> Link<'a> {
         Ok(false)
     }
 
-    /// Makes `request` and waits for its reply. Where the line lost or damaged it, repeats the request,
-    /// three times in all.
+    /// Makes `request` and waits for its reply. If the line lost or damaged it, repeats the request, up to three times
+    /// in all.
     pub fn ask(&mut self, request: Request) -> Result<Reply, LinkError> {
         let mut attempt = 1;
 
@@ -194,8 +193,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Finds the reply to `request` among the bytes received: behind noise, or behind a late reply to
-    /// another request.
+    /// Finds the reply to `request` in the bytes received. Noise, or a late reply to another request, may come before
+    /// it.
     fn find_reply(&self, request: Request) -> Result<Reply, LinkError> {
         let mut failure = if self.incoming.is_empty() { LinkError::Silent } else { WireError::Garbage.into() };
 
@@ -213,15 +212,15 @@ impl<'a> Link<'a> {
         Err(failure)
     }
 
-    /// Counts bytes that came `before` a reply and were not part of it.
+    /// Counts a line error if other bytes came `before` a reply.
     fn note_noise(&self, before: bool) {
         if before {
             self.shared.count_line_error();
         }
     }
 
-    /// Waits until the line is quiet, and drops the bytes received. Where a reply is due of which nothing
-    /// has come yet, waits as long as a reply may take.
+    /// Waits until the line is quiet, and drops the bytes received. If a reply is due and no byte of it has come yet,
+    /// waits as long as a reply may take.
     fn drain(&mut self) -> Result<(), LinkError> {
         let begun = self.shared.clock.now();
         let end = begun + DRAINING;
@@ -245,8 +244,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Leaves the lens without current, so that it rests and does not warm up. Tells the driver whatever
-    /// it answers, and then asks whether it obeyed.
+    /// Leaves the lens without current, so that it rests and does not warm up. Sends the commands whatever the driver
+    /// answers, and then asks whether it obeyed.
     pub fn relax(&mut self) -> Result<(), LinkError> {
         let mut attempt = 1;
         loop {
@@ -263,7 +262,7 @@ impl<'a> Link<'a> {
 
     fn relax_once(&mut self) -> Result<(), LinkError> {
         let by_current = self.ask_once(Request::CurrentMode);
-        // The current is set even where the change of mode went unconfirmed: the lens must come to rest.
+        // The current is set even if the change of mode was not confirmed: the lens must come to rest.
         self.tell(Request::SetCurrent(0))?;
         by_current?;
         match self.ask_once(Request::Current)? {
@@ -272,7 +271,7 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// The last operation on the lens: takes no more commands, and leaves the lens without current.
+    /// The last operation on the lens: stops taking commands, and leaves the lens without current.
     pub fn close(&mut self) -> Result<(), LinkError> {
         self.closing = true;
         self.range = None;
@@ -286,8 +285,7 @@ impl<'a> Link<'a> {
         Ok(())
     }
 
-    /// An error that the driver sent without being asked; it answers so to a command that it did not
-    /// accept.
+    /// An error that the driver sent on its own. It does so if it did not accept a command.
     pub fn stray_error(&mut self) -> Option<DeviceError> {
         let stray = std::mem::take(&mut self.incoming);
         let error = codec::error_reply(&stray);
@@ -297,8 +295,8 @@ impl<'a> Link<'a> {
         error
     }
 
-    /// Sends what waits to be sent, then waits until bytes came, the slot was filled, the thread is to
-    /// end, or `until`.
+    /// Sends the bytes that wait. Then waits until bytes come, the slot is filled, the thread is told to end, or
+    /// `until`.
     pub fn pump(&mut self, until: Moment) -> Result<(), LinkError> {
         self.take_command();
         self.flush()?;
@@ -326,14 +324,14 @@ impl<'a> Link<'a> {
         if port.intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR) { self.receive() } else { Ok(()) }
     }
 
-    /// When the command waiting in the slot may be sent.
+    /// Earliest time for sending the command that waits in the slot; `None` if it may be sent at once, or not at all.
     fn command_due(&self) -> Option<Moment> {
         let free = self.range.is_some() && self.outgoing.is_empty();
         let sent = self.sent.filter(|_| free && self.shared.has_command())?;
         Some(sent.at + ON_THE_WIRE)
     }
 
-    /// Moves the command from the slot onto the wire, unless an older one is still on it.
+    /// Sends the command in the slot, unless an older one is still on the wire.
     fn take_command(&mut self) {
         let Some(range) = self.range.filter(|_| self.outgoing.is_empty()) else { return };
         if self.command_due().is_some_and(|due| self.shared.clock.now() < due) {
@@ -364,7 +362,7 @@ impl<'a> Link<'a> {
             Ok(0) => Err(io::Error::from(ErrorKind::UnexpectedEof).into()),
             Ok(read) => {
                 self.incoming.extend(bytes.iter().take(read));
-                // A line that never stops sending must not fill the memory; its length gives it away.
+                // A device that never stops sending must not fill the memory.
                 self.incoming.truncate(4096);
                 Ok(())
             }

@@ -1,10 +1,9 @@
 //! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
 //!
-//! The caller's side only touches memory; a thread of its own talks to the port. When the lens is
-//! dropped, that thread puts the driver into current mode at 0 mA: the lens relaxes to its resting focal
-//! power and does not warm up (unless [`Settings::keep`] is set). [`let_go_of_all`] does the same before
-//! a process ends in another way. Only `kill -9` leaves the lens at the last focal power commanded,
-//! until it is opened again.
+//! The caller's side only touches memory; a separate thread talks to the port. When the lens is dropped, that thread
+//! puts the driver into current mode at 0 mA, unless [`Settings::keep`] is set. The lens then relaxes to its resting
+//! focal power and does not warm up. [`let_go_of_all`] does the same before a process ends in another way. Only
+//! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
 
 pub mod codec;
 mod handshake;
@@ -29,33 +28,33 @@ use crate::clock::Clock;
 use crate::options::Options;
 use crate::priority::{self, Place};
 
-/// Until they are measured on the bench: the simulated lens's figures.
+/// The simulated lens's figures, used until the lens is measured on the bench.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
-/// Prefix of the serial numbers of emulated units (see [`super::emulator`]), in which no glass moves.
+/// Prefix of the serial numbers of emulated units (see [`super::emulator`]), which have no real lens.
 const EMULATED: &str = "EMUL";
 
-/// Longest wait for a device to identify itself, on a line where much has to be repeated.
+/// Longest wait for a device to identify itself. Long enough for a bad line with many repetitions.
 const CONNECT: Duration = Duration::from_secs(4);
 /// Longest wait for an answer.
 const ANSWER: Duration = Duration::from_millis(900);
 
-/// Longest wait for the driver's thread to let the lens go: it tells and asks a silent driver three
-/// times, twice over.
+/// Longest wait for the driver's thread to remove the lens's current. With a silent driver it tries three times on the
+/// open connection, and three times on a new one.
 const LETTING_GO: Duration = Duration::from_secs(3);
 
-/// The open lenses: however the process ends, they must not be left under current.
+/// The open lenses. However the process ends, they must not be left under current.
 static OPEN: Mutex<Vec<Weak<Shared>>> = Mutex::new(Vec::new());
 
-/// Leaves every open lens without current, except those that are to stay where they are, and waits until
-/// that is done. The lenses take no more commands.
+/// Removes the current of every open lens, except of those that must stay where they are, and waits until that is done.
+/// The lenses accept no more commands.
 pub fn let_go_of_all() {
     let open: Vec<_> = {
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         open.drain(..).filter_map(|shared| shared.upgrade()).collect()
     };
 
-    // All are told before any is waited for, so that they let go at the same time.
+    // All are told before any is waited for, so that they do it at the same time.
     for shared in &open {
         shared.end();
     }
@@ -76,8 +75,8 @@ impl OptotuneLens {
     /// Connects to the driver at `path`.
     ///
     /// # Errors
-    /// When it cannot be used right now; says why and what to do. It recovers from later failures by
-    /// itself.
+    /// If the lens cannot be used right now. The error says why and what to do. The lens recovers from later failures
+    /// by itself.
     pub fn connect(path: &Path, settings: Settings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let response = Arc::new(Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE));
         let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
@@ -106,9 +105,8 @@ impl OptotuneLens {
         Ok(lens)
     }
 
-    /// The lens of a specification: `device` is a path, or `auto` for the one that is plugged in;
-    /// options are `min` and `max`, the dioptres to use, and `low` and `high`, the temperature limits in
-    /// °C.
+    /// Opens the lens of a specification. `device` is a path, or `auto` for the one driver that is plugged in. Options
+    /// are `min` and `max`, the dioptres to use, and `low` and `high`, the temperature limits in °C.
     pub(super) fn open(
         device: &str,
         mut options: Options,

@@ -1,5 +1,4 @@
-//! The lens driver's serial port: finds it, opens it for this process alone, and puts errors about it
-//! into words.
+//! The lens driver's serial port: finds it, opens it exclusively for this process, and explains errors in words.
 
 use std::fs::{File, TryLockError};
 use std::os::unix::fs::MetadataExt;
@@ -13,14 +12,13 @@ use rustix::termios::{
 
 use crate::lens::LensError;
 
-/// Folder in which Linux lists serial ports by the USB names of their devices.
+/// Folder where Linux lists serial ports by the USB names of their devices.
 pub const BY_ID: &str = "/dev/serial/by-id";
-/// Prefix of those names for a Lens Driver 4; the serial number follows.
+/// Prefix of the USB name of a Lens Driver 4. The serial number follows.
 const USB_NAME: &str = "usb-Optotune_LD_";
 const BAUD: u32 = 115_200;
 
-/// An open port: 115200 baud, 8 bits, no parity, no flow control, never blocking, refused to others
-/// until dropped.
+/// An open port: 115200 baud, 8 bits, no parity, no flow control, non-blocking, and exclusive until dropped.
 #[derive(Debug)]
 pub struct Port(File);
 
@@ -28,13 +26,13 @@ impl Port {
     /// Opens the port at `path`.
     ///
     /// # Errors
-    /// When it does not exist, is in use, is not a serial port or may not be opened; says what to do.
+    /// If the port does not exist, is in use, is not a serial port, or access is denied. The error says what to do.
     pub fn open(path: &Path) -> Result<Self, LensError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| open_error(path, error))?;
         let port = Self(File::from(fd));
 
-        // The lock keeps out parfocal processes of any user; exclusive mode keeps out everyone but root.
+        // The lock keeps out parfocal processes of all users. Exclusive mode keeps out all programs except root's.
         match port.0.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(open_error(path, Errno::BUSY)),
@@ -66,8 +64,8 @@ impl Port {
 
 impl Drop for Port {
     fn drop(&mut self) {
-        // Closing a port would wait half a minute for a device that accepts nothing; and exclusive mode
-        // would outlast this process where another one has the port open too.
+        // Without the flush, closing a port would wait half a minute for a device that accepts no bytes. Exclusive mode
+        // would outlast this process if another one has the port open too.
         let _ = tcflush(&self.0, QueueSelector::OFlush);
         let _ = ioctl_tiocnxcl(&self.0);
     }
@@ -76,7 +74,7 @@ impl Drop for Port {
 /// The one lens driver listed in `folder` (usually [`BY_ID`]).
 ///
 /// # Errors
-/// When there is none, or more than one.
+/// If there is none, or more than one.
 pub fn find(folder: &Path) -> Result<PathBuf, LensError> {
     let mut found = drivers(folder);
     match (found.pop(), found.as_slice()) {
@@ -127,7 +125,7 @@ fn open_error(path: &Path, error: Errno) -> LensError {
     gone(path, &why)
 }
 
-/// Name of the group that a device belongs to; on Debian serial ports belong to `dialout`.
+/// Name of the group of the device at `path`; `dialout` if unknown, as for serial ports on Debian.
 fn group_of(path: &Path) -> String {
     let named = || {
         let id = std::fs::metadata(path).ok()?.gid().to_string();

@@ -1,4 +1,4 @@
-//! Dioptres, the driver's own units, and focal power 0..=1: the one place that converts between them.
+//! Converts between dioptres, the driver's own units, and focal power 0..=1. No other module does.
 
 use super::codec::Limits;
 use crate::lens::{FocalPower, LensError};
@@ -13,25 +13,25 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale of a firmware type: `A` adds five dioptres, others add none.
+    /// The scale of a firmware type: `A` adds an offset of five dioptres, the others none.
     #[must_use]
     pub const fn of_firmware(letter: u8) -> Self {
         Self { offset: if letter == b'A' { 5.0 } else { 0.0 } }
     }
 
-    /// Dioptres of `raw`.
+    /// Converts `raw` to dioptres.
     #[must_use]
     pub fn dioptre(self, raw: i16) -> f64 {
         f64::from(raw) / PER_DIOPTRE - self.offset
     }
 
-    /// The driver's units of `dioptre`, not rounded.
+    /// Converts `dioptre` to the driver's units, not rounded.
     fn raw(self, dioptre: f64) -> f64 {
         (dioptre + self.offset) * PER_DIOPTRE
     }
 }
 
-/// The part of the lens's range that focal power 0..=1 stands for.
+/// The part of the lens's range that corresponds to focal power 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     scale: Scale,
@@ -43,7 +43,7 @@ impl Range {
     /// The range that the device allows, narrowed to the configured dioptres.
     ///
     /// # Errors
-    /// When the narrowed range is empty.
+    /// If the narrowed range is empty.
     pub fn new(
         scale: Scale,
         device: Limits,
@@ -51,7 +51,7 @@ impl Range {
         max_dioptre: Option<f64>,
     ) -> Result<Self, LensError> {
         let bound = |raw: f64| raw.clamp(f64::from(i16::MIN), f64::from(i16::MAX));
-        // Rounded inwards: the range must not exceed the dioptres asked for.
+        // Rounded inwards, so that the range does not exceed the dioptres asked for.
         let min = min_dioptre.map_or(device.min, |dioptre| device.min.max(whole(bound(scale.raw(dioptre)).ceil())));
         let max = max_dioptre.map_or(device.max, |dioptre| device.max.min(whole(bound(scale.raw(dioptre)).floor())));
 
@@ -66,7 +66,7 @@ impl Range {
         )))
     }
 
-    /// The driver's units of `power`, never outside the range that the device allows.
+    /// Converts `power` to the driver's units, never outside the range that the device allows.
     #[must_use]
     pub fn raw(self, power: FocalPower) -> i16 {
         let min = f64::from(self.min);
@@ -74,7 +74,7 @@ impl Range {
         whole((min + power.get() * (max - min)).round())
     }
 
-    /// The focal power nearest to `raw`.
+    /// Converts `raw` to the nearest focal power.
     #[must_use]
     pub fn focal_power(self, raw: i16) -> FocalPower {
         let min = f64::from(self.min);
@@ -95,7 +95,7 @@ impl Range {
     }
 }
 
-/// Converts to whole units; callers round `value` and keep it within the bounds of `i16`.
+/// Converts to whole units. Callers round `value` and keep it within the bounds of `i16`.
 const fn whole(value: f64) -> i16 {
     value as i16
 }

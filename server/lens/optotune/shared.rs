@@ -1,4 +1,4 @@
-//! State shared by the caller and the driver's thread: the command slot, and the readings of the device.
+//! State shared by the caller and the driver's thread: the slot for commands, and the device's readings.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -13,43 +13,43 @@ use super::status::Status;
 use crate::clock::{Clock, Moment};
 use crate::lens::{FocalPower, LensError, Response};
 
-/// A command that waited this long in the slot is not being carried out.
+/// If a command has waited in the slot longer than this, commands are not being carried out.
 const STALLED: Duration = Duration::from_millis(250);
 
-/// Held by both sides. The lock is never held during input or output.
+/// Shared by both sides. The lock is never held during input or output.
 pub struct Shared {
-    /// Clock for deadlines and time stamps.
+    /// The clock for deadlines and time stamps.
     pub clock: Arc<dyn Clock>,
-    /// Model of the glass, fed when a command goes over the wire.
+    /// Model of the lens. It gets each command when the command is sent.
     pub response: Arc<Response>,
-    /// Readable when the thread has something to look at.
+    /// Becomes readable when the thread must look at the slot or the requests.
     pub wake: OwnedFd,
     line_errors: AtomicU64,
     state: Mutex<State>,
     changed: Condvar,
 }
 
-/// Everything known of the device.
+/// Everything known about the device.
 pub struct State {
-    /// The latest command not yet sent, and when the slot was filled.
+    /// The slot: the latest command not yet sent, and the time since which the slot has been full.
     wanted: Option<(FocalPower, Moment)>,
-    /// The latest command taken; restored when the lens comes back.
+    /// The latest command accepted. It is sent again after a reconnection.
     pub last: Option<FocalPower>,
-    /// The device while it is connected and focal power is under control; else the reason why not.
+    /// The device while it is connected and controls focal power; otherwise the reason why not.
     pub device: Result<Device, LensError>,
-    /// Whether the first attempt to connect is over.
+    /// Whether the first attempt to connect has ended.
     tried: bool,
-    /// State of a connected device, in words.
+    /// The state of a connected device in words.
     pub message: Arc<str>,
     /// Why commands are not carried out although the device is connected.
     pub refusal: Option<Arc<str>>,
-    /// Whether a lens driver ever replied to the greeting here.
+    /// Whether a lens driver has ever replied to the greeting on this port.
     pub greeted: bool,
     /// Progress of the thread.
     progress: Progress,
-    /// Whether someone waits for fresh readings.
+    /// Whether the caller waits for new readings.
     pub refresh: bool,
-    /// Counts the times that all readings were fresh.
+    /// Number of times that all readings were taken anew.
     refreshed: u64,
 }
 
@@ -60,15 +60,15 @@ pub struct Device {
     pub firmware: String,
     /// Serial number.
     pub serial: String,
-    /// The range that focal power 0..=1 stands for.
+    /// The range that corresponds to focal power 0..=1.
     pub range: Range,
-    /// Mode of control, by number.
+    /// Mode of control, by the driver's number.
     pub mode: u8,
     /// Status bits.
     pub status: Status,
     /// Temperature of the lens, °C.
     pub temperature: f64,
-    /// Focal power set, as read back, in the driver's own units.
+    /// The focal power set, as read back, in the driver's own units.
     pub read_back: i16,
 }
 
@@ -76,18 +76,18 @@ pub struct Device {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Progress {
     Serving,
-    /// The thread is to end.
+    /// The thread was told to end.
     Ending,
     Ended,
 }
 
 impl State {
-    /// Whether the thread is to end.
+    /// Whether the thread was told to end, or has ended.
     pub fn ending(&self) -> bool {
         self.progress != Progress::Serving
     }
 
-    /// Whether a lens driver was ever connected here.
+    /// Whether a lens driver has ever been connected on this port.
     pub const fn was_connected(&self) -> bool {
         self.refreshed > 0
     }
@@ -97,7 +97,7 @@ impl Shared {
     /// State for a driver that is not connected yet.
     ///
     /// # Errors
-    /// When the system has no event descriptor left.
+    /// If the system has no event descriptor left.
     pub fn new(clock: Arc<dyn Clock>, response: Arc<Response>) -> io::Result<Self> {
         let wake = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
         let state = State {
@@ -122,10 +122,10 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a command into the slot, replacing one that is still there.
+    /// Puts a command into the slot. Replaces one that is still there.
     ///
     /// # Errors
-    /// When it will not be carried out.
+    /// If the device is away, accepts commands too slowly, or did not follow earlier ones.
     pub fn command(&self, target: FocalPower) -> Result<(), LensError> {
         let now = self.clock.now();
         let mut state = self.state();
@@ -133,7 +133,7 @@ impl Shared {
             return Err(trouble.clone());
         }
 
-        // A command that is replaced passes its age on: the slot has been full since the first.
+        // The age of a replaced command is kept, because the slot has been full since then.
         let since = state.wanted.map_or(now, |(_, since)| since);
         state.wanted = Some((target, since));
         state.last = Some(target);
@@ -161,11 +161,11 @@ impl Shared {
 
     /// Makes the thread look at the slot and the requests.
     pub fn wake(&self) {
-        // Fails only when the counter is full, and then the thread is awake.
+        // This fails only if the counter is full, and then the thread is awake.
         let _ = rustix::io::write(&self.wake, &1_u64.to_ne_bytes());
     }
 
-    /// Notes that the device is here.
+    /// Records that the device is connected.
     pub fn connected(&self, device: Device, message: Arc<str>) {
         let mut state = self.state();
         state.device = Ok(device);
@@ -178,7 +178,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Notes that the device is away, and why. The latest command is kept, to be restored later.
+    /// Records that the device is away, and why. The latest command is kept, to be sent again later.
     pub fn lost(&self, trouble: LensError) {
         let mut state = self.state();
         state.device = Err(trouble);
@@ -189,7 +189,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Notes that all readings are fresh.
+    /// Records that all readings have been taken anew.
     pub fn refreshed(&self) {
         let mut state = self.state();
         state.refresh = false;
@@ -197,10 +197,10 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Waits for the end of the first attempt to connect, at most `timeout`, and returns the device.
+    /// Waits at most `timeout` for the end of the first attempt to connect, and returns the device.
     ///
     /// # Errors
-    /// With the reason why the device is not connected.
+    /// If the device is not connected. The error gives the reason.
     pub fn wait_connected(&self, timeout: Duration) -> Result<Device, LensError> {
         let (state, _) = self
             .changed
@@ -210,10 +210,10 @@ impl Shared {
         state.device.clone()
     }
 
-    /// Requests fresh readings, waits for them at most `timeout`, and returns them.
+    /// Requests new readings, waits for them at most `timeout`, and returns them.
     ///
     /// # Errors
-    /// When the device is away or does not answer in time.
+    /// If the device is away or does not answer in time.
     pub fn refresh(&self, timeout: Duration) -> Result<Device, LensError> {
         let before = {
             let mut state = self.state();
@@ -233,7 +233,7 @@ impl Shared {
         }
     }
 
-    /// Waits `time`, or until the thread is to end; returns whether it is to end.
+    /// Waits for `time`, or until the thread is told to end. Returns whether it was told to end.
     pub fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed
@@ -253,7 +253,7 @@ impl Shared {
         self.wake();
     }
 
-    /// Notes that the thread has ended.
+    /// Records that the thread has ended.
     pub fn ended(&self) {
         self.state().progress = Progress::Ended;
         self.changed.notify_all();
@@ -264,7 +264,7 @@ impl Shared {
         let _ = self.changed.wait_timeout_while(self.state(), timeout, |state| state.progress != Progress::Ended);
     }
 
-    /// Counts a reply that was damaged, late or missing, or noise.
+    /// Counts one line error: a reply that was damaged, late or missing, or noise.
     pub fn count_line_error(&self) {
         self.line_errors.fetch_add(1, Ordering::Relaxed);
     }

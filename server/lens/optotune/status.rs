@@ -1,6 +1,6 @@
-//! The driver's status bits and modes, in words.
+//! The driver's status bits and modes of control, in words.
 
-/// Status bits, from the lowest.
+/// Meaning of the status bits, lowest first.
 const CONDITIONS: [&str; 8] = [
     "no lens is connected",
     "the lens's memory is missing or faulty",
@@ -12,7 +12,7 @@ const CONDITIONS: [&str; 8] = [
     "outside the temperature limits set",
 ];
 
-/// The driver's report on itself and its lens, one bit a condition.
+/// The driver's report on itself and its lens, one bit per condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Status(pub u32);
 
@@ -55,7 +55,7 @@ impl Status {
         self.outside_temperature() || self.unreachable()
     }
 
-    /// Every condition, in words.
+    /// All conditions that are set, in words.
     #[must_use]
     pub fn words(self) -> Vec<String> {
         let known = CONDITIONS.iter().enumerate().filter(|(bit, _)| self.0 >> bit & 1 == 1);
@@ -63,7 +63,7 @@ impl Status {
     }
 }
 
-/// Name of the mode of control that the driver numbers `number`.
+/// Name of the mode of control with the driver's number `number`.
 #[must_use]
 pub const fn mode_name(number: u8) -> &'static str {
     match number {
@@ -78,7 +78,7 @@ pub const fn mode_name(number: u8) -> &'static str {
     }
 }
 
-/// Number of the mode in which focal power is controlled.
+/// Number of the mode that controls focal power.
 pub const FOCAL_POWER_MODE: u8 = 5;
 
 #[cfg(test)]

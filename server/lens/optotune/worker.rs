@@ -1,5 +1,4 @@
-//! The thread that talks to the driver: connects, follows commands, takes readings in the gaps between
-//! them, and reconnects.
+//! The thread that talks to the driver: connects, sends commands, takes readings between them, and reconnects.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -15,25 +14,25 @@ use super::trouble::Trouble;
 use crate::clock::Moment;
 use crate::lens::LensError;
 
-/// Wait before the first attempt to reconnect; doubles up to [`BACKOFF_MOST`].
+/// Wait before the first attempt to reconnect. It doubles up to [`BACKOFF_MOST`].
 const BACKOFF_FIRST: Duration = Duration::from_millis(50);
-/// Longest wait between attempts: short enough that the lens is back within a second of its recovery.
+/// Longest wait between attempts: short enough that the lens is usable within a second after its recovery.
 const BACKOFF_MOST: Duration = Duration::from_millis(400);
-/// Time between two readings; each value is read every third time.
+/// Time between two readings. Each value is read every third time.
 const READING_EVERY: Duration = Duration::from_millis(200);
 /// The values read in turn.
 const READINGS: [Request; 3] = [Request::Status, Request::FocalPower, Request::Temperature];
-/// All values, in the order in which they are read at once.
+/// All values, in the order in which a refresh reads them.
 const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower];
-/// How long a due reading waits for a command, to be made right after one: then the reply is in before
-/// the next command comes.
+/// How long a due reading waits for a command. If it is made right after a command, its reply arrives before the next
+/// command.
 const GAP_PATIENCE: Duration = Duration::from_millis(60);
-/// A reading made this soon after a command is in its gap.
+/// Longest time after a command that counts as right after it.
 const GAP: Duration = Duration::from_millis(5);
-/// Times that a command is sent again before it counts as refused.
+/// How often a command is sent again before it counts as refused.
 const RESENDS: u32 = 2;
 
-/// Serves the device at `path` until told to stop; then lets the lens go.
+/// Serves the device at `path` until it must stop. Then removes the lens's current.
 pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
     let mut backoff = BACKOFF_FIRST;
     loop {
@@ -42,12 +41,12 @@ pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
             .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
         shared.lost(trouble.into());
 
-        // Where the end was requested while the port was open, the open connection is used for it.
+        // If the end was requested while the port was open, the open connection is used to remove the current.
         if shared.stop_within(Duration::ZERO) {
             return let_go(shared, path, settings, link);
         }
 
-        // The port is closed for others, and for the next attempt.
+        // Close the port, so that others and the next attempt can open it.
         drop(link);
         if shared.stop_within(backoff) {
             return let_go(shared, path, settings, None);
@@ -57,7 +56,7 @@ pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
     }
 }
 
-/// Connects, and follows commands until that fails. Leaves the connection in `link`.
+/// Connects and sends commands until that fails. Leaves the connection in `link`.
 fn attend<'a>(
     shared: &'a Shared,
     path: &Path,
@@ -79,8 +78,7 @@ fn attend<'a>(
     }
 }
 
-/// The last words to the driver: zero current, unless the lens is to stay where it is. `link` is the
-/// connection to it, if there still is one.
+/// Sets zero current at the end, unless the lens must stay where it is. `link` is the connection, if it is still open.
 fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>) {
     // Never send anything to a device that is not a lens driver.
     if settings.keep || !shared.state().greeted {
@@ -90,7 +88,7 @@ fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>)
         return;
     }
 
-    // A fresh connection may still work, and the lens may still be under current.
+    // A new connection may still work, and the lens may still be under current.
     let afresh = Port::open(path).map_err(|error| error.to_string());
     if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {
         tracing::warn!(error, "could not confirm that the lens is without current after closing");
@@ -112,7 +110,7 @@ fn connect<'a, 'b>(
 ) -> Result<Session<'a, 'b>, Trouble> {
     let mut device = handshake::perform(link, settings, path)?;
 
-    // A lens that came back returns to the latest command; a new one stays where it is.
+    // After a reconnection the lens goes to the latest command. A new lens stays where it is.
     let last = shared.state().last;
     match last {
         Some(power) => {
@@ -129,7 +127,7 @@ fn connect<'a, 'b>(
     Ok(Session { shared, settings, link, device, next_reading, turn: 0, unmet: 0 })
 }
 
-/// A connection that works.
+/// A working connection.
 struct Session<'a, 'b> {
     shared: &'a Shared,
     settings: &'b Settings,
@@ -137,12 +135,12 @@ struct Session<'a, 'b> {
     device: Device,
     next_reading: Moment,
     turn: usize,
-    /// Times in a row that the read-back differed from the command.
+    /// How many times in a row the read-back differed from the command.
     unmet: u32,
 }
 
 impl Session<'_, '_> {
-    /// Follows commands until the connection ends.
+    /// Sends commands and takes readings until the connection ends.
     fn serve(&mut self) -> Trouble {
         loop {
             if let Err(trouble) = self.step() {
@@ -181,7 +179,7 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    /// Reads `request`. A lens that is gone, or a driver that lost its settings, ends the connection.
+    /// Reads the value of `request`. If the lens is gone, or the driver lost its settings, the connection ends.
     fn read(&mut self, request: Request) -> Result<(), Trouble> {
         let sent = self.link.sent();
         if let Some(error) = self.link.stray_error() {
@@ -206,22 +204,22 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    /// Sends the last command again if the device did not take it.
+    /// Sends the last command again if the device did not accept it.
     fn compare(&mut self, sent: Option<Sent>, read_back: i16) {
-        // A command sent in the meantime makes the comparison void.
+        // A command sent in the meantime makes the comparison meaningless.
         let Some(last) = self.link.sent().filter(|&last| Some(last) == sent) else { return };
         if last.raw == read_back {
             self.unmet = 0;
         } else {
             self.unmet += 1;
-            // The next reading is the status, which may tell why, and then the focal power again.
+            // The next reading is the status, which may say why. Then the focal power is read again.
             self.turn = READINGS.len() - 1;
             self.link.send_focal_power(self.device.range, last.raw);
         }
     }
 
     fn publish(&self) {
-        // Without the dioptres: they would tell the operator of a blinded session how the policy moves.
+        // No dioptres here: they would show the operator of a blinded session how the policy moves.
         let refusal = (self.unmet > RESENDS)
             .then(|| Arc::from("it does not go where it is sent: restart the driver or check the lens"));
 
@@ -232,7 +230,7 @@ impl Session<'_, '_> {
     }
 }
 
-/// The state of a connected device, in a sentence.
+/// Describes the state of a connected device in one sentence.
 fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
     let Device { status, temperature, range, .. } = device;
     let line = match line_errors {

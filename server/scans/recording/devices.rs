@@ -1,4 +1,4 @@
-//! A bench of real devices: a camera, a lens, and somebody or something that moves on to the next pose.
+//! A bench of real devices: a camera, a lens, and a person or a command that moves the camera to the next pose.
 
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -12,9 +12,10 @@ use crate::clock::{Clock, Moment};
 use crate::imaging::{GrayImage, PatchArea, Reconstructor, RgbImage, content_area, rgb_to_gray};
 use crate::lens::{FocalPower, Lens};
 
-/// How long a frame is waited for.
+/// Longest wait for a frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// How far off the lens may read back: twice the hysteresis of a tunable lens.
+/// Largest allowed difference between the focal power that was set and the one read back: twice the hysteresis of a
+/// tunable lens.
 const TOLERANCE: f64 = 0.01;
 
 /// What moves the camera to its next pose.
@@ -28,21 +29,21 @@ pub enum Stepper {
 /// Why the camera was not moved.
 #[derive(Debug, thiserror::Error)]
 pub enum StepperError {
-    /// Nobody is there to do it.
+    /// Nobody is there to move the camera.
     #[error("nobody confirmed pose {0}: the input has ended; use --stepper if nobody can press Enter")]
     Unattended(usize),
-    /// It was told to stop.
+    /// Recording was stopped.
     #[error("stopped before pose {0}")]
     Stopped(usize),
     /// The command cannot be started.
     #[error("cannot start the stepper's shell: {0}")]
     NotStarted(io::Error),
-    /// The command says that it did not get there.
+    /// The command reported a failure.
     #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to continue")]
     Failed {
-        /// The pose it was for.
+        /// Pose that it should have reached.
         pose: usize,
-        /// How it ended.
+        /// Exit status of the command.
         status: ExitStatus,
     },
 }
@@ -76,13 +77,13 @@ impl Stepper {
 pub struct Devices {
     /// Takes the pictures.
     pub camera: Box<dyn Camera>,
-    /// Is sent to each focal power.
+    /// Is set to each focal power.
     pub lens: Box<dyn Lens>,
     /// Makes gray pictures from mosaics.
     pub reconstructor: Reconstructor,
-    /// Moves on.
+    /// Moves the camera to the next pose.
     pub stepper: Stepper,
-    /// Where time comes from.
+    /// Source of time.
     pub clock: Arc<dyn Clock>,
 }
 
@@ -111,12 +112,12 @@ impl PoseSource for Devices {
 }
 
 impl Devices {
-    /// Sends the lens to `power` and takes the first picture whose exposure began after it had settled there.
+    /// Sets the lens to `power` and takes the first picture whose exposure began after the lens had settled.
     fn picture(&mut self, power: FocalPower) -> Result<GrayImage, RecordError> {
         self.lens.set(power)?;
         let dynamics = self.lens.dynamics();
 
-        // Four times the settling time leaves 1/160 000 of a step.
+        // After four times the settling time, 1/160 000 of the step remains.
         let settled = self.clock.now() + dynamics.delay + dynamics.settling * 4;
         let image = self.frame_since(settled)?;
         let reached = self.lens.read_back()?;

@@ -1,4 +1,4 @@
-//! Importing a scan: a folder of pictures named by pose and focal power, from whatever recorded them.
+//! Imports a scan: a folder of pictures named by pose and focal power, recorded by any program.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,17 +12,17 @@ use crate::camera::recorded::{
 use crate::imaging::{DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
 use crate::lens::FocalPower;
 
-/// What a folder holds: for each pose its number there, and a file for each focal power, rising.
+/// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
 pub struct Imported {
     poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>>,
 }
 
 impl Imported {
-    /// Looks through `folder` and the folders in it. Names are read and compared; pictures are not yet opened.
+    /// Searches `folder` and the folders directly in it. Reads and compares names, but does not open pictures yet.
     ///
     /// # Errors
-    /// When names make no sense, or poses or focal powers are missing.
+    /// If names make no sense, or poses or focal powers are missing.
     pub fn look(folder: &Path) -> Result<Self, ImportError> {
         let mut poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>> = BTreeMap::new();
         for path in files(folder)? {
@@ -95,11 +95,11 @@ impl Imported {
     }
 }
 
-/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds
-/// already must show the same pictures. `progress` is called after each.
+/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds already must show the
+/// same pictures. `progress` is called after each pose.
 ///
 /// # Errors
-/// When a picture cannot be used, `out` holds another scan, or it cannot be written.
+/// If a picture cannot be used, `out` holds another scan, or it cannot be written.
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
     let header = Header {
         format: FORMAT.to_owned(),
@@ -116,7 +116,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
     };
 
     let mut reader = Reader { reconstructor: Reconstructor::default(), first: None };
-    // Before anything is written.
+    // Checks all sizes before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
 
     let mut recording = Recording::open(out, &header)?;
@@ -138,7 +138,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
     Ok(())
 }
 
-/// Whether the stored pictures of `pose` are `pictures`, which rise in focal power as the scan's do.
+/// Whether the stored pictures of `pose` equal `pictures`, which are in order of rising focal power.
 fn shows(scan: &ScanFolder, pose: usize, pictures: &[GrayImage]) -> Result<bool, ScanError> {
     let Some(stored) = scan.poses().get(&pose) else { return Ok(false) };
     for (power, picture) in scan.header().focal_powers.iter().zip(pictures) {
@@ -169,7 +169,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Compares a picture's size, of which only the beginning is read, to the first one's.
+    /// Compares a picture's size with the first one's. Reads only the beginning of the file.
     fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
         let damaged = |error: image::ImageError| ImportError::Picture {
             path: path.to_owned(),
@@ -205,7 +205,7 @@ impl Reader {
     }
 }
 
-/// The files in `folder` and in the folders right in it, by name.
+/// The files in `folder` and in the folders directly in it, sorted.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     let entries = |folder: &Path| -> Result<Vec<PathBuf>, ImportError> {
         let unreadable = |error| ImportError::Unreadable { path: folder.to_owned(), error };
@@ -222,7 +222,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     Ok(files)
 }
 
-/// Pose and focal power of a name like `pose0001_f0.350.png`; `None` of a file that means something else.
+/// Pose and focal power of a name like `pose0001_f0.350.png`; `None` for any other file.
 fn parse(name: &str) -> Option<Result<(usize, FocalPower), String>> {
     let (stem, extension) = name.rsplit_once('.')?;
     if !["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {

@@ -13,27 +13,27 @@ pub enum ImportError {
     /// The folder cannot be read.
     #[error("cannot read {}: {error}", path.display())]
     Unreadable {
-        /// The folder or file.
+        /// Path that cannot be read.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         error: io::Error,
     },
     /// It holds no pictures of a scan.
     #[error("there is no picture named like pose0001_f0.350.png in {}", .0.display())]
     Empty(PathBuf),
-    /// A name that cannot be meant.
+    /// A file name that makes no sense.
     #[error("{}: {reason}", path.display())]
     Name {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong with its name.
         reason: String,
     },
     /// Poses without any picture.
-    #[error("there is no picture of {} in {}; poses follow one another without a gap",
+    #[error("there is no picture of {} in {}; pose numbers must have no gaps",
             poses(missing), folder.display())]
     MissingPoses {
-        /// The folder.
+        /// The folder to import.
         folder: PathBuf,
         /// Numbers of the poses.
         missing: Vec<usize>,
@@ -41,20 +41,20 @@ pub enum ImportError {
     /// More poses than a scan may have.
     #[error("{} holds {poses} poses; a scan has at most {MOST_POSES}: import it in parts", folder.display())]
     TooMany {
-        /// The folder.
+        /// The folder to import.
         folder: PathBuf,
-        /// Their number.
+        /// Number of poses found.
         poses: usize,
     },
-    /// A pose without some of the others' focal powers.
+    /// A pose lacks a focal power that other poses have.
     #[error("pose {pose} has no picture at focal power {power:.3}, which other poses have")]
     MissingPower {
-        /// The pose's number.
+        /// Number of the incomplete pose.
         pose: usize,
-        /// The focal power.
+        /// The missing focal power.
         power: f64,
     },
-    /// A stack of one picture.
+    /// All pictures are at one focal power.
     #[error("a scan needs at least two focal powers; every picture is at {0:.3}")]
     OnePower(f64),
     /// Pictures of different sizes.
@@ -63,31 +63,31 @@ pub enum ImportError {
     Sizes {
         /// The first picture.
         first: PathBuf,
-        /// Its width and height.
+        /// Its width and height in pixels.
         size: (usize, usize),
-        /// One that differs.
+        /// A picture of another size.
         other: PathBuf,
-        /// Its width and height.
+        /// Its width and height in pixels.
         other_size: (usize, usize),
     },
-    /// Pictures too small to be of use.
+    /// A picture is smaller than the least size.
     #[error("{} is {}x{} pixels; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}",
             path.display(), size.0, size.1)]
     TooSmall {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its width and height.
+        /// Its width and height in pixels.
         size: (usize, usize),
     },
     /// A file that is not a picture.
     #[error("{}: {error}", path.display())]
     Picture {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Why it cannot be decoded.
         error: DecodeError,
     },
-    /// It cannot be stored.
+    /// The scan cannot be stored.
     #[error(transparent)]
     Record(#[from] RecordError),
 }

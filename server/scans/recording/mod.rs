@@ -23,28 +23,28 @@ pub trait PoseSource {
     /// Goes to pose `pose` (from 1) and takes a picture at each of `powers`, in this order.
     ///
     /// # Errors
-    /// When pose, lens or camera fail; then nothing of the pose is stored.
+    /// If the pose cannot be reached, or lens or camera fail. Then nothing of the pose is stored.
     fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError>;
 }
 
 /// The pictures of one pose.
 #[derive(Debug, Clone)]
 pub struct Taken {
-    /// In the order asked for; all of one size.
+    /// The pictures, in the requested order and all of one size.
     pub pictures: Vec<GrayImage>,
     /// Where the patch is.
     pub patch: PatchArea,
-    /// The best focal power, where a simulation knows it.
+    /// The best focal power, if a simulation knows it.
     pub truth: Option<FocalPower>,
 }
 
-/// Why recording ended early. What was stored is whole.
+/// Why recording ended early. The poses stored so far are complete.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// It was told to stop.
+    /// Recording was stopped.
     #[error("stopped")]
     Stopped,
-    /// The camera could not be moved on.
+    /// The camera could not be moved to the next pose.
     #[error(transparent)]
     Stepper(#[from] StepperError),
     /// The camera failed.
@@ -53,15 +53,15 @@ pub enum RecordError {
     /// The lens failed.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// The lens is not where it was sent.
+    /// The lens did not reach the focal power that was set.
     #[error("the lens was sent to focal power {asked:.3} but is at {reached:.3}; see `parfocal lens info`")]
     Astray {
-        /// Where it was sent.
+        /// Focal power that was set.
         asked: f64,
-        /// Where it says it stands.
+        /// Focal power that the lens reads back.
         reached: f64,
     },
-    /// The camera's pictures are of no use.
+    /// The camera's pictures are too small: their width and height in pixels.
     #[error("a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE} pixels; the camera's are {0}x{1}")]
     TooSmall(usize, usize),
     /// The folder cannot be written.
@@ -69,11 +69,10 @@ pub enum RecordError {
     Folder(#[from] ScanError),
 }
 
-/// Records every pose that `recording` misses. `stop` is asked between poses and `progress` called
-/// after each.
+/// Records every pose that `recording` lacks. Calls `stop` before each pose and `progress` after it.
 ///
 /// # Errors
-/// [`RecordError::Stopped`] when it was told to stop; else when something failed.
+/// [`RecordError::Stopped`] if `stop` returned true, another one if something failed.
 pub fn record(
     recording: &mut Recording,
     source: &mut dyn PoseSource,
@@ -98,7 +97,7 @@ pub fn record(
     Ok(())
 }
 
-/// A pose as it is stored, its optimum searched in the stack as the evaluation does.
+/// A pose as it is stored. Its optimum is searched in the stack, as the evaluation does.
 fn shot(pose: usize, in_order: &[FocalPower], taken: Taken) -> Shot {
     let Taken { pictures, patch, truth } = taken;
     let patches = pictures.iter().map(|picture| Box::new(levels_at(picture, patch))).collect();

@@ -1,4 +1,4 @@
-//! The phantom as something to record: a hand-held trajectory, each pose held still.
+//! Poses of the phantom to record: a hand-held trajectory, with each pose held still.
 
 use rayon::prelude::*;
 
@@ -37,7 +37,8 @@ impl PoseSource for PhantomPoses {
             let mut gray = GrayImage::default();
 
             reconstructor.reconstruct(&mosaic, &mut rgb, &mut gray);
-            // What policies see as they see it: the picture is reconstructed for people and may be off by a level.
+            // The part that policies see is made as for policies: the picture for people may differ from it by a gray
+            // level.
             put_square(&mut gray, still.seen(), &reconstructor.gray_square(&mosaic, still.seen()));
             *samples = mosaic.into_samples();
             Ok(gray)

@@ -4,28 +4,29 @@ use super::{FocalStack, Plane, StackError};
 
 use crate::imaging::{GrayImage, reduced};
 
-/// Side in pixels of the places whose sharpness is followed through the stack; of smaller pictures an eighth.
+/// Side in pixels of the places whose sharpness is followed through the stack. In smaller pictures, an eighth of their
+/// side.
 const TILE: usize = 64;
-/// How many times as sharp as at its worst a place must be at its best to have a peak.
+/// A place has a peak if its greatest sharpness is at least this many times its least.
 const LEAST_PEAK: f64 = 1.2;
-/// Part of a curve's range by which it must fall and rise again to have another peak.
+/// Share of a curve's range by which it must fall and rise again to have another peak.
 const PROMINENCE: f64 = 0.25;
-/// Correlation of brightness from place to place below which two pictures show two scenes; of real
-/// stacks .98 and more.
+/// Two pictures show different scenes if the correlation of their brightness over all places is below this. In real
+/// stacks it is 0.98 or more.
 const LEAST_ALIKE: f64 = 0.8;
-/// Gray levels by which a place's brightness changes at once where something moves, and how many
-/// times as much as is usual.
+/// Something moves where a place's brightness changes at once by more than this many gray levels, and by more than this
+/// many times the usual change.
 const MOVED: (f64, f64) = (15.0, 4.0);
 
-/// Difference of two pictures' sharpness that the same focus may have, as that of logarithms: noise, light.
+/// Difference in the logarithm of sharpness that two pictures at the same focus may have, from noise and light.
 const ALIKE_FOCUS: f64 = 0.05;
-/// How many times as much as on either side focus changes where a picture is in the wrong place or one is missing.
+/// Where a picture is in the wrong place or missing, focus changes more than this many times as much as on either side.
 const BREAK: f64 = 3.0;
 
 /// Notes for the person who took the stack: wrong order, jumps, motion, overexposure.
 ///
 /// # Errors
-/// When the pictures are not a focal stack: no peak, another scene, the wrong order, or overexposed.
+/// If the pictures are not a focal stack: no peak, another scene, the wrong order, or overexposed.
 pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
     let mut notes = Vec::new();
     overexposure(stack, &mut notes)?;
@@ -56,9 +57,7 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
 
     let told = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
-        return Err(unfit(format!(
-            "{told}, where nothing can be told of focus; shorten the exposure and take it again"
-        )));
+        return Err(unfit(format!("{told}, where focus cannot be judged; shorten the exposure and take it again")));
     }
 
     if share > 0.05 {
@@ -67,7 +66,8 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
     Ok(())
 }
 
-/// Brightness of blocks, which focus hardly changes: another scene has others, and what moves changes a few.
+/// Brightness of blocks. Focus hardly changes it. Another scene changes all blocks, and something that moves changes a
+/// few.
 fn blocks(stack: &FocalStack) -> Vec<GrayImage> {
     let (width, height) = stack.size();
     let block = block_side(stack);
@@ -79,7 +79,7 @@ fn block_side(stack: &FocalStack) -> usize {
     (width.min(height) / 8).clamp(1, 32)
 }
 
-/// By how much each block's brightness changes from one picture to the next, beyond what is usual.
+/// How far each block's change in brightness from one picture to the next is from the median change.
 fn changes(pair: &[GrayImage]) -> Vec<f64> {
     let steps: Vec<f64> = pair[0].data.iter().zip(&pair[1].data).map(|(a, b)| f64::from(b - a)).collect();
     let usual = median(&steps);
@@ -106,7 +106,7 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
     Ok(())
 }
 
-/// What moves, but for pictures between which everything changes: `broken`, one a pair of neighbours.
+/// Notes what moves. Leaves out the pairs of neighbours that are `broken`, because everything changes between them.
 fn motion(stack: &FocalStack, blocks: &[GrayImage], broken: &[bool], notes: &mut Vec<String>) {
     let largest = |pair: &[GrayImage]| {
         let changes = changes(pair);
@@ -163,7 +163,8 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     Ok(())
 }
 
-/// Between which neighbours the order of focus breaks: a picture is in the wrong place, or some are missing.
+/// For each pair of neighbours, whether the order of focus breaks: a picture is in the wrong place, or some are
+/// missing.
 fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) -> Vec<bool> {
     let planes = stack.planes();
     let curves: Vec<Vec<f64>> =
@@ -173,14 +174,14 @@ fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) ->
         root_mean_square(differences).max(ALIKE_FOCUS)
     };
 
-    // Without a picture that is in the wrong place its neighbours would follow one another.
+    // The neighbours of a picture in the wrong place are like each other and unlike it.
     let mut broken = vec![false; planes.len().saturating_sub(1)];
     for index in 1..planes.len().saturating_sub(1) {
         let aside = root_mean_square(curves.iter().map(|curve| stands_out(curve, index)));
         if aside > BREAK * change(index - 1, index + 1) {
             broken[index - 1..=index].fill(true);
             notes.push(format!(
-                "{} is not in order of focus: the pictures before and after it are alike, and it is not like them",
+                "{} is not in order of focus: the pictures before and after it are like each other and unlike it",
                 planes[index].name
             ));
         }
@@ -202,8 +203,8 @@ fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) ->
     broken
 }
 
-/// By how much a picture lies above or below both of its neighbours in a focus curve; 0 where the curve peaks, as it
-/// may.
+/// How far a picture lies above or below both of its neighbours in a focus curve. 0 at the curve's peak, which may
+/// stand out.
 fn stands_out(curve: &[f64], index: usize) -> f64 {
     if best(curve) == index {
         return 0.0;
@@ -212,9 +213,9 @@ fn stands_out(curve: &[f64], index: usize) -> f64 {
     (here - before.max(after)).max(before.min(after) - here).max(0.0)
 }
 
-/// Between which pictures everything jumps.
+/// For each pair of neighbours, whether the whole picture jumps.
 fn jumps(stack: &FocalStack, notes: &mut Vec<String>) -> Vec<bool> {
-    /// Width to which pictures are reduced to find how far they are shifted, and the farthest shift.
+    /// Width in pixels to which pictures are reduced before their shift is measured, and the farthest shift.
     const WIDTH: usize = 240;
     const FARTHEST: isize = 4;
     let (width, height) = stack.size();
@@ -238,7 +239,7 @@ fn jumps(stack: &FocalStack, notes: &mut Vec<String>) -> Vec<bool> {
     jumped
 }
 
-/// By how many pixels `b` is shifted against `a`, at most `farthest` along each axis: where they differ least.
+/// The shift of `b` against `a`, in pixels, at which they differ least; at most `farthest` along each axis.
 #[must_use]
 pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
     let width = a.width;
@@ -274,7 +275,7 @@ pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
     (dx as f64 + fine_x, dy as f64 + fine_y)
 }
 
-/// Mean gradient magnitude of each place in each picture: a curve a place.
+/// Mean gradient magnitude of each place in each picture: one curve for each place.
 fn sharpness(stack: &FocalStack) -> Vec<Vec<f64>> {
     let (width, height) = stack.size();
     let tile = TILE.min(width.min(height) / 8).max(8);
@@ -310,7 +311,7 @@ fn best(curve: &[f64]) -> usize {
     (0..curve.len()).max_by(|&a, &b| curve[a].total_cmp(&curve[b])).unwrap_or(0)
 }
 
-/// How often a curve rises to a peak, by a part of its range at least.
+/// How often a curve rises to a peak, by at least [`PROMINENCE`] of its range.
 fn peaks(curve: &[f64]) -> usize {
     let (least, most) = least_and_most(curve);
     let enough = PROMINENCE * (most - least);
@@ -342,7 +343,7 @@ fn median(values: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or_default()
 }
 
-/// Correlation of two pictures; nothing where one hardly varies.
+/// Correlation of two pictures; `None` if one hardly varies.
 fn correlation(a: &[f32], b: &[f32]) -> Option<f64> {
     let [a, b] = [a, b].map(|values| values.iter().map(|&value| f64::from(value)).collect::<Vec<f64>>());
     let mean_a = mean(&a);
@@ -360,7 +361,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     mean(&values.map(|value| value.powi(2)).collect::<Vec<_>>()).sqrt()
 }
 
-/// The mean of `values`; 0 where there are none.
+/// The mean of `values`; 0 if there are none.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
@@ -425,7 +426,7 @@ mod tests {
         let told = check(&FocalStack::new(planes).unwrap()).unwrap();
         assert!(told.len() == 1 && told[0].starts_with("12.png is not in order of focus"), "{told:?}");
 
-        // Blur from 3.8 to 1.8 pixels was not photographed.
+        // Pictures with blur from 3.8 to 1.8 pixels are missing.
         let sigmas = [4.4, 4.2, 4.0].into_iter().chain((0..17_i32).map(|step| 0.2 * f64::from((8 - step).abs())));
         let told = check(&blurred_by(sigmas, |_, picture| picture)).unwrap();
         assert!(told.len() == 1 && told[0].starts_with("focus jumps between 02.png and 03.png"), "{told:?}");

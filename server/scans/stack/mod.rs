@@ -13,9 +13,9 @@ use crate::imaging::{DecodeError, GrayImage, Reconstructor, decode, in_blocks};
 
 /// Least number of pictures in which a peak and an order can be recognised.
 pub const LEAST_PLANES: usize = 5;
-/// Most positions, gaps included.
+/// Greatest number of positions, including gaps.
 const MOST_POSITIONS: usize = 1001;
-/// How far from its place on the regular grid a position may be, in steps.
+/// How far a position may be from its place on the regular grid, in steps.
 const TOLERANCE: f64 = 0.25;
 
 /// One picture of a stack.
@@ -23,9 +23,9 @@ const TOLERANCE: f64 = 0.25;
 pub struct Plane {
     /// Its file's name.
     pub name: String,
-    /// Position of the focus, in whatever unit the names or the list have.
+    /// Position of the focus, in the unit of the names or the list.
     pub position: f64,
-    /// What it shows.
+    /// The picture, in gray levels.
     pub picture: GrayImage,
 }
 
@@ -44,25 +44,25 @@ pub enum StackError {
     /// A picture cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file is not a picture.
     #[error("{}: {source}", path.display())]
     Picture {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Why it cannot be decoded.
         source: DecodeError,
     },
     /// The list of positions makes no sense.
     #[error("{}: {reason}", path.display())]
     List {
-        /// The list.
+        /// Path of the list.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with it.
         reason: String,
     },
     /// Too few pictures.
@@ -77,9 +77,9 @@ pub enum StackError {
     Sizes {
         /// The first picture.
         first: String,
-        /// One that differs.
+        /// A picture of another size.
         other: String,
-        /// Their widths and heights.
+        /// Width and height of each, in pixels.
         sizes: [(usize, usize); 2],
     },
     /// Two pictures at one position.
@@ -89,20 +89,20 @@ pub enum StackError {
         first: String,
         /// The other.
         second: String,
-        /// Where both are.
+        /// Position of both.
         position: f64,
     },
-    /// Positions that no regular grid holds.
+    /// Positions that do not fit a regular grid.
     #[error(
         "the positions are too uneven: with steps of {step}, the least between two pictures, {found} \
          of {of} places would have a picture; take pictures at even distances"
     )]
     Uneven {
-        /// Least distance of two pictures.
+        /// Least distance between two pictures.
         step: f64,
         /// Places with a picture.
         found: usize,
-        /// All places.
+        /// Number of places on the grid.
         of: usize,
     },
     /// The pictures do not show a focal stack.
@@ -114,7 +114,7 @@ impl FocalStack {
     /// A stack of `planes`, put in order of position.
     ///
     /// # Errors
-    /// When there are fewer than [`LEAST_PLANES`], two share a position, or sizes differ.
+    /// If there are fewer than [`LEAST_PLANES`], two share a position, or sizes differ.
     pub fn new(mut planes: Vec<Plane>) -> Result<Self, StackError> {
         planes.sort_by(|a, b| a.position.total_cmp(&b.position));
         if planes.len() < LEAST_PLANES {
@@ -139,7 +139,7 @@ impl FocalStack {
     /// the natural order of names.
     ///
     /// # Errors
-    /// When a picture or the list cannot be read, or the pictures are not a stack.
+    /// If a picture or the list cannot be read, or the pictures are not a stack.
     pub fn load(folder: &Path, list: Option<&Path>, scale: usize) -> Result<Self, StackError> {
         let files = pictures_in(folder)?;
         let placed = match list {
@@ -170,11 +170,11 @@ impl FocalStack {
         self.planes.first().map_or((0, 0), |plane| (plane.picture.width, plane.picture.height))
     }
 
-    /// The stack at even distances, the least between two of its pictures, and the number of places
-    /// where a mix of the two pictures around fills a gap.
+    /// The stack at even distances, and the number of gaps that are filled by a mix of the two pictures around. The
+    /// distance is the least between two of the stack's pictures.
     ///
     /// # Errors
-    /// When most places would have no picture.
+    /// If most places would have no picture, or positions are too far from the grid.
     pub fn even(&self) -> Result<(Self, usize), StackError> {
         let position = |index: usize| self.planes[index].position;
         let last = self.planes.len() - 1;
@@ -261,7 +261,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A piece of a name: a number as digits with at most one point, or what lies between two.
+/// The pieces of a name: numbers, which are digits with at most one point, and what lies between them.
 fn pieces(name: &str) -> Vec<&str> {
     let mut pieces = Vec::new();
     let mut rest = name;
@@ -285,13 +285,13 @@ fn pieces(name: &str) -> Vec<&str> {
     pieces
 }
 
-/// The numbers in `name`. A minus counts as a sign where no letter or digit stands before it.
+/// The numbers in `name`. A minus counts as a sign if no letter or digit stands before it.
 fn numbers(name: &str) -> Vec<f64> {
     let pieces = pieces(name);
     let number = |(index, piece): (usize, &&str)| {
         let value: f64 = piece.parse().ok()?;
         let before = index.checked_sub(1).map_or("", |before| pieces[before]);
-        // A lone minus between two numbers parts them.
+        // A lone minus between two numbers separates them.
         let alone = before == "-" && index > 1;
         let sign = before.strip_suffix('-').is_some_and(|before| !before.ends_with(char::is_alphanumeric));
         Some(if sign && !alone { -value } else { value })
@@ -304,7 +304,7 @@ fn numbers(name: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Names as people order them: numbers by value.
+/// Orders names as people do: numbers by value.
 fn natural(a: &str, b: &str) -> Ordering {
     let a_pieces = pieces(a);
     let b_pieces = pieces(b);
@@ -344,7 +344,7 @@ mod tests {
         );
         assert_eq!(placed(&["z_-2.5um.tif", "z_3um.tif"])[1], ("z_-2.5um.tif".to_owned(), -2.5));
         assert_eq!(placed(&["stack-3.png", "stack-11.png"])[0], ("stack-3.png".to_owned(), 3.0));
-        // Two numbers differ: the order of the names alone is used.
+        // Two numbers differ, so only the order of the names is used.
         assert_eq!(placed(&["b10_1.png", "b9_2.png"]), pairs(&[("b9_2.png", 0.0), ("b10_1.png", 1.0)]));
         assert_eq!(placed(&["far.png", "near.png"]), pairs(&[("far.png", 0.0), ("near.png", 1.0)]));
     }

@@ -1,5 +1,5 @@
-//! What a focal stack shows of its optic: focus curves of several places, how fast blur grows with
-//! the distance to the focus, how soft the sharpest picture is, and how magnification changes.
+//! What a focal stack shows of the optic that took it: focus curves of several places, how fast blur grows with the
+//! distance to the focus, how soft the sharpest picture is, and how magnification changes.
 
 use serde::Serialize;
 
@@ -12,13 +12,13 @@ use crate::simulation::blur::gaussian_blur;
 
 /// Places along each axis whose focus curves are shown.
 const PLACES: usize = 3;
-/// Blurs in pixels that the sharpest picture is given to find which one another picture has.
+/// Blurs, in pixels, that are applied to the sharpest picture to find how much another picture is blurred.
 const BLURS: [f64; 12] = [0.0, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0];
-/// Pixels around a patch that a blur draws from.
+/// Pixels around a patch that its blur needs.
 const MARGIN: usize = 32;
-/// Least fall of sharpness from the best picture to the worst by which a place shows anything.
+/// A place is used if its least sharpness is below this share of its greatest.
 const LEAST_FALL: f64 = 0.8;
-/// Share of a place's pixels, those of the steepest gradient, that count as edges.
+/// One in this many of a place's pixels counts as an edge: those with the steepest gradients.
 const EDGES: usize = 50;
 /// Blur in pixels by which edges are blurred again to find how soft they are.
 const AGAIN: f64 = 1.0;
@@ -38,7 +38,7 @@ pub struct Place {
     pub sharpness: Vec<f64>,
 }
 
-/// What is known about an optic; `None` where the pictures do not show it.
+/// What is known about an optic. A figure is `None` if the pictures do not show it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Optics {
     /// Focus curves.
@@ -47,18 +47,18 @@ pub struct Optics {
     pub blur_per_unit: Option<f64>,
     /// Blur of the sharpest picture, pixels (standard deviation).
     pub softness: Option<f64>,
-    /// By which share magnification grows from the first picture to the last.
+    /// Share by which magnification grows from the first picture to the last.
     pub magnification: Option<f64>,
 }
 
 impl Optics {
-    /// What `stack` shows.
+    /// Measures all figures that `stack` shows.
     #[must_use]
     pub fn of(stack: &FocalStack) -> Self {
         Self { magnification: magnification(stack), ..Self::of_focus(stack) }
     }
 
-    /// What `stack` shows but for magnification, which takes longer than all the rest.
+    /// As [`Optics::of`], but without magnification, which takes longer than all the rest.
     #[must_use]
     pub fn of_focus(stack: &FocalStack) -> Self {
         let (width, height) = stack.size();
@@ -88,7 +88,7 @@ impl Optics {
         optics
     }
 
-    /// Several stacks of one optic in one: all places, and the medians of the figures.
+    /// Combines several stacks of one optic: all places, and the medians of the figures.
     #[must_use]
     pub fn together(all: Vec<Self>) -> Self {
         let figure = |value: fn(&Self) -> Option<f64>| median(all.iter().filter_map(value).collect());
@@ -106,15 +106,15 @@ fn metric(picture: &GrayImage, x: usize, y: usize) -> f64 {
     mgm(&as_patch(&levels_at(picture, area(x, y))))
 }
 
-/// The focus curve at a place, and the number of its sharpest picture.
+/// The focus curve at a place, and the index of its sharpest picture.
 fn curve(stack: &FocalStack, x: usize, y: usize) -> (Place, usize) {
     let sharpness: Vec<f64> = stack.planes().iter().map(|plane| metric(&plane.picture, x, y)).collect();
     let best = (0..sharpness.len()).max_by(|&a, &b| sharpness[a].total_cmp(&sharpness[b])).unwrap_or(0);
     (Place { x, y, best: stack.planes()[best].position, sharpness }, best)
 }
 
-/// Pixels of blur a unit of position: each picture's sharpness is compared with the sharpest one's,
-/// blurred until it is the same.
+/// Pixels of blur per unit of position, from each picture: the sharpest picture is blurred until it is as sharp as that
+/// one.
 fn rate(stack: &FocalStack, place: &Place, best: usize) -> Vec<f64> {
     let (around, x, y) = surroundings(&stack.planes()[best].picture, place.x, place.y);
     let blurred: Vec<f64> = BLURS.iter().map(|&blur| metric(&gaussian_blur(&around, blur), x, y)).collect();
@@ -126,7 +126,7 @@ fn rate(stack: &FocalStack, place: &Place, best: usize) -> Vec<f64> {
         Some(BLURS[before] + part * (BLURS[after] - BLURS[before]))
     };
 
-    // The pictures beside the sharpest one are hardly blurred: rounding and noise decide there.
+    // The pictures beside the sharpest one are hardly blurred, so rounding and noise would decide there.
     let far = |index: &usize| index.abs_diff(best) >= 2;
     let numbers = (0..place.sharpness.len()).filter(far);
     let pairs = numbers.filter_map(|index| Some((blur(place.sharpness[index])?, stack.planes()[index].position)));
@@ -145,8 +145,8 @@ fn surroundings(picture: &GrayImage, x: usize, y: usize) -> (GrayImage, usize, u
     (GrayImage { width: right - left, height: bottom - top, data }, x - left, y - top)
 }
 
-/// How soft the edges at a place are: by the ratio of their gradients before and after blurring them
-/// again (Zhuo and Sim 2011).
+/// How soft the edges at a place are, from the ratio of their gradients before and after blurring them again (Zhuo and
+/// Sim 2011).
 fn softness(picture: &GrayImage, x: usize, y: usize) -> Option<f64> {
     let (around, x, y) = surroundings(picture, x, y);
     let again = gaussian_blur(&around, AGAIN);
@@ -173,8 +173,8 @@ fn gradient(picture: &GrayImage, x: usize, y: usize) -> f64 {
     f64::from(across.hypot(down))
 }
 
-/// How magnification grows from the first picture to the last: by how the left and right thirds, and
-/// the upper and lower ones, move apart from picture to picture.
+/// How magnification grows from the first picture to the last. Measured by how the left and right thirds, and the upper
+/// and lower ones, move apart from picture to picture.
 fn magnification(stack: &FocalStack) -> Option<f64> {
     /// Farthest shift from one picture to the next, pixels.
     const FARTHEST: isize = 3;

@@ -10,31 +10,31 @@ use crate::autofocus::BlurRate;
 use crate::imaging::{GrayImage, in_blocks};
 use crate::scans::planes::{PlaneStack, PlanesError};
 
-/// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
-/// how soft a lens's best picture is on the sensor, so each stack is used at both.
+/// The two scales: names, and the width in pixels to which a stack's pictures are reduced as nearly as possible. It is
+/// unknown how soft a lens's best picture is on the sensor, so each stack is used at both.
 const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
-/// Fewest planes that make a range, where their number is not given.
+/// Least number of planes in a range, if the number is not given.
 const LEAST_PLANES: usize = 6;
 
 /// Why a focal stack cannot be scanned.
 #[derive(Debug, thiserror::Error)]
 pub enum UnfitStack {
-    /// It cannot be read, or its pictures make no stack.
+    /// It cannot be read, or its pictures are not a stack.
     #[error(transparent)]
     Stack(#[from] StackError),
-    /// Its pictures are too small or too many.
+    /// Its pictures are too few or too small, or differ in size.
     #[error("{} is not a focal stack: {source}", folder.display())]
     Planes {
-        /// The folder.
+        /// The stack's folder.
         folder: PathBuf,
-        /// Why.
+        /// What is wrong with its pictures.
         source: PlanesError,
     },
     /// It has fewer planes than the range needs, or is too small.
     #[error("{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
              pixels", folder.display())]
     TooSmall {
-        /// The folder.
+        /// The stack's folder.
         folder: PathBuf,
         /// Planes of the range.
         planes: usize,
@@ -46,7 +46,7 @@ pub enum UnfitStack {
 pub struct StackSource {
     /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
     pub folder: PathBuf,
-    /// Planes of the range; two fifths of the stack's where it is `None`, but at least 6.
+    /// Planes of the range; if it is `None`, two fifths of the stack's, but at least 6.
     pub planes: Option<usize>,
 }
 
@@ -59,12 +59,12 @@ pub struct ScaledStack {
     pub planes: usize,
     /// The pictures; their positions count the planes from 0.
     pub pictures: Arc<PlaneStack>,
-    /// The same pictures.
+    /// The same pictures, to measure the blur rate.
     stack: FocalStack,
 }
 
 impl ScaledStack {
-    /// How fast the optic blurs over the range, where the pictures show it. Measuring takes seconds.
+    /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
     #[must_use]
     pub fn blur_rate(&self) -> Option<BlurRate> {
         let rate = Optics::of_focus(&self.stack).blur_per_unit?;
@@ -89,11 +89,11 @@ impl StackSource {
         self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
     }
 
-    /// Reads the stack and makes it smaller to each of the scales. Also returns what is doubtful about
-    /// its pictures, in words: a scan over them is possible all the same.
+    /// Reads the stack and reduces it to each of the scales. Also returns warnings about its pictures, as text for
+    /// people. A scan is possible despite them.
     ///
     /// # Errors
-    /// When it cannot be read, or its pictures make no stack.
+    /// If the stack cannot be read, or its pictures are not a stack.
     pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
         let stack = FocalStack::load(&self.folder, None, 1)?;
         let doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);

@@ -19,11 +19,11 @@ pub(super) struct Cortex {
     pub(super) open: Field,
     /// Share of dura and bone (1) against brain (0).
     pub(super) rim: Field,
-    /// Distance from the next sulcus: 0 in it, about 1 on a crown.
+    /// Distance from the nearest sulcus: 0 in it, about 1 on a crown.
     pub(super) crown: Field,
 }
 
-/// Folding of a cortex.
+/// How a cortex is folded.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Folding {
     /// Distance between neighbouring sulci, texels.

@@ -8,7 +8,7 @@ use super::spectra::ENDMEMBERS;
 /// The composition of one texel: abundances of the endmembers, in units of 1/8191.
 pub(super) type Texel = [u16; ENDMEMBERS];
 
-/// Radius of each level's disc in texels, and the step at which that level is kept: a wide disc leaves
+/// Radius of each level's disc, and the step of the grid on which the level is kept, both in texels. A wide disc leaves
 /// no detail that a coarser grid would lose.
 const LEVELS: [(f32, usize); 9] =
     [(0.0, 1), (1.0, 1), (2.0, 1), (3.0, 1), (4.5, 2), (6.5, 2), (9.0, 4), (12.5, 4), (17.0, 4)];
@@ -39,8 +39,8 @@ impl Stack {
             .iter()
             .map(|&(radius, step)| {
                 let coarse = shrink(&sharp, side, step);
-                // Averaging boxes of n texels blurs by a second moment of (n^2 - 1) / 12, and giving each
-                // coarse texel the part of the disc that it covers, by n^2 / 12. A disc has r^2 / 4.
+                // Averaging boxes of n texels adds a second moment of (n^2 - 1) / 12. Weighting each coarse texel by
+                // the part that the disc covers adds n^2 / 12. A disc has r^2 / 4.
                 let boxes = (2 * step * step - 1) as f32 / 3.0;
                 let rest = (radius * radius - boxes).sqrt() / step as f32;
                 Level::new(radius, step, side / step, blur(&coarse, side / step, &Disc::new(rest)))
@@ -145,7 +145,7 @@ fn shrink(sharp: &[Texel], side: usize, step: usize) -> Vec<[f32; ENDMEMBERS]> {
     out
 }
 
-/// A disc's share in each row of texels around its centre.
+/// A disc's weight in each texel around its centre.
 struct Disc {
     reach: usize,
     /// `(2 reach + 1)^2` weights that add up to 1.
@@ -211,7 +211,7 @@ fn blur(sharp: &[[f32; ENDMEMBERS]], side: usize, disc: &Disc) -> Vec<Texel> {
     out
 }
 
-/// Adds to each texel of `sum` the texels of `row` at and right of it, weighted.
+/// Adds to each texel of `sum` the texels of `row` from its place to the right, weighted.
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn weighted_sum(sum: &mut [f32], row: &[f32], weights: &[f32]) {
     for (shift, &weight) in weights.iter().enumerate() {

@@ -7,7 +7,7 @@ use rand::{Rng, RngExt};
 /// working distance.
 pub const SIDE: usize = 1024;
 
-/// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
+/// The value that stands for an abundance of 1 in a texel. It leaves headroom for mirrored lamps of 8 times white.
 pub(super) const UNIT: f32 = 8191.0;
 
 /// Standard deviation of uniform noise on -1..1 after the spline's smoothing in both directions.
@@ -77,7 +77,7 @@ impl Spline {
         Self { side, wide, weights }
     }
 
-    /// One row, into `out`.
+    /// Writes row `y` into `out`.
     pub(super) fn row_into(&self, y: usize, out: &mut [f32]) {
         let cell = self.weights.len();
         blend(out, &self.wide[(y / cell) * self.side..], self.weights[y % cell]);

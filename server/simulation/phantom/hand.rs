@@ -52,7 +52,7 @@ impl Default for Haste {
 /// Physiological tremor: frequency, 1/s, and amplitude, texels. A hand trembles at 8 to 12 Hz.
 const TREMORS: [(f64, f64); 3] = [(8.3, 0.35), (9.7, 0.3), (11.6, 0.2)];
 
-/// A hand's path. It depends on its seed and on time alone, as long as time does not run backwards.
+/// A hand's path. It depends only on its seed and on time, as long as time does not run backwards.
 #[derive(Debug, Clone)]
 pub struct Hand {
     path: Path<6>,
@@ -80,7 +80,7 @@ impl Hand {
         Self { path: Path::new(seed, RATE, habits), phases }
     }
 
-    /// The camera's pose at `time` after the start; times must be asked for in rising order.
+    /// The camera's pose at `time` after the start; times must be requested in rising order.
     pub fn pose_at(&mut self, time: Duration) -> Pose {
         let [x, y, roll, lean_x, lean_y, focus] = self.path.at(time);
         let [shake_x, shake_y] = self.phases.map(|phases| tremor(phases, time.as_secs_f64()));

@@ -69,8 +69,8 @@ impl Phantom {
         self.render((pose, focal_power), self.exposure.gain(), &noise, &Region::WHOLE, samples);
     }
 
-    /// Renders the sensor's samples with `noise` starting at each row's place. Computes light within
-    /// `region` alone, and leaves samples above and below it as they were.
+    /// Renders the sensor's samples. `noise` says for each row where in the stored noise it starts. Computes light only
+    /// within `region`, and leaves samples above and below it as they were.
     fn render(&self, seen: (&Pose, FocalPower), gain: f32, noise: &[u32], region: &Region, samples: &mut [u16]) {
         let mapping = Mapping::new(&self.optics, seen.0);
         let mut expected = vec![0.0; SENSOR_WIDTH];
@@ -109,8 +109,8 @@ impl Phantom {
         }
     }
 
-    /// Takes one exposure of a white tile under even light that brings `level` of full scale to the
-    /// content area's centre: 0 with the lens cap on.
+    /// Takes one exposure of a white tile under even light. The light brings the content area's centre to `level` of
+    /// full scale; 0 is with the lens cap on.
     pub fn expose_tile(&mut self, level: f32, samples: &mut [u16]) {
         let noise = self.sensor.fresh_noise();
 

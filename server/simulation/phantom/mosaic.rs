@@ -1,5 +1,4 @@
-//! From abundances on the grid of mosaic cells to expected counts of each sample, at its own place
-//! within the cell.
+//! Turns abundances on the grid of mosaic cells into expected counts of each sample, at its own place within the cell.
 
 use multiversion::multiversion;
 
@@ -33,8 +32,8 @@ impl Bands {
         self.0.map(|band| band.iter().zip(light).map(|(response, light)| response * light).sum())
     }
 
-    /// Expected counts of sensor row `row` (0..4) of a cell row, for the cells in `columns`, into `out`
-    /// (4 a cell). `lines` are the cell rows above, here and below.
+    /// Writes the expected counts of sensor row `row` (0..4) of a cell row, for the cells in `columns`, into `out` (4
+    /// for each cell). `lines` are the cell rows above, here and below.
     pub(super) fn expose(&self, out: &mut [f32], lines: [&Line; 3], row: usize, columns: (usize, usize), gain: f32) {
         let (vertical, neighbour) = shift(row);
         let next = if neighbour < 0 { lines[0] } else { lines[2] };
@@ -51,7 +50,8 @@ impl Bands {
     }
 }
 
-/// Distance of sample `index` of a cell from the cell's centre, in cells, and on which side.
+/// Distance of sample `index` of a cell from the cell's centre, in cells, and on which side (-1: left or above, 1:
+/// right or below).
 fn shift(index: usize) -> (f32, i32) {
     [(0.375, -1), (0.125, -1), (0.125, 1), (0.375, 1)][index]
 }

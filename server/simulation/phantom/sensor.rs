@@ -16,7 +16,7 @@ const READ_NOISE: f32 = 13.0;
 /// Standard deviation of the pixels' relative response.
 const UNEVENNESS: f32 = 0.007;
 
-/// Normal deviates kept; rows start at random places in them.
+/// Number of normal deviates stored. Each row starts at a random place among them.
 const TABLE: usize = 1 << 16;
 
 /// Noise of a sensor `width` samples wide.
@@ -54,7 +54,8 @@ impl Sensor {
         noise(self.pattern.len(), rng)
     }
 
-    /// Counts of row `y`: where light fell, `expected` counts from column `left` on, and darkness elsewhere.
+    /// Writes the counts of row `y` into `out`: where light fell, `expected` counts with noise from column `left` on;
+    /// elsewhere, darkness.
     pub(super) fn read_row(&self, out: &mut [u16], y: usize, left: usize, expected: &[f32], noise: u32) {
         let noise = noise as usize;
         out.copy_from_slice(&self.dark[noise..noise + out.len()]);
@@ -95,9 +96,9 @@ pub(super) struct AutoExposure {
 
 /// Count that one sample in [`BRIGHT_SHARE`] should exceed.
 const BRIGHT: f32 = 0.8 * FULL_SCALE;
-/// See [`BRIGHT`].
+/// One sample in this many should exceed [`BRIGHT`].
 const BRIGHT_SHARE: usize = 40;
-/// Part of the way, in stops, that one frame goes.
+/// Share of the way, in stops, that the gain moves in one frame.
 const SPEED: f32 = 0.15;
 /// Least and greatest gain: a camera cannot change its exposure time without limit either.
 const GAINS: (f32, f32) = (0.1, 10.0);
@@ -123,7 +124,7 @@ impl AutoExposure {
         self.gain
     }
 
-    /// Moves the gain towards what some of an exposure's samples call for.
+    /// Moves the gain a step towards the one that `samples`, some of an exposure's, call for.
     pub(super) fn adjust(&mut self, samples: impl Iterator<Item = u16>) {
         let mut histogram = [0_usize; 1024];
         let mut total = 0;

@@ -1,4 +1,4 @@
-//! Spectra of what the phantom is made of: tissue as scatterer and haemoglobin, seen through the sensor's bands.
+//! Spectra of the phantom's materials: tissue as scatterer and haemoglobin, seen through the sensor's bands.
 //!
 //! Extinction: S. Prahl's compilation, "Tabulated molar extinction coefficient for hemoglobin in
 //! water", Oregon Medical Laser Center. Scattering and the blood fraction's meaning: S. L. Jacques,
@@ -6,7 +6,7 @@
 //! 10.1088/0031-9155/58/11/R37. Diffuse reflectance: S. T. Flock et al., "Monte Carlo modeling of
 //! light propagation in highly scattering tissues", IEEE Trans. Biomed. Eng. 36 (1989) 1162.
 
-/// Number of endmembers that the phantom's surface is mixed of.
+/// Number of endmembers that are mixed into the phantom's surface.
 pub const ENDMEMBERS: usize = 4;
 
 /// Endmember: tissue with hardly any blood, such as dura.
@@ -89,7 +89,8 @@ const TISSUES: [Tissue; 3] = [
     Tissue { blood: 0.30, saturation: 0.60 },
 ];
 
-/// Diffuse reflectance, 0..1, of `tissue` at `nanometres` (440..=620; the ends hold beyond).
+/// Diffuse reflectance, 0..1, of `tissue` at `nanometres`. Beyond 440..=620 nm, the extinction at the end of that range
+/// is used.
 ///
 /// Scattering is that of brain, 24.2 (lambda / 500 nm)^-1.611 per cm (Jacques 2013, table 2);
 /// absorption is 2.303 * extinction * blood * 150 g/l / 64 500 g/mol (Prahl); the reflectance of the

@@ -1,5 +1,5 @@
-//! Poses held still: a hand-held trajectory over the phantom, stopped at each of its poses for as many
-//! exposures as are wanted, as an arm that replays a trajectory does.
+//! Poses held still: a hand-held trajectory over the phantom. It stops at each of its poses for any number of
+//! exposures, as an arm that replays a trajectory does.
 
 use std::time::Duration;
 
@@ -68,8 +68,8 @@ impl Trajectory {
     }
 }
 
-/// One pose held still. All its exposures gather the same light, that at which auto-exposure settles
-/// there; each has noise of its own, which depends on its number alone.
+/// One pose held still. All its exposures have the same gain, at which auto-exposure settles there. Each has its own
+/// noise, which depends only on its number.
 pub struct Still<'a> {
     phantom: &'a Phantom,
     pose: &'a Pose,

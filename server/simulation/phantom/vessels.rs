@@ -39,7 +39,7 @@ struct Tip {
     x: f32,
     y: f32,
     heading: f32,
-    /// Heading that it wanders about.
+    /// Heading about which it wanders.
     course: f32,
     turn: f32,
     radius: f32,
@@ -70,7 +70,7 @@ impl Vessels {
         vessels
     }
 
-    /// Draws one vessel from its tip to its end, leaving the tips of its branches.
+    /// Draws one vessel from its tip to its end. Adds the tips of its branches to `tips`.
     fn follow(&mut self, mut tip: Tip, valleys: &Field, tips: &mut Vec<Tip>, rng: &mut impl Rng) {
         let side = self.bulge.side as f32;
         let mut until_branch = branch_distance(tip.radius, rng);
@@ -159,8 +159,8 @@ impl Tip {
     }
 }
 
-/// A centred uniform draw of variance 1: cheaper than a normal one, and over a vessel's many steps the
-/// sum is nearly normal all the same.
+/// A centred uniform draw of variance 1: cheaper than a normal one, and over a vessel's many steps the sum is still
+/// nearly normal.
 fn swing(rng: &mut impl Rng) -> f32 {
     3.46 * (rng.random::<f32>() - 0.5)
 }

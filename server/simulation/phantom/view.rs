@@ -1,4 +1,4 @@
-//! The camera's view: which place of the surface each mosaic cell sees, how far out of focus, and in
+//! The camera's view: for each mosaic cell, which place of the surface it sees, how far that is out of focus, and in
 //! what light.
 
 use std::ops::Range;
@@ -51,7 +51,7 @@ pub(super) struct Region {
 impl Region {
     pub(super) const WHOLE: Self = Self { columns: 0..WIDTH, rows: 0..HEIGHT };
 
-    /// The columns between the first and last lit one; `0..0` where there are none.
+    /// The region's columns from the first to the last lit one; `0..0` if there are none.
     pub(super) fn lit(&self, (first, last): (usize, usize)) -> Range<usize> {
         let columns = first.max(self.columns.start)..(last + 1).min(self.columns.end);
         if columns.is_empty() { 0..0 } else { columns }

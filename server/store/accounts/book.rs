@@ -1,4 +1,4 @@
-//! Writes accounts and sign-ins: for the server, or for a command beside it.
+//! Writes accounts and sign-ins, for the server or for a command beside it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub struct AccountBook {
 enum Way {
     /// Within the server.
     Server(Store),
-    /// From the command line, beside a server or without one.
+    /// From the command line, whether or not a server runs.
     CommandLine(SqlitePool),
 }
 
@@ -40,16 +40,16 @@ enum Write<'a> {
 }
 
 impl AccountBook {
-    /// That of the server.
+    /// The account book of the server.
     #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>) -> Self {
         Self { way: Way::Server(store.clone()), reader: store.reader().clone(), clock }
     }
 
-    /// That of data folder `folder`, for a command, whether or not a server has it open.
+    /// Opens data folder `folder` for a command, whether or not a server has it open.
     ///
     /// # Errors
-    /// When there is no database, it is not of this version, or it cannot be written.
+    /// If there is no database, it is of another version, or it cannot be written.
     pub async fn open(folder: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
         let reader = Reader::open(folder).await?;
         let options = SqliteConnectOptions::new()
@@ -62,13 +62,13 @@ impl AccountBook {
         Ok(Self { way: Way::CommandLine(pool), reader, clock })
     }
 
-    /// For reading.
+    /// The reader of the same database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }
 
-    /// Ends its connections where it has its own.
+    /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
         if let Way::CommandLine(pool) = &self.way {
             self.reader.close().await;
@@ -76,19 +76,19 @@ impl AccountBook {
         }
     }
 
-    /// Makes `account`. On disk when this returns.
+    /// Creates `account`. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn add(&self, account: &Account, hash: &PassphraseHash, by: By<'_>) -> Result<(), StoreError> {
         let event = AccountEvent::Added(account.role);
         self.write(Some(&account.account), &event, by, Write::Insert(account, hash)).await
     }
 
-    /// Changes `account`. On disk when this returns; then its sign-ins have ended where the change says so.
+    /// Changes `account`. The change is on disk when this returns. `Disable` and `SignOut` also end its sign-ins.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn change(&self, account: &AccountName, change: &AccountChange, by: By<'_>) -> Result<(), StoreError> {
         self.write(Some(account), &AccountEvent::Changed(change.clone()), by, Write::Change(change)).await
     }
@@ -96,7 +96,7 @@ impl AccountBook {
     /// Replaces the passphrase of `account`, and ends its sign-ins.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn replace_passphrase(
         &self,
         account: &AccountName,
@@ -106,10 +106,10 @@ impl AccountBook {
         self.write(Some(account), &AccountEvent::PassphraseReplaced, by, Write::Passphrase(hash)).await
     }
 
-    /// Records that a browser signed in to `account`; its token has the SHA-256 `token_sha256`.
+    /// Records that a browser signed in to `account`. `token_sha256` is the SHA-256 of its token.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn sign_in(&self, account: &AccountName, token_sha256: &str) -> Result<(), StoreError> {
         let write = Write::SignIn { token_sha256 };
         self.write(Some(account), &AccountEvent::SignedIn, Some(account), write).await
@@ -118,16 +118,16 @@ impl AccountBook {
     /// Ends the sign-in of `account` whose token has this SHA-256.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn sign_out(&self, account: &AccountName, token_sha256: &str) -> Result<(), StoreError> {
         let write = Write::SignOut { token_sha256 };
         self.write(Some(account), &AccountEvent::SignedOut, Some(account), write).await
     }
 
-    /// Records `event`, a failed attempt on `account`; none where no account has the name that was given.
+    /// Records `event`, a failed attempt on `account`; `None` if no account has the name that was given.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn failed(&self, account: Option<&AccountName>, event: &AccountEvent) -> Result<(), StoreError> {
         self.write(account, event, None, Write::Nothing).await
     }
@@ -135,7 +135,7 @@ impl AccountBook {
     /// Notes that the sign-in with this token was used now.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn note_use(&self, token_sha256: &str) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
             Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),

@@ -11,27 +11,27 @@ use crate::trial::account::{Account, AccountChange, AccountName, AccountRole};
 
 pub use book::AccountBook;
 
-/// An argon2id hash of a passphrase, with what it was made with.
+/// An argon2id hash of a passphrase, with its parameters.
 #[derive(Clone, PartialEq, Eq)]
 pub struct PassphraseHash {
     /// Memory, KiB.
     pub memory_kib: u32,
-    /// Passes over it.
+    /// Passes over the memory.
     pub passes: u32,
-    /// Random, of its own for each passphrase.
+    /// Random bytes, new for each passphrase.
     pub salt: Vec<u8>,
-    /// The hash.
+    /// The hash itself, as bytes.
     pub hash: Vec<u8>,
 }
 
-/// An account with what it signs in by.
+/// An account with the hash of its passphrase.
 #[derive(Clone, PartialEq, Eq)]
 pub struct StoredAccount {
-    /// The account.
+    /// Its name, role and whether it is disabled.
     pub account: Account,
     /// The hash of its passphrase.
     pub hash: PassphraseHash,
-    /// Whether the account of somebody else set this passphrase.
+    /// Whether the account of another person set this passphrase.
     pub set_by_another: bool,
 }
 
@@ -51,7 +51,7 @@ pub struct AccountLine {
 /// A browser that is signed in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredSignIn {
-    /// Whose it is.
+    /// The account that is signed in.
     pub account: Account,
     /// When it began, by the wall clock.
     pub began: Timestamp,
@@ -59,12 +59,12 @@ pub struct StoredSignIn {
     pub used: Timestamp,
 }
 
-/// Something that happened to an account, as the chain keeps it.
+/// An event of an account, as the chain keeps it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AccountEvent {
-    /// It was made.
+    /// The account was created.
     Added(AccountRole),
-    /// Its role, or whether it may sign in, changed; or all its sign-ins were ended.
+    /// Its role changed, it was disabled or enabled, or all its sign-ins were ended.
     Changed(AccountChange),
     /// Its passphrase was replaced.
     PassphraseReplaced,
@@ -76,14 +76,14 @@ pub enum AccountEvent {
     Failed(FailedAttempt),
 }
 
-/// Where a wrong passphrase was given.
+/// What a wrong passphrase was given for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailedAttempt {
     /// To sign in.
     SignIn,
     /// To sign in to an account that is disabled.
     Disabled,
-    /// To lock or unblind.
+    /// To confirm a lock or an unblinding.
     Confirmation,
 }
 
@@ -115,5 +115,5 @@ impl AccountEvent {
     }
 }
 
-/// Who changes an account: a lead's account, or none for the command line.
+/// The account that makes a change, such as a lead's; `None` for the command line.
 pub type By<'a> = Option<&'a AccountName>;

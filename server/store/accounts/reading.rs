@@ -1,4 +1,4 @@
-//! Accounts and sign-ins read back.
+//! Reads accounts and sign-ins.
 
 use std::collections::HashMap;
 
@@ -11,8 +11,8 @@ use crate::store::values::parsed;
 use crate::store::{Reader, StoreError};
 use crate::trial::account::{Account, AccountName, AccountRole};
 
-/// Every column of an account, and whether somebody else's account set its passphrase: whoever made or replaced it last.
-/// The command line, where the person may have typed it, has no account.
+/// Every column of an account, and whether another account was the last to set its passphrase. The command line counts
+/// as no account, because the person may have typed the passphrase there.
 const ACCOUNT: &str = "SELECT accounts.*, (
         SELECT done_by IS NOT NULL AND done_by <> account FROM account_events
         WHERE account_events.account = accounts.account AND kind IN ('added', 'passphrase-replaced')
@@ -23,7 +23,7 @@ impl Reader {
     /// All accounts, by name.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn accounts(&self) -> Result<Vec<Account>, StoreError> {
         let rows = sqlx::query("SELECT * FROM accounts ORDER BY account").fetch_all(self.pool()).await?;
         rows.iter().map(account).collect()
@@ -32,7 +32,7 @@ impl Reader {
     /// All accounts, by name, as a lead sees them.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn account_lines(&self) -> Result<Vec<AccountLine>, StoreError> {
         let signed_in = sqlx::query(
             "SELECT account, max(wall) AS last_signed_in FROM account_events WHERE kind = 'signed-in' GROUP BY account",
@@ -51,19 +51,19 @@ impl Reader {
         rows.iter().map(line).collect()
     }
 
-    /// Whether somebody can sign in.
+    /// Whether any account is enabled, so that somebody can sign in.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn has_accounts(&self) -> Result<bool, StoreError> {
         let found = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM accounts WHERE disabled = 0)");
         Ok(found.fetch_one(self.pool()).await?)
     }
 
-    /// The account of this name, with what it signs in by.
+    /// The account of this name, with the hash of its passphrase; `None` if there is none.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn account(&self, name: &AccountName) -> Result<Option<StoredAccount>, StoreError> {
         let row = sqlx::query(AssertSqlSafe(format!("{ACCOUNT} WHERE account = ?"))).bind(name.as_str());
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
@@ -81,10 +81,11 @@ impl Reader {
         Ok(Some(StoredAccount { account: account(&row)?, hash, set_by_another: set_by_another(&row)? }))
     }
 
-    /// The sign-in whose token has this SHA-256, if it was not ended. Whether it has expired is not looked at.
+    /// The sign-in whose token has this SHA-256; `None` if there is none or it was ended. Does not check whether it has
+    /// expired.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn sign_in(&self, token_sha256: &str) -> Result<Option<StoredSignIn>, StoreError> {
         let row = sqlx::query("SELECT * FROM sign_ins JOIN accounts USING (account) WHERE token_sha256 = ?")
             .bind(token_sha256)

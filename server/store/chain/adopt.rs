@@ -1,4 +1,4 @@
-//! Databases of versions without a chain: what they hold is chained when they are opened, and marked as chained late.
+//! Databases of versions without a chain. When one is opened, its records get rows in the chain, marked as adopted.
 
 use sqlx::sqlite::SqliteConnection;
 
@@ -8,9 +8,8 @@ use super::records::{keys, one};
 use super::telemetry;
 use crate::store::StoreError;
 
-/// Chains what a database of a version without a chain holds, marked as adopted. A chain that has a row is left as
-/// it is:
-/// what is put beside it is never adopted.
+/// Appends rows for all records of a database of a version without a chain, marked as adopted. Does nothing if the
+/// chain has any row: a record that was added beside the chain is never adopted.
 pub async fn adopt(connection: &mut SqliteConnection, wall: &str) -> Result<(), StoreError> {
     if head(connection).await?.number > 0 {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Rows of the chain as they are written: in the transaction that writes their record.
+//! Writes rows of the chain, in the transaction that writes their record.
 
 use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
@@ -10,25 +10,25 @@ use crate::store::StoreError;
 
 /// A row to be written.
 pub struct NewRow<'a> {
-    /// When, by the wall clock.
+    /// When the row is written, by the wall clock.
     pub wall: &'a str,
     /// Kind of the record.
     pub kind: &'static str,
     /// The record's key.
     pub key: &'a str,
-    /// Empty where the record has no session.
+    /// The record's session; empty if it has none.
     pub session: &'a str,
-    /// Whether the record was there before the chain was.
+    /// Whether the record is older than the chain.
     pub adopted: bool,
     /// Hash of the sealed columns.
     pub sealed: String,
-    /// Salt of `sealed`; empty where the kind has no sealed columns.
+    /// Salt of `sealed`; empty if the kind has no sealed columns.
     pub sealed_salt: String,
     /// Hash of the record.
     pub content: String,
 }
 
-/// Chains the record of kind `name` with this key, which the transaction on `connection` has just written.
+/// Appends the row of the record of kind `name` with this key, which the transaction on `connection` has just written.
 pub async fn append(
     connection: &mut SqliteConnection,
     name: &'static str,
@@ -40,7 +40,7 @@ pub async fn append(
     append_record(connection, kind, key, &record, wall, false).await
 }
 
-/// Chains `record`, which has this key.
+/// Appends the row of `record`, which has this key.
 pub async fn append_record(
     connection: &mut SqliteConnection,
     kind: &Kind,
@@ -114,7 +114,7 @@ pub async fn insert(connection: &mut SqliteConnection, row: NewRow<'_>) -> Resul
     Ok(Head { number, hash })
 }
 
-/// The latest row.
+/// The latest row; `Head::none` if there is no row.
 pub async fn head(connection: &mut SqliteConnection) -> Result<Head, StoreError> {
     let latest = sqlx::query("SELECT number, hash FROM chain ORDER BY number DESC LIMIT 1");
     match latest.fetch_optional(connection).await? {

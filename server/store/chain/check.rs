@@ -1,4 +1,5 @@
-//! The chain computed again, row by row, against the records: the first row that is not as it was written is named.
+//! Computes the chain again, row by row, and compares it with the records. Names the first row that is not as it was
+//! written.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,60 +11,60 @@ use super::telemetry::Block;
 /// A row of the chain as it was found.
 #[derive(Debug, Clone)]
 pub struct FoundRow {
-    /// Its number.
+    /// Its number, as it is written in the row.
     pub number: String,
-    /// The hash of the row before, where the row says so itself.
+    /// Hash of the row before, as stored in this row; `None` in an export, which does not repeat it.
     pub previous: Option<String>,
-    /// What it says of its record; of another session's row the hash of that alone.
+    /// Its entry. For the rows of other sessions, an export has only the entry's hash.
     pub entry: Found,
-    /// Its hash.
+    /// Its hash, as it is written in the row.
     pub hash: String,
 }
 
-/// What a row tells of its record.
+/// What a row says about its record.
 #[derive(Debug, Clone)]
 pub enum Found {
-    /// All, and the salt of the sealed columns where it is not withheld.
+    /// The whole entry, and the salt of the sealed columns; `None` if the salt is withheld or erased.
     Whole(Entry, Option<String>),
-    /// Its hash alone.
+    /// Only the hash of the entry.
     Hash(String),
 }
 
-/// The check under way.
+/// The state of a check.
 pub struct Walk {
-    /// The records that no row has come for.
+    /// Records whose row has not come yet, by kind and key.
     records: BTreeMap<(&'static str, String), Record>,
     expected: Option<Head>,
     last: Head,
     adopted: usize,
-    /// Rows told whole.
+    /// Rows with a whole entry.
     whole: usize,
-    /// Records with sealed columns that could not be checked.
+    /// Records whose sealed columns could not be checked.
     withheld: usize,
     /// The records whose sealed columns were erased, by kind and key.
     erased: BTreeSet<(String, String)>,
-    /// How many of them came.
+    /// Rows of erased records seen so far.
     erased_rows: usize,
-    /// Of each session the rows so far.
+    /// Rows seen so far, per session.
     places: BTreeMap<String, i64>,
-    /// Of each kind and session the place of the latest record.
+    /// Order of the latest record, per kind and session.
     orders: BTreeMap<(&'static str, String), i64>,
-    /// Of each segment the steps in blocks.
+    /// Steps in the blocks seen so far, per segment.
     steps: BTreeMap<String, i64>,
 }
 
-/// A block of telemetry to be checked by whoever has its steps.
+/// A block of telemetry, which the caller checks because it has the steps.
 pub struct BlockToCheck {
-    /// Which.
+    /// The segment and the range of its steps.
     pub block: Block,
-    /// What the row says.
+    /// The row's entry.
     pub entry: Entry,
-    /// The salt of its sealed columns, if it is told.
+    /// Salt of its sealed columns; `None` if it is withheld.
     pub sealed_salt: Option<String>,
 }
 
 impl Walk {
-    /// Begins, with every record but telemetry. `expected` is a head known from elsewhere.
+    /// Begins a check. `records` are all records except telemetry. `expected` is a head known from elsewhere.
     pub fn new(records: BTreeMap<(&'static str, String), Record>, expected: Option<Head>) -> Self {
         Self {
             erased: erased(&records),
@@ -80,10 +81,10 @@ impl Walk {
         }
     }
 
-    /// Checks the next row and its record. A block of telemetry comes back for its steps to be checked.
+    /// Checks the next row and its record. Returns a block of telemetry, whose steps the caller has to check.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// If something is wrong. The text says what.
     pub fn row(&mut self, row: &FoundRow) -> Result<Option<BlockToCheck>, String> {
         self.link(row)?;
         match &row.entry {
@@ -95,7 +96,7 @@ impl Walk {
     fn link(&mut self, row: &FoundRow) -> Result<(), String> {
         let number = self.last.number + 1;
         if row.number != number.to_string() {
-            return Err(format!("chain: row {number} is missing; row {} stands in its place", row.number));
+            return Err(format!("chain: row {number} is missing; row {} was found instead", row.number));
         }
 
         let (named, entry) = match &row.entry {
@@ -145,7 +146,7 @@ impl Walk {
         let record = self
             .records
             .remove(&key)
-            .ok_or_else(|| format!("{named} is missing; row {number} of the chain tells of it"))?;
+            .ok_or_else(|| format!("{named} is missing, but row {number} of the chain is about it"))?;
 
         let changed = || Err(format!("{named} was changed since row {number} of the chain was written"));
         if record.session != entry.session || record.content(kind, &entry.sealed) != entry.content {
@@ -155,14 +156,14 @@ impl Walk {
         match (&record.sealed, salt) {
             _ if kind.sealed.is_empty() => {}
             (None, _) => self.withheld += 1,
-            // That it was erased is a record of its own, which has to have its row.
+            // The erasure is a record of its own, which must have its own row in the chain.
             (Some(columns), None) if self.erased.contains(&(entry.kind.clone(), entry.key.clone())) => {
                 if columns.iter().any(|column| !matches!(column.as_str(), "" | EMPTY_TEXT)) {
                     return Err(format!("{named} was erased, but has words"));
                 }
                 self.erased_rows += 1;
             }
-            (Some(_), None) => return Err(format!("{named}: its salt is missing, without which nothing proves it")),
+            (Some(_), None) => return Err(format!("{named}: its salt is missing, so it cannot be checked")),
             (Some(columns), Some(salt)) => {
                 if sealed(salt, columns.iter().map(String::as_str)) != entry.sealed {
                     return changed();
@@ -172,7 +173,7 @@ impl Walk {
 
         let latest = self.orders.entry((kind.name, record.session)).or_insert(record.order);
         if record.order < *latest {
-            return Err(format!("{named} stands in another order than it was kept in"));
+            return Err(format!("{named} is not in the order in which it was kept"));
         }
         *latest = record.order;
         Ok(None)
@@ -186,18 +187,18 @@ impl Walk {
         let steps = self.steps.entry(block.segment.clone()).or_default();
         if block.first != *steps + 1 {
             let missing = *steps + 1;
-            return Err(format!("chain: row {number} holds no step {missing} of segment {}", block.segment));
+            return Err(format!("chain: step {missing} of segment {} is missing from row {number}", block.segment));
         }
         *steps = block.last;
         Ok(BlockToCheck { block, entry: entry.clone(), sealed_salt: salt.cloned() })
     }
 
-    /// Steps of `segment` that the rows so far hold.
+    /// Steps of `segment` in the blocks seen so far.
     pub fn steps(&self, segment: &str) -> i64 {
         self.steps.get(segment).copied().unwrap_or(0)
     }
 
-    /// The latest row.
+    /// The latest row checked.
     pub const fn last(&self) -> &Head {
         &self.last
     }
@@ -207,14 +208,15 @@ impl Walk {
         self.withheld += 1;
     }
 
-    /// Ends the check: nothing may be left over, and the expected head must have come. What was found, in words.
+    /// Ends the check: no record may be left without a row, and the expected head must have come. Returns what was
+    /// found, in words.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// If something is wrong. The text says what.
     pub fn end(self) -> Result<String, String> {
         if let Some(((name, key), _)) = self.records.first_key_value() {
             let table = kind(name).map_or(*name, |kind| kind.table);
-            return Err(format!("{table}: {name} {key} was inserted: no row of the chain tells of it"));
+            return Err(format!("{table}: {name} {key} was inserted: the chain has no row for it"));
         }
         if let Some(expected) = self.expected.filter(|expected| expected.number > self.last.number) {
             return Err(format!(
@@ -228,19 +230,19 @@ impl Walk {
             said.push(format!("{} were recorded before there was a chain", self.adopted));
         }
         if self.erased_rows > 0 {
-            said.push(format!("of {} the words were erased", self.erased_rows));
+            said.push(format!("{} have erased words", self.erased_rows));
         }
         if self.withheld > 0 {
-            said.push(format!("of {} a part is withheld here", self.withheld));
+            said.push(format!("{} are withheld in part", self.withheld));
         }
         Ok(said.join("; "))
     }
 }
 
-/// An answer without words, as JSON.
+/// The value of an erased answer: an empty text, as JSON.
 const EMPTY_TEXT: &str = "\"\"";
 
-/// The records that erasures among `records` name, by kind and key.
+/// The records that were erased, by kind and key: those that the erasures among `records` name.
 fn erased(records: &BTreeMap<(&'static str, String), Record>) -> BTreeSet<(String, String)> {
     let Some(kind) = kind(ERASED) else { return BTreeSet::new() };
     let place = |column: &str| kind.open.iter().position(|name| *name == column);
@@ -253,11 +255,11 @@ fn erased(records: &BTreeMap<(&'static str, String), Record>) -> BTreeSet<(Strin
 }
 
 impl BlockToCheck {
-    /// Checks the block's steps by their hashes: how many there are, that of the open columns, and that of the sealed
-    /// ones where they are told.
+    /// Checks the block's steps: their number, the hash of their open columns, and the hash of their sealed columns.
+    /// `sealed` is `None` if an export withholds these.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// If something is wrong. The text says what.
     pub fn check(&self, steps: i64, open: &str, sealed: Option<&str>) -> Result<(), String> {
         let Block { segment, first, last } = &self.block;
         let named = format!("telemetry: steps {first} to {last} of segment {segment}");

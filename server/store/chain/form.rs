@@ -6,22 +6,22 @@ use std::str::FromStr;
 
 use sha2::{Digest, Sha256};
 
-/// The hash before the first row.
+/// Stands in the first row for the hash of the row before.
 pub const GENESIS: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// Hexadecimal digits of a hash that are shown to people: 128 bits, which nobody can meet on purpose.
+/// Hexadecimal digits of a hash that are shown to people: 128 bits, enough that nobody can forge a match.
 const SHOWN: usize = 32;
 
-/// Fewest digits of a hash that say which one is meant.
+/// Fewest hexadecimal digits of a hash that a person may give.
 const FEWEST: usize = 16;
 
-/// A hash over a list of fields, each as a netstring: its length in bytes, a colon, its bytes, a comma. So no two lists
-/// have the same bytes.
+/// A hash over a list of fields, each as a netstring: its length in bytes, a colon, its bytes, a comma. So two
+/// different lists never have the same bytes.
 #[derive(Clone)]
 pub struct Fields(Sha256);
 
 impl Fields {
-    /// A list that begins with `domain`, which says what is hashed.
+    /// Begins a list with `domain`, which says what is hashed.
     pub fn of(domain: &str) -> Self {
         Self(Sha256::new()).and(domain)
     }
@@ -58,7 +58,8 @@ pub fn netstring(field: &str, bytes: &mut Vec<u8>) {
     bytes.push(b',');
 }
 
-/// The hash of what of a record can be withheld or erased. Without the salt nobody can try what it may have been.
+/// The hash of a record's sealed columns, which can be withheld or erased. Without the salt, nobody can test guesses of
+/// what they hold.
 pub fn sealed<'a>(salt: &str, fields: impl IntoIterator<Item = &'a str>) -> String {
     let mut list = begin_sealed(salt);
     for field in fields {
@@ -67,7 +68,7 @@ pub fn sealed<'a>(salt: &str, fields: impl IntoIterator<Item = &'a str>) -> Stri
     list.hex()
 }
 
-/// The same, begun.
+/// Begins the hash of sealed columns, for fields that are added one by one.
 pub fn begin_sealed(salt: &str) -> Fields {
     Fields::of("parfocal-sealed-1").and(salt)
 }
@@ -82,7 +83,7 @@ pub fn content<'a>(kind: &str, columns: impl IntoIterator<Item = (&'a str, &'a s
     list.and(sealed).hex()
 }
 
-/// What a row of the chain says of its record, its place in the chain aside.
+/// What a row of the chain says about its record: everything except its number and the two hashes that link it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// When the row was written, by the wall clock.
@@ -91,22 +92,22 @@ pub struct Entry {
     pub kind: String,
     /// The record's key within its kind.
     pub key: String,
-    /// The record's session; empty where it has none.
+    /// The record's session; empty if it has none.
     pub session: String,
-    /// Number of the row among those of its session, from 1.
+    /// Number of the row among those of its session, from 1; `None` without a session.
     pub place: Option<i64>,
-    /// Whether the record was there before the chain was.
+    /// Whether the record is older than the chain.
     pub adopted: bool,
-    /// Random: keeps the row from being guessed where it is shown as a hash alone.
+    /// Random. Keeps an entry that is shown only as a hash from being guessed.
     pub salt: String,
-    /// Hash of the record's sealed columns; empty where its kind has none.
+    /// Hash of the record's sealed columns; empty if its kind has none.
     pub sealed: String,
     /// Hash of the record.
     pub content: String,
 }
 
 impl Entry {
-    /// Its hash, which stands for it where the row is another session's.
+    /// Hash of the entry. An export shows only this for the rows of other sessions.
     pub fn hash(&self) -> String {
         let place = self.place.map_or_else(String::new, |place| place.to_string());
         Fields::of("parfocal-entry-1")
@@ -123,17 +124,17 @@ impl Entry {
     }
 }
 
-/// The hash of row `number`, which holds the entry of hash `entry` and follows the row of hash `previous`.
+/// The hash of row `number`. `entry` is the hash of its entry, `previous` the hash of the row before.
 pub fn link(number: i64, previous: &str, entry: &str) -> String {
     Fields::of("parfocal-chain-1").and(&number.to_string()).and(previous).and(entry).hex()
 }
 
-/// The latest row of a chain. Whoever knows it can tell whether anything before it was changed.
+/// The latest row of a chain. A person who noted it can tell later whether anything before it was changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Head {
-    /// Its number.
+    /// Number of the row, from 1; 0 for a chain without a row.
     pub number: i64,
-    /// Its hash, or the beginning of it where a person gave it: hexadecimal.
+    /// Hash of the row, hexadecimal; only its beginning if a person gave it.
     pub hash: String,
 }
 
@@ -144,7 +145,7 @@ impl Head {
         Self { number: 0, hash: GENESIS.to_owned() }
     }
 
-    /// Whether it stands for the row `number` with this hash.
+    /// Whether it is the row `number` with this hash.
     #[must_use]
     pub fn is(&self, number: i64, hash: &str) -> bool {
         self.number == number && hash.starts_with(&self.hash)
@@ -162,7 +163,7 @@ impl FromStr for Head {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
-            || format!("'{text}' is no head; give NUMBER:HASH as it was printed, such as 1234:9f86d081884c7d65");
+            || format!("'{text}' is not a head; give NUMBER:HASH as it was printed, such as 1234:9f86d081884c7d65");
         let (number, hash) = text.trim().split_once(':').ok_or_else(wrong)?;
         let number = number.parse().ok().filter(|&number: &i64| number >= 0).ok_or_else(wrong)?;
         let hash = hash.to_ascii_lowercase();

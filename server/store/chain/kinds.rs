@@ -3,19 +3,19 @@
 /// A kind of record.
 #[derive(Debug)]
 pub struct Kind {
-    /// Its name.
+    /// Its name, as in the chain.
     pub name: &'static str,
-    /// Its table in exports.
+    /// Name of its table in exports.
     pub table: &'static str,
-    /// Columns that an export always tells.
+    /// Columns that an export never withholds.
     pub open: &'static [&'static str],
-    /// Columns that can be withheld or erased: hashed with a salt of their own.
+    /// Columns that can be withheld or erased. They are hashed with a salt of their own.
     pub sealed: &'static [&'static str],
-    /// Gives `chain_key`, `chain_session`, `chain_order` and every column as exports have it.
+    /// SQL that selects `chain_key`, `chain_session`, `chain_order` and every column as exports have it.
     pub select: &'static str,
-    /// Picks one record by its key, which has as many parts, divided by slashes, as there are parameters.
+    /// SQL condition that picks one record by its key. The parts of the key, divided by slashes, are its parameters.
     pub one: &'static str,
-    /// The order in which records are kept.
+    /// SQL expression for the order in which records are kept.
     pub order: &'static str,
 }
 
@@ -66,7 +66,7 @@ const SESSION: Kind = Kind {
     order: "rowid",
 };
 
-// Two columns tell the kind of an event. Where they differ, neither is believed.
+// Two columns hold the kind of an event. If they differ, neither is believed.
 const EVENT: Kind = Kind {
     name: "event",
     table: "events",
@@ -247,7 +247,7 @@ const ACTOR: Kind = Kind {
     order: "number",
 };
 
-// The sound itself is in no column here: its hash is, and stays when the sound is erased.
+// The sound itself is in none of these columns. Its hash is, and stays when the sound is erased.
 const VOICE_PIECE: Kind = Kind {
     name: "voice-piece",
     table: "voice_pieces",
@@ -273,7 +273,7 @@ const VOICE_PIECE: Kind = Kind {
     order: "number",
 };
 
-/// Every kind but telemetry, which is sealed in blocks.
+/// Every kind except telemetry, which is chained in blocks.
 pub const KINDS: [Kind; 17] = [
     RUN,
     PARTICIPANT,
@@ -300,11 +300,11 @@ pub fn kind(name: &str) -> Option<&'static Kind> {
     ALL.iter().find(|kind| kind.name == name)
 }
 
-/// A block of telemetry: steps of a segment that follow one another. Its key is `SEGMENT/FIRST/LAST`, counted from 1
+/// The kind of a block of telemetry: consecutive steps of a segment. Its key is `SEGMENT/FIRST/LAST`, counted from 1
 /// within the segment.
 pub const TELEMETRY: &str = "telemetry";
 
-/// The kind of record that tells that another one's sealed columns were erased.
+/// The kind of a record that says that the sealed columns of another one were erased.
 pub const ERASED: &str = "erasure";
 
 /// The kind of an event whose reason may name a policy.

@@ -1,5 +1,6 @@
-//! The chain: a row for each record that counts as evidence, each with the hash of the row before. Any change, loss,
-//! insertion or other order of records is found by computing it again. `docs/evidence.md` has the form and its limits.
+//! The chain: a row for each record that counts as evidence, each with the hash of the row before. Computing the chain
+//! again finds any record that was changed, lost, inserted or put elsewhere. `docs/evidence.md` has the form and its
+//! limits.
 
 mod adopt;
 mod append;

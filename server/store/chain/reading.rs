@@ -1,4 +1,4 @@
-//! What readers ask of the chain.
+//! Reads the chain.
 
 use super::append::head;
 use super::form::Head;
@@ -10,7 +10,7 @@ impl Reader {
     /// The latest row of the chain.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn head(&self) -> Result<Head, StoreError> {
         head(&mut *self.pool().acquire().await?).await
     }
@@ -20,7 +20,7 @@ impl Reader {
         Ok(sqlx::query_scalar("SELECT hash FROM chain ORDER BY number").fetch_all(self.pool()).await?)
     }
 
-    /// Whether `session` has steps of telemetry that are not chained.
+    /// Whether `session` has steps of telemetry that are not chained yet.
     pub(in crate::store) async fn has_unsealed(&self, session: SessionId) -> Result<bool, StoreError> {
         let mut connection = self.pool().acquire().await?;
         Ok(!unsealed(&mut connection, &session.to_string()).await?.is_empty())

@@ -10,21 +10,21 @@ use super::form::content;
 use super::kinds::{KINDS, Kind};
 use crate::store::StoreError;
 
-/// A record, each column as the CSV files have it.
+/// A record, with each column as the CSV files have it.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
-    /// Its session; empty where it has none.
+    /// Its session; empty if it has none.
     pub session: String,
-    /// Its place among the records of its kind and session, as they are kept.
+    /// Orders it among the records of its kind and session, as they are kept.
     pub order: i64,
     /// Its open columns.
     pub open: Vec<String>,
-    /// Its sealed columns; none where an export withholds them.
+    /// Its sealed columns; `None` if an export withholds them.
     pub sealed: Option<Vec<String>>,
 }
 
 impl Record {
-    /// Its hash, of kind `kind`, with this hash of its sealed columns.
+    /// Its hash. `kind` is its kind, and `sealed` the hash of its sealed columns.
     pub fn content(&self, kind: &Kind, sealed: &str) -> String {
         content(kind.name, kind.open.iter().copied().zip(self.open.iter().map(String::as_str)), sealed)
     }
@@ -49,7 +49,7 @@ pub async fn keys(connection: &mut SqliteConnection, kind: &Kind) -> Result<Vec<
     Ok(rows.iter().map(|row| row.try_get("chain_key")).collect::<Result<_, _>>()?)
 }
 
-/// Every record but telemetry, by kind and key.
+/// Every record except telemetry, by kind and key.
 pub async fn all(connection: &mut SqliteConnection) -> Result<BTreeMap<(&'static str, String), Record>, StoreError> {
     let mut found = BTreeMap::new();
     for kind in KINDS {
@@ -75,7 +75,7 @@ fn record(kind: &Kind, row: &SqliteRow) -> Result<(String, Record), StoreError> 
     Ok((row.try_get("chain_key")?, record))
 }
 
-/// A value as the CSV files have it. Nothing and an empty text are one.
+/// A value as the CSV files have it. Null and an empty text both become an empty text.
 pub fn cell(value: SqliteValueRef<'_>) -> Result<String, StoreError> {
     if value.is_null() {
         return Ok(String::new());

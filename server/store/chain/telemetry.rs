@@ -1,6 +1,7 @@
-//! Telemetry in the chain: the steps of a segment in blocks, as one row for each step would be too many.
+//! Telemetry in the chain. The steps of a segment are chained in blocks, because one row for each step would be too
+//! many.
 //!
-//! A block is hashed in two parts: what every export tells of its steps, and, with a salt, what tells the policy.
+//! A block is hashed in two parts: the columns that every export has, and, with a salt, those that reveal the policy.
 
 use futures_util::TryStreamExt;
 use sqlx::Row;
@@ -21,7 +22,8 @@ pub const OPEN: [&str; 7] = ["run", "frame", "exposed_ns", "asked", "measured", 
 /// Columns of `policy_steps.csv` that are hashed.
 pub const SEALED: [&str; 5] = ["policy", "metric", "policy_micros", "latency_micros", "held"];
 
-/// The columns of both, the latter with `step_` before their names. Steps `?2 + 1` to `?2 + ?3` of segment `?1`.
+/// Selects the columns of both, those of `SEALED` with `step_` before their names. Gives steps `?2 + 1` to `?2 + ?3` of
+/// segment `?1`.
 const STEPS: &str = "SELECT t.run, t.frame, t.exposed_ns, t.asked, t.measured,
         iif(coalesce(t.held IN ('paused', 'lens-failed', 'camera-failed'), FALSE), 'true', 'false') AS held, t.optimal,
         p.name AS step_policy, t.metric AS step_metric, t.policy_micros AS step_policy_micros,
@@ -32,7 +34,7 @@ const STEPS: &str = "SELECT t.run, t.frame, t.exposed_ns, t.asked, t.measured,
 /// Which steps of a segment a block holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Block {
-    /// The segment.
+    /// Id of the segment.
     pub segment: String,
     /// Its first step, from 1.
     pub first: i64,
@@ -41,7 +43,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// The block whose row has this key.
+    /// The block whose row has this key, `SEGMENT/FIRST/LAST`; `None` if the key has another form.
     pub fn of(key: &str) -> Option<Self> {
         let (segment, steps) = key.split_once('/')?;
         let (first, last) = steps.split_once('/')?;
@@ -49,7 +51,7 @@ impl Block {
         (1 <= block.first && block.first <= block.last && block.key() == key).then_some(block)
     }
 
-    /// Its row's key.
+    /// Its row's key, `SEGMENT/FIRST/LAST`.
     pub fn key(&self) -> String {
         format!("{}/{}/{}", self.segment, self.first, self.last)
     }
@@ -59,7 +61,7 @@ impl Block {
         self.last - self.first + 1
     }
 
-    /// The hash of its row's record. `open` is the hash of what every export tells of its steps.
+    /// Its hash as a record. `open` is the hash of its open columns, `sealed` that of its sealed columns.
     pub fn content(&self, open: &str, sealed: &str) -> String {
         let first = self.first.to_string();
         let last = self.last.to_string();
@@ -68,14 +70,14 @@ impl Block {
     }
 }
 
-/// The hash over open columns, begun.
+/// Begins the hash over open columns.
 pub fn begin_open() -> Fields {
     Fields::of("parfocal-steps-1")
 }
 
 /// The hashes of a block.
 pub struct Hashes {
-    /// Steps that were found of it.
+    /// Steps of the block that were found.
     pub steps: i64,
     /// The hash of its open columns.
     pub open: String,
@@ -107,7 +109,7 @@ fn add(list: &mut Fields, row: &SqliteRow, from: usize, count: usize) -> Result<
     Ok(())
 }
 
-/// Chains the steps of `session` that have no block yet. How many there were.
+/// Chains the steps of `session` that have no block yet. Returns how many there were.
 pub async fn seal(
     connection: &mut SqliteConnection,
     session: &str,
@@ -140,7 +142,7 @@ pub async fn seal(
     Ok(sealed_now)
 }
 
-/// The segments of `session` with steps that have no block: each with its steps and how many of them have one.
+/// The segments of `session` that have steps without a block: id, number of steps, number of steps in blocks.
 pub async fn unsealed(connection: &mut SqliteConnection, session: &str) -> Result<Vec<(String, i64, i64)>, StoreError> {
     let blocks = sqlx::query_scalar("SELECT key FROM chain WHERE session = ? AND kind = ?");
     let blocks: Vec<String> = blocks.bind(session).bind(TELEMETRY).fetch_all(&mut *connection).await?;

@@ -1,5 +1,5 @@
-//! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or
-//! a reason that may name them.
+//! The blinded part of an export. Its types have no field for a policy, the order, the seed, or a reason that may name
+//! them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,19 +33,19 @@ use crate::trial::question::{AnswerValue, QuestionKind};
 use crate::trial::remark::WaitClock;
 use crate::trial::standing::Standing;
 
-/// What an export says of itself first.
+/// The beginning of an export's description of itself.
 const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, \
     comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json \
     holds all tables but telemetry and policy_steps.";
 
-/// A session without what unblinding tells.
+/// A session without anything that unblinding reveals.
 pub struct Blinded {
     line: SessionLine,
     run: i64,
     monotonic_ns: i64,
     protocol_toml: String,
     protocol_sha256: String,
-    /// `None` where this version cannot read it; then questions stand without their text.
+    /// `None` if this version cannot read it. Then the questions have no text.
     protocol: Option<Protocol>,
     algorithm: &'static str,
     commitment: String,
@@ -74,7 +74,7 @@ impl Blinded {
 
         let clocks = reader.run_clocks().await?;
 
-        // What tells the policies goes no further than this.
+        // Nothing that reveals the policies gets past this point.
         let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
 
         Ok(Self {
@@ -110,7 +110,7 @@ impl Blinded {
         self.line.session
     }
 
-    /// Writes all its files but the description; `recordings` are the session's.
+    /// Writes all its files except the description. `recordings` are the session's recordings.
     pub async fn write(
         &self,
         reader: &Reader,
@@ -160,7 +160,7 @@ impl Blinded {
         telemetry.end().await
     }
 
-    /// The description of the whole, without its tables.
+    /// The description of the whole export, without its tables.
     pub fn package(&self, unblinded: bool, head: &Head) -> Value {
         let name = super::folder::folder_name(self.session(), unblinded);
         json!({
@@ -181,7 +181,7 @@ impl Blinded {
         })
     }
 
-    /// Which rows of the chain the export tells whole.
+    /// The rows of the chain that the export shows whole.
     fn own_rows(&self, runs: &[RunRow], devices: &[(i64, i64, DeviceEvent)]) -> OwnRows {
         let unblinding = |(_, event): &&(i64, Event)| matches!(event.kind, EventKind::Unblinded { .. });
         let key = |(_, event): &(i64, Event)| format!("{}/{}", self.session(), event.number);
@@ -332,7 +332,7 @@ impl Blinded {
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
-    /// When the words of a record were erased.
+    /// When the words of a record were erased; `None` if they were not.
     pub(super) fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
         let mut erasures = self.erasures.iter().map(|stored| &stored.erasure);
         let its_own = |erasure: &&Erasure| erasure.subject == subject && erasure.record == record;
@@ -340,7 +340,7 @@ impl Blinded {
     }
 
     fn score_rows(&self) -> Vec<ScoreRow> {
-        // What was asked cannot be known where this version cannot read the protocol.
+        // If this version cannot read the protocol, it cannot know the questions.
         let Some(protocol) = &self.protocol else { return Vec::new() };
         let scored = Scored {
             session: self.session(),
@@ -449,14 +449,14 @@ struct OwnRows {
     session: String,
     runs: BTreeSet<String>,
     devices: BTreeSet<String>,
-    /// Its unblinding, whose reason may name a policy.
+    /// Keys of its unblinding, whose reason may name a policy.
     unblindings: BTreeSet<String>,
-    /// Its study, and the events of that which the export tells.
+    /// Keys of its study, and of the study's events that the export shows.
     study: BTreeSet<String>,
 }
 
 impl OwnRows {
-    /// What a blinded export tells of `row`.
+    /// What a blinded export shows of `row`.
     fn told_of(&self, row: ChainRow) -> ChainRow {
         let kind = row.kind.as_deref().unwrap_or_default();
         let key = row.key.as_deref().unwrap_or_default();
@@ -475,7 +475,7 @@ impl OwnRows {
     }
 }
 
-/// Writes a table, and copies it into `copies`, which become session.json.
+/// Writes a table, and copies it into `copies`, which becomes session.json.
 async fn copy<R: Row>(folder: &mut Folder, copies: &mut Map<String, Value>, rows: &[R]) -> Result<(), ExportError> {
     copies.insert(R::TABLE.name.to_owned(), objects(rows));
     folder.table(rows).await

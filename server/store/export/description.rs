@@ -1,5 +1,5 @@
-//! The data dictionary: every table of an export, a struct a row. A new column is a new field here,
-//! and the compiler shows where its value is still missing.
+//! The data dictionary: every table of an export, with a struct for its rows. A new column is a new field here, and the
+//! compiler shows where its value is still missing.
 
 use jiff::Timestamp;
 use serde_json::Value;
@@ -92,8 +92,8 @@ table! {
         unblinded: &'static str =
             means("no; after-end; emergency-after-end; or while-under-way, which is emergency unblinding, too"),
         counts_until: Option<Timestamp> = means(
-            "Until when what arrived counts: the session's end and the protocol's grace_minutes, or \
-             unblinding if that came first; empty while the session is under way",
+            "Deadline for what counts: the session's end plus the protocol's grace_minutes, or unblinding \
+             if that came first; empty while the session is under way",
         )
         .in_unit("UTC")
         .since(2),
@@ -103,8 +103,8 @@ table! {
 table! {
     name: "segments",
     description:
-        "The session's settings in order, one policy's segment each; which, allocation.csv tells after \
-         unblinding",
+        "The session's settings in order, each a segment of one policy; after unblinding, allocation.csv \
+         says which policy",
     key: [segment],
     row:
     /// A segment of a session.
@@ -352,14 +352,14 @@ table! {
         role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
         kind: &'static str = means(
             "created, started, segment-started, segment-finished, questions-finished, paused, resumed, \
-             server-restarted, completed, aborted or unblinded",
+             server-restarted, completed, aborted, withdrawn or unblinded",
         ),
         setting: Option<usize> = SETTING,
         segment: Option<SegmentId> = SEGMENT,
         inspected_ms: Option<u64> =
             means("Time inspected in the segment by then, without pauses").in_unit("ms"),
         reason: Option<String> = means(
-            "Reason given; an unblinding's stands in allocation.json alone, as it may name a policy",
+            "Reason given; that of an unblinding is only in allocation.json, as it may name a policy",
         ),
         emergency: Option<bool> = means("For an unblinding: whether the session was still under way"),
     }
@@ -490,7 +490,7 @@ table! {
         wall: Timestamp = WALL.since(5),
         run: Option<i64> = means("Start of the server that recorded it; empty for the command line").since(5),
         monotonic_ns: Option<i64> = MONOTONIC.since(5),
-        role: String = means("By which way: researcher, or command-line").since(5),
+        role: String = means("How it was recorded: researcher (on the page), or command-line").since(5),
         person: String = means("Who, as the person said").since(5),
         kind: String = means(
             "planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded, which is \
@@ -505,7 +505,7 @@ table! {
 
 table! {
     name: "actors",
-    description: "Under which personal account a record was made; a record without a row was made by whoever held a \
+    description: "Under which personal account a record was made; a record without a row was made through a \
                   role's link, by the command line, or by the server",
     key: [number],
     row:
@@ -594,8 +594,9 @@ table! {
         wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC").since(4),
         kind: Option<String> =
             means(
-            "Kind of the record: run, session, event, comment, answer, device, access, correction, consent, \
-             erasure, telemetry, study, study-event or study-session",
+            "Kind of the record: run, participant, session, event, comment, answer, device, access, \
+             correction, consent, erasure, telemetry, study, study-event, study-session, account-event, \
+             actor or voice-piece",
         )
         .since(4),
         key: Option<String> = means("The record's key").since(4),
@@ -612,7 +613,7 @@ table! {
 
 table! {
     name: "chain_salts",
-    description: "The salts of sealed columns that are told only after unblinding",
+    description: "The salts of sealed columns, which are withheld until unblinding",
     key: [number],
     row:
     /// The salt of a row's sealed columns.
@@ -631,7 +632,7 @@ table! {
          the loop waited, may suggest one to an expert",
     key: [run, frame],
     row:
-    /// A step of the control loop, without what tells the policy.
+    /// A step of the control loop, without the columns that reveal the policy.
     #[derive(Debug, Clone, sqlx::FromRow)]
     TelemetryRow {
         setting: i64 = SETTING,
@@ -687,10 +688,10 @@ table! {
 
 table! {
     name: "policy_steps",
-    description: "What of each step tells the policy; belongs to telemetry.csv by run and frame",
+    description: "The columns of each step that reveal the policy; join with telemetry.csv by run and frame",
     key: [run, frame],
     row:
-    /// What of a step of the control loop tells the policy.
+    /// The columns of a step of the control loop that reveal the policy.
     #[derive(Debug, Clone, sqlx::FromRow)]
     PolicyStepRow {
         setting: i64 = SETTING,

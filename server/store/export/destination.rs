@@ -17,13 +17,13 @@ use zip::{CompressionMethod, ZipWriter};
 use super::ExportError;
 use crate::files::{files_below, sync_folder_of};
 
-/// Pieces of a ZIP file that may wait for whoever downloads it.
+/// Pieces of a ZIP file that may wait to be downloaded.
 const PIECES: usize = 4;
 
-/// Bytes of a ZIP file that go on their way together.
+/// Bytes of a ZIP file that are sent together.
 const PIECE: usize = 64 * 1024;
 
-/// Whoever has taken nothing of a download for so long has left. Until then the database keeps what the export reads.
+/// A download that takes nothing for this long is given up. Until then, the database has to keep what the export reads.
 const STALLED: Duration = Duration::from_mins(1);
 
 /// Where an export goes, file by file.
@@ -44,7 +44,7 @@ impl Destination {
         .map_err(|error| self.unwritable(name, error))
     }
 
-    /// Adds `bytes` to the file begun last, `name`.
+    /// Adds `bytes` to `name`, the file begun last.
     pub async fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ExportError> {
         match self {
             Self::Folder(folder) => folder.write(bytes),
@@ -53,7 +53,7 @@ impl Destination {
         .map_err(|error| self.unwritable(name, error))
     }
 
-    /// Ends the file begun last, `name`: a folder waits until the disk has it.
+    /// Ends `name`, the file begun last. In a folder, waits until it is on disk.
     pub fn end(&mut self, name: &str) -> Result<(), ExportError> {
         match self {
             Self::Folder(folder) => folder.end(),
@@ -62,7 +62,7 @@ impl Destination {
         .map_err(|error| self.unwritable(name, error))
     }
 
-    /// Ends the whole: the folder is put in its place, the ZIP file gets its directory.
+    /// Completes the export: moves the folder to its place, or writes the directory of the ZIP file.
     pub async fn finish(self) -> Result<(), ExportError> {
         match self {
             Self::Folder(folder) => folder.finish(),
@@ -91,7 +91,7 @@ pub fn check_new(out: &Path) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// A folder being written: beside its place and under another name until it is whole.
+/// A folder being written, beside its place and under another name until it is complete.
 pub struct NewFolder {
     out: PathBuf,
     temporary: TempDir,
@@ -99,7 +99,7 @@ pub struct NewFolder {
 }
 
 impl NewFolder {
-    /// A folder that is to be `out`, which must be new or empty.
+    /// Begins the folder that becomes `out`, which must be new or empty.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
         check_new(out)?;
@@ -131,7 +131,7 @@ impl NewFolder {
         sync_folder_of(&self.temporary.path().join("any"));
         let whole = self.temporary.keep();
         std::fs::rename(&whole, &self.out).map_err(|error| {
-            // It is all that is left to do for it.
+            // Nothing else can be done for it. If this fails too, the folder stays.
             let _ = std::fs::remove_dir_all(&whole);
             ExportError::Unwritable { path: self.out.clone(), error }
         })?;
@@ -141,9 +141,10 @@ impl NewFolder {
     }
 }
 
-/// A ZIP file on its way to whoever downloads it: what was taken is forgotten, and what is not taken is not made.
+/// A ZIP file that is made while it is downloaded. Nothing is kept of what was taken, and no more is made until it is
+/// taken.
 pub struct ZipStream {
-    /// The folder in which its files stand.
+    /// The folder in the archive that holds its files.
     root: String,
     archive: ZipWriter<StreamWriter<Made>>,
     made: Made,
@@ -154,13 +155,13 @@ pub struct ZipStream {
 enum Piece {
     /// The next bytes.
     Bytes(Bytes),
-    /// There are no more. Without it the file was cut off.
+    /// There are no more. If this never comes, the file was cut off.
     End,
 }
 
 impl ZipStream {
-    /// A ZIP file whose files stand in a folder named `root`, and its bytes as they come: an error
-    /// where it was cut off.
+    /// A ZIP file whose files are in a folder named `root`, and a stream of its bytes. The stream ends with an error if
+    /// the file was cut off.
     pub fn new(root: String) -> (Self, impl Stream<Item = io::Result<Bytes>> + Send + use<>) {
         let (pieces, receiver) = mpsc::channel(PIECES);
         let made = Made::default();
@@ -177,16 +178,16 @@ impl ZipStream {
         (Self { root, archive, made, pieces }, bytes)
     }
 
-    /// Sends every file of `folder` and of the folders in it, no faster than they are taken.
+    /// Sends every file in `folder` and in its subfolders, no faster than the download takes them.
     ///
     /// # Errors
-    /// When a file cannot be read, or nothing is taken any more; then the ZIP file is cut off.
+    /// If a file cannot be read, or the download stops. Then the ZIP file is cut off.
     pub async fn send_folder(mut self, folder: &Path) -> io::Result<()> {
         let mut block = vec![0; PIECE];
         for name in files_below(folder)? {
             let mut file = File::open(folder.join(&name))?;
-            // A study's telemetry is large: what a slower level saves is not worth the wait. Sizes beyond 4 GB must be
-            // told beforehand.
+            // A study's telemetry is large, and what a slower level saves is not worth the wait. The archive has to
+            // know beforehand that a file is larger than 4 GB.
             let large = file.metadata()?.len() >= u64::from(u32::MAX);
             let options = options().compression_level(Some(1)).large_file(large);
             self.archive.start_file(format!("{}/{}", self.root, name.display()), options)?;
@@ -228,12 +229,12 @@ fn options() -> SimpleFileOptions {
 }
 
 async fn send(pieces: &mpsc::Sender<Piece>, piece: Piece) -> io::Result<()> {
-    let left = |_| io::Error::new(io::ErrorKind::BrokenPipe, "whoever downloaded it left");
-    let stalled = |_| io::Error::new(io::ErrorKind::TimedOut, "nothing of the download was taken for a minute");
+    let left = |_| io::Error::new(io::ErrorKind::BrokenPipe, "the download was closed");
+    let stalled = |_| io::Error::new(io::ErrorKind::TimedOut, "the download stalled for a minute");
     timeout(STALLED, pieces.send(piece)).await.map_err(stalled)?.map_err(left)
 }
 
-/// What was made of a ZIP file and not yet sent.
+/// Bytes of a ZIP file that were made and not yet sent.
 #[derive(Clone, Default)]
 struct Made(Arc<Mutex<Vec<u8>>>);
 

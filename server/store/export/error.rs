@@ -15,7 +15,7 @@ pub enum ExportError {
     NoSession {
         /// The session asked for.
         session: SessionId,
-        /// The sessions there are.
+        /// The sessions that exist, as text.
         known: String,
     },
     /// Policies were asked for before unblinding.
@@ -27,25 +27,25 @@ pub enum ExportError {
          sessions of its protocol tell that it was withdrawn, and its place"
     )]
     Withdrawn {
-        /// The session.
+        /// The withdrawn session.
         session: SessionId,
-        /// When.
+        /// When the withdrawal was recorded.
         at: Timestamp,
-        /// By whom.
+        /// The role that recorded it.
         by: &'static str,
     },
-    /// The folder to write holds something.
+    /// The folder to write is not empty, or a file has its name.
     #[error("{} exists and is not empty; choose a new folder", .0.display())]
     Exists(PathBuf),
-    /// Something else was recorded each time that the export was about to be read.
+    /// Each time that the export was about to be read, something else had been recorded.
     #[error("the session is being written to without a pause; try again")]
     Busy,
     /// A file could not be written.
     #[error("cannot write {}: {error}", .path.display())]
     Unwritable {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The error of the file system.
         error: std::io::Error,
     },
     /// The database failed.

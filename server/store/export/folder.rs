@@ -1,5 +1,4 @@
-//! The files of an export as they are written, to a folder or into a ZIP file: each described, with
-//! its checksum.
+//! Writes the files of an export, to a folder or into a ZIP file, with the description of the tables and the checksums.
 
 use std::marker::PhantomData;
 use std::path::Path;
@@ -15,7 +14,7 @@ use crate::ids::SessionId;
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
 
-/// Bytes of a table that are gathered before they go on.
+/// Bytes of a table that are gathered before they are passed on.
 const BLOCK: usize = 64 * 1024;
 
 /// An export being written.
@@ -33,12 +32,12 @@ struct Written {
 }
 
 impl Folder {
-    /// An export to the folder `out`, which must be new or empty.
+    /// Begins an export to the folder `out`, which must be new or empty.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         Ok(Self::to(Destination::Folder(NewFolder::beside(out)?)))
     }
 
-    /// An export into the ZIP file `zip`.
+    /// Begins an export into the ZIP file `zip`.
     pub fn zipped(zip: ZipStream) -> Self {
         Self::to(Destination::Zip(Box::new(zip)))
     }
@@ -68,7 +67,7 @@ impl Folder {
         Ok(file)
     }
 
-    /// Writes a table whole.
+    /// Writes a whole table.
     pub async fn table<R: Row>(&mut self, rows: &[R]) -> Result<(), ExportError> {
         let mut file = self.begin()?;
         for row in rows {
@@ -98,7 +97,7 @@ impl Folder {
         self.json("datapackage.json", &package).await
     }
 
-    /// Writes the checksums and ends the whole. Its files come back.
+    /// Writes the checksums and completes the export. Returns the names of its files.
     pub async fn finish(mut self) -> Result<Vec<String>, ExportError> {
         self.files.sort();
         let lines: Vec<String> = self.files.iter().map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
@@ -130,15 +129,15 @@ impl Folder {
 pub struct CsvFile<'a, R> {
     folder: &'a mut Folder,
     name: String,
-    /// Rows that have not gone on yet.
+    /// Rows that are not passed on yet.
     csv: csv::Writer<Vec<u8>>,
-    /// Room for a cell.
+    /// Buffer for one cell.
     cell: Vec<u8>,
-    /// At least the bytes in them.
+    /// Bytes of the cells in `csv`; with quotes, `csv` may have more.
     gathered: usize,
     sha256: Sha256,
     bytes: usize,
-    /// A file takes the rows of its own table.
+    /// Makes the file take only the rows of its own table.
     rows: PhantomData<fn(&R)>,
 }
 
@@ -153,7 +152,7 @@ impl<R: Row> CsvFile<'_, R> {
         Ok(())
     }
 
-    /// Waits until all of it has gone on.
+    /// Ends the file. Returns when all of it is passed on.
     pub async fn end(mut self) -> Result<(), ExportError> {
         self.pass_on().await?;
         self.folder.destination.end(&self.name)?;
@@ -187,7 +186,7 @@ fn new_block() -> csv::Writer<Vec<u8>> {
     csv::Writer::from_writer(Vec::with_capacity(BLOCK))
 }
 
-/// Name for an export of `session`, without an ending.
+/// Name for an export of `session`, without a file extension.
 #[must_use]
 pub fn folder_name(session: SessionId, unblinded: bool) -> String {
     format!("parfocal-{session}{}", if unblinded { "-unblinded" } else { "" })

@@ -1,5 +1,5 @@
-//! Export: a session as a folder of CSV and JSON with a description of every column and checksums.
-//! Blinded unless asked otherwise after unblinding; the blinded files are the same in both kinds.
+//! Export: a session as a folder of CSV and JSON with a description of every column and checksums. An export is
+//! blinded, unless the policies are asked for after unblinding. The blinded files are the same in both kinds.
 
 mod blinded;
 mod description;
@@ -36,32 +36,32 @@ pub use self::verify::ExportFiles;
 use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::ids::SessionId;
 
-/// How often an export is recorded anew because something else was recorded in the same moment.
+/// How often an export is recorded at most, if something else is recorded at the same moment each time.
 const ATTEMPTS: usize = 50;
 
 /// What was exported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Summary {
-    /// The session.
+    /// The exported session.
     pub session: SessionId,
-    /// The folder.
+    /// Path of its folder.
     pub folder: PathBuf,
     /// Whether policies are in it.
     pub unblinded: bool,
     /// Whether the session is practice.
     pub practice: bool,
-    /// Its files.
+    /// Names of its files.
     pub files: Vec<String>,
-    /// The chain's head then.
+    /// Head of the chain in it, `NUMBER:HASH`.
     pub head: String,
 }
 
-/// An export about to be written: a session as it stands at one moment.
+/// An export about to be written: a session as it was at one moment.
 pub struct Export {
     session: SessionId,
     /// The database at that moment.
     snapshot: Reader,
-    /// The chain's latest row then, which is this export's own record.
+    /// The chain's latest row at that moment: the record of this export.
     head: Head,
     blinded: Blinded,
     telling: Option<Unblinded>,
@@ -69,21 +69,22 @@ pub struct Export {
 }
 
 impl Export {
-    /// Records that `session` is exported, and reads what is exported of it, all but its telemetry.
+    /// Records that `session` is exported, and reads what is exported of it, except its telemetry.
     ///
     /// # Errors
-    /// When there is no such session, or it is asked for unblinded before it was.
+    /// If there is no such session, its participant withdrew, or the policies are asked for before unblinding.
     pub async fn prepare(recorder: &Recorder, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
         read(recorder.reader(), session, unblinded).await?;
-        // Once: a long recording takes a while to open.
+        // Read only once, because a long recording takes a while to open.
         let recordings = recordings::rows(recorder.folder(), session).await;
 
-        // The export ends with its own record, so that nobody can take away what came before it. Where something else
-        // was recorded in between, it is recorded again.
+        // The chain in an export ends with the record of that export, so that nobody can cut off rows unnoticed. If
+        // something else was recorded in between, the export is recorded again.
         for _ in 0..ATTEMPTS {
             let head = recorder.record(&Access::Exported { session, unblinded }).await?;
-            // A session may be under way: what is said meanwhile is in all of the files or in none.
+            // The session may be under way. The snapshot makes sure that what is said meanwhile is in all files or in
+            // none.
             let snapshot = recorder.reader().snapshot().await?;
             match Self::of(&snapshot, head, session, unblinded).await {
                 Ok(Some(export)) => return Ok(Self { recordings, ..export }),
@@ -97,7 +98,8 @@ impl Export {
         Err(ExportError::Busy)
     }
 
-    /// The export as `snapshot` has it, unless something came after the row `head`.
+    /// The export as `snapshot` has it. `None` if a row came after `head`, or if the session is over and has telemetry
+    /// that is not chained yet.
     async fn of(
         snapshot: &Reader,
         head: Head,
@@ -115,7 +117,7 @@ impl Export {
     /// Writes the folder `out`, which must be new or empty. It appears whole or not at all.
     ///
     /// # Errors
-    /// When `out` cannot be written or the database fails.
+    /// If `out` cannot be written or the database fails.
     pub async fn into_folder(self, out: &Path) -> Result<Summary, ExportError> {
         let outcome = match Folder::beside(out) {
             Ok(folder) => self.write(folder).await,
@@ -133,11 +135,10 @@ impl Export {
         })
     }
 
-    /// Sends the same files into `zip`, no faster than they are taken, so that nothing gathers
-    /// anywhere.
+    /// Sends the same files into `zip`, no faster than the download takes them, so that memory use stays small.
     ///
     /// # Errors
-    /// When they are no longer taken or the database fails; then the ZIP file is cut off.
+    /// If the download stops or the database fails. Then the ZIP file is cut off.
     pub async fn into_zip(self, zip: ZipStream) -> Result<(), ExportError> {
         let outcome = self.write(Folder::zipped(zip)).await;
         self.snapshot.close().await;
@@ -166,7 +167,7 @@ async fn read(
         return Err(ExportError::Withdrawn { session, at, by: by.name() });
     }
 
-    // `None` unless the session was unblinded: whoever has no `Unblinded` can write no policy.
+    // `None` unless the session was unblinded. Without an `Unblinded`, no policy can be written.
     let telling = if unblinded { Some(Unblinded::of(reader, &stored).await?) } else { None };
     let telling = match telling {
         Some(None) => return Err(ExportError::StillBlinded(session)),
@@ -181,15 +182,15 @@ async fn read(
 /// not at all.
 ///
 /// # Errors
-/// When there is no such session, it is asked for unblinded before it was, or `out` cannot be
-/// written.
+/// If there is no such session, its participant withdrew, the policies are asked for before unblinding, or `out` cannot
+/// be written.
 pub async fn export(
     recorder: &Recorder,
     session: SessionId,
     out: &Path,
     unblinded: bool,
 ) -> Result<Summary, ExportError> {
-    // What cannot be written is not recorded.
+    // An export that cannot be written is not recorded.
     destination::check_new(out)?;
     Export::prepare(recorder, session, unblinded).await?.into_folder(out).await
 }

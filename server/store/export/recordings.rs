@@ -1,5 +1,5 @@
-//! The recordings of a session, as an export names them. Nothing in a row tells policies apart: the protocol decides
-//! what is recorded, and the frames stay where they are.
+//! The recordings of a session, as an export lists them. Nothing in a row reveals a policy: the protocol decides what
+//! is recorded, and the frames stay in the data folder.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use super::description::RecordingRow;
 use crate::ids::SessionId;
 use crate::recording::{AnyRecording, FOLDER, Found, of_session};
 
-/// A row for each recording of `session` in the data folder `data`. What cannot be read has a row that says so: a
-/// recording that is broken must not keep anybody from exporting what was said.
+/// A row for each recording of `session` in the data folder `data`. A recording that cannot be read has a row that says
+/// so. A broken recording must not prevent the export of what was said.
 pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     let folder = data.join(FOLDER);
     let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(told).collect());
@@ -24,7 +24,7 @@ pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     told.into_iter().map(|told| row(session, told)).collect()
 }
 
-/// What a recording's folder told.
+/// What was read from a recording's folder.
 struct Told {
     name: String,
     read: Result<Read, String>,

@@ -1,5 +1,5 @@
-//! The items and scores of a session's answers, as numbers: of each question the answer that counts, as it was
-//! corrected where it was.
+//! The items and scores of a session's answers, as numbers. For each question, that is the answer that counts, with its
+//! correction applied.
 
 use super::description::ScoreRow;
 use crate::ids::{SegmentId, SessionId};
@@ -18,7 +18,7 @@ pub struct Scored<'a> {
     pub segments: &'a [SegmentId],
     /// Its answers, each with the start of the server that kept it.
     pub answers: &'a [(i64, Answer)],
-    /// What became of each of them.
+    /// The standing of each answer, in the same order: whether it counts, and its full value.
     pub standings: &'a [Standing],
     /// The corrections of the session.
     pub corrections: &'a Latest,

@@ -1,5 +1,5 @@
-//! What an export tells of the study that its session belongs to. An export of a session outside any study has the same
-//! tables without a row.
+//! The study that the session of an export belongs to. If the session is outside any study, the export has the same
+//! tables without rows.
 
 use super::description::{StudyEventRow, StudyRow, StudySessionRow};
 use crate::ids::SessionId;
@@ -11,7 +11,7 @@ pub struct ExportedStudy {
     enrolment: Enrolment,
     study: StoredStudy,
     events: Vec<StudyEventRow>,
-    /// What the database tells of it.
+    /// The row of the study.
     row: StudyRow,
 }
 
@@ -38,12 +38,12 @@ impl ExportedStudy {
         Ok(Some(Self { session, enrolment, study, events, row }))
     }
 
-    /// The row of the study.
+    /// The row of the study; none if the session is outside any study.
     pub fn study_rows(exported: Option<&Self>) -> Vec<StudyRow> {
         exported.map(|exported| exported.row.clone()).into_iter().collect()
     }
 
-    /// The place of the session.
+    /// The place of the session in its study, as a row; none outside any study.
     pub fn session_rows(exported: Option<&Self>) -> Vec<StudySessionRow> {
         let row = |exported: &Self| StudySessionRow {
             session: exported.session,
@@ -55,7 +55,7 @@ impl ExportedStudy {
         exported.map(row).into_iter().collect()
     }
 
-    /// What happened to the study as a whole and, of its sessions, to this one.
+    /// What happened to the study as a whole, and to this session in it.
     pub fn event_rows(exported: Option<&Self>) -> &[StudyEventRow] {
         exported.map_or(&[], |exported| &exported.events)
     }
@@ -75,7 +75,7 @@ impl ExportedStudy {
         &self.enrolment.definition_sha256
     }
 
-    /// The keys of the rows that the chain has of it.
+    /// The keys that the study and its exported events have in the chain.
     pub fn keys(&self) -> impl Iterator<Item = String> {
         let name = self.name().to_owned();
         let events = self.events.iter().map(move |event| format!("{}/{}", event.study, event.number));

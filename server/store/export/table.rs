@@ -1,5 +1,5 @@
-//! Tables: a struct a row, whose fields know what their columns mean. CSV, JSON and the data
-//! dictionary come from them.
+//! Tables. Each has a struct for its rows, whose fields say what their columns mean. CSV, JSON and the data dictionary
+//! are made from these structs.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -40,10 +40,9 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The seventh has voice comments. The sixth names the personal
-/// accounts. The fifth names recordings and studies, and has corrections, scores, consents, withdrawals and erasures.
-/// The fourth has the chain. The third tells what the policies knew of the optic, the second what was said late and on
-/// which device; the first did not name itself.
+/// The format of exports that this version writes. Each format added something. 7: voice comments. 6: personal
+/// accounts. 5: recordings, studies, corrections, scores, consents, withdrawals and erasures. 4: the chain. 3: what the
+/// policies knew about the optic. 2: what was said late, and on which device. 1: did not yet state its format.
 pub const FORMAT: u64 = 7;
 
 /// A table without its rows.
@@ -51,41 +50,41 @@ pub const FORMAT: u64 = 7;
 pub struct Table {
     /// Name; its file is `NAME.csv`.
     pub name: &'static str,
-    /// What a row is.
+    /// What the rows are.
     pub description: &'static str,
     /// Its columns, in order.
     pub columns: &'static [Column],
-    /// Columns that together name a row.
+    /// Columns that together identify a row.
     pub key: &'static [&'static str],
 }
 
-/// A row of a table. The macro `table!` makes the struct and this together.
+/// A row of a table. The macro `table!` makes the struct and implements this trait.
 pub trait Row {
-    /// The table.
+    /// The table that the row belongs to.
     const TABLE: Table;
 
-    /// A cell for each column, in order, null where there is nothing.
+    /// A cell for each column, in order; null if there is no value.
     fn cells(&self) -> Vec<Value>;
 
-    /// Writes the row into a CSV file. `cell` is room for one cell, kept from row to row. Gives about how many bytes
-    /// were written.
+    /// Writes the row into a CSV file. `cell` is a buffer for one cell, reused from row to row. Returns about how many
+    /// bytes were written.
     ///
     /// # Errors
-    /// When `csv` cannot be written.
+    /// If `csv` cannot be written.
     fn write_csv(&self, csv: &mut csv::Writer<Vec<u8>>, cell: &mut Vec<u8>) -> Result<usize, csv::Error>;
 }
 
-/// What a field of a row may be.
+/// A type that a field of a row may have.
 pub trait Cell: Serialize {
     /// The type of its column.
     const KIND: Type;
 
-    /// The cell, null where there is nothing.
+    /// The cell; null if there is no value.
     fn value(&self) -> Value {
         json!(self)
     }
 
-    /// Adds the cell to `csv` as the CSV files have it: nothing where there is nothing.
+    /// Adds the cell to `csv` as the CSV files have it: nothing if there is no value.
     fn write_csv(&self, csv: &mut Vec<u8>) {
         csv.extend_from_slice(in_csv(Self::KIND, &self.value()).as_bytes());
     }
@@ -106,7 +105,8 @@ cells! {
     Datetime: Timestamp;
 }
 
-/// The cells of tables with a row for each frame: millions of them are written without anything in between.
+/// Types of cells in tables with a row for each frame. There are millions of such cells, so they are written without an
+/// intermediate value.
 macro_rules! plain_cells {
     ($($kind:ident: $($cell:ty),+;)+) => {
         $($(
@@ -178,7 +178,7 @@ impl Meaning {
         Self { unit, ..self }
     }
 
-    /// The same in a column that exports before `format` did not have.
+    /// The same in a column that exports have since `format`.
     pub const fn since(self, format: u64) -> Self {
         Self { since: format, ..self }
     }
@@ -316,14 +316,14 @@ impl Column {
     }
 }
 
-/// How texts stand in the CSV files, for the data dictionary.
+/// How texts are written in the CSV files, for the data dictionary.
 pub const TEXTS_IN_CSV: &str = "In the CSV files a text that a spreadsheet would run as a formula, one that \
     begins with =, +, -, @, their full-width forms, a tab or a line break, has an \
-    apostrophe before it; so has one that begins with apostrophes and goes on like \
-    that. Take away one apostrophe to read it. session.json has every text as it is.";
+    apostrophe before it, and so has such a text behind apostrophes. Remove one \
+    apostrophe to read it. session.json has every text as it is.";
 
-/// What a spreadsheet takes for the beginning of a formula, in itself or once it has dropped it
-/// (OWASP, "CSV Injection").
+/// Characters that begin a formula in a spreadsheet, or that a spreadsheet drops before it looks for one (OWASP, "CSV
+/// Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '＝', '＋', '－', '＠', '\t', '\r', '\n'];
 
 impl Column {
@@ -333,7 +333,7 @@ impl Column {
         in_csv(self.kind, cell)
     }
 
-    /// What a cell of the CSV files says.
+    /// The text of a cell of the CSV files, without an added apostrophe.
     #[must_use]
     pub fn read<'a>(&self, csv: &'a str) -> &'a str {
         match csv.strip_prefix('\'') {
@@ -342,8 +342,8 @@ impl Column {
         }
     }
 
-    /// Whether a CSV file that has `csv` in this column tells of `cell`. Earlier versions left
-    /// texts as they were.
+    /// Whether `csv`, in this column of a CSV file, stands for `cell`. Earlier versions wrote texts without an
+    /// apostrophe.
     #[must_use]
     pub fn tells(&self, csv: &str, cell: &Value) -> bool {
         csv == self.csv(cell) || csv == plain(cell)
@@ -358,7 +358,7 @@ fn in_csv(kind: Type, cell: &Value) -> String {
     }
 }
 
-/// Also one behind apostrophes: otherwise nobody could tell which of them were said.
+/// Also true for a formula behind apostrophes. Otherwise nobody could tell which apostrophes belong to the text.
 fn is_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(FORMULA)
 }

@@ -1,5 +1,4 @@
-//! What unblinding adds to an export: the policies, and the seed by which anyone can rebuild the
-//! order.
+//! What unblinding adds to an export: the policies, and the seed, from which anyone can draw the order again.
 
 use serde_json::{Value, json};
 
@@ -15,29 +14,29 @@ use crate::trial::event::EventKind;
 use crate::trial::study::lists::Lists;
 use crate::trial::study::stage::Stage;
 
-/// Why the seed is not told.
+/// Why the seed is withheld.
 const SEED_WITHHELD: &str = "it would unblind other sessions of the same balanced set; unblind those and export again";
 
-/// Why the orders of the session's study are not told.
+/// Why the orders of the session's study are withheld.
 const STUDY_WITHHELD: &str = "they would unblind other sessions of the study; unblind all of it and export again";
 
-/// A session's allocation. There is one only for a session that was unblinded.
+/// A session's allocation. It exists only for a session that was unblinded.
 pub struct Unblinded {
     made: NewSession,
     reason: String,
-    /// Whether the seed may be told: not while it would unblind another session of its set.
+    /// Whether the seed may be shown. It may not while it would unblind another session of its set.
     seed_told: bool,
     /// The orders of its study.
     study: StudyOrders,
 }
 
-/// What may be told of the orders of a session's study.
+/// What may be shown of the orders of a session's study.
 enum StudyOrders {
     /// The session is outside any study.
     Outside,
     /// Nothing: the study is blinded.
     Withheld,
-    /// All of them, as they were committed to.
+    /// All of them: the statement that was committed to.
     Told(String),
 }
 
@@ -67,13 +66,13 @@ impl Unblinded {
 
         let Some(reason) = reason else { return Ok(None) };
         let study = StudyOrders::of(reader, stored.made.session).await?;
-        // In a study the seed of a balanced set also tells the orders of places that nobody has taken yet.
+        // In a study, the seed of a balanced set also reveals the orders of places that nobody has taken yet.
         let tells_others = stored.made.algorithm.order() == Order::Balanced && matches!(study, StudyOrders::Withheld);
         let seed_told = !tells_others && reader.balanced_set(stored.made.seed).await?.may_tell_seed();
         Ok(Some(Self { made: stored.made.clone(), reason, seed_told, study }))
     }
 
-    /// Writes its files.
+    /// Writes the files that an unblinded export has in addition.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
         folder.table(&self.rows()).await?;
 

@@ -17,13 +17,13 @@ use crate::trial::voice::{Ending, MediaType};
 /// The folder of an export in which the recordings are.
 pub const FOLDER: &str = "voice";
 
-/// The file of the recording that belongs to `comment`.
+/// Path, in an export, of the recording that belongs to `comment`.
 pub fn file_name(comment: impl std::fmt::Display, media_type: MediaType) -> String {
     format!("{FOLDER}/{comment}.{}", media_type.extension())
 }
 
 impl Blinded {
-    /// Writes the recordings, one file each, and gives the rows of their table.
+    /// Writes the recordings, one file each, and returns the rows of their table.
     pub(super) async fn write_voice(&self, reader: &Reader, folder: &mut Folder) -> Result<Vec<VoiceRow>, ExportError> {
         let typed = Latest::of(&self.corrections);
         let comments = self.comments.iter().map(|(_, comment)| comment);
@@ -43,7 +43,7 @@ impl Blinded {
         Ok(rows)
     }
 
-    /// What is known of a recording without its sound.
+    /// The row of a recording, without file, hash and transcript.
     fn voice_row(&self, comment: &Comment) -> VoiceRow {
         let nothing = Recorded::default();
         let recorded = self.voice.get(&comment.key).unwrap_or(&nothing);

@@ -26,21 +26,21 @@ pub struct StudyBook {
 enum Way {
     /// Within the server.
     Server(Store),
-    /// From the command line. The lock keeps servers out, so that nobody decides on what is being changed.
+    /// From the command line. The lock keeps servers out, so that no server decides on data that is being changed.
     CommandLine { pool: SqlitePool, _lock: Arc<File> },
 }
 
 impl StudyBook {
-    /// That of the server.
+    /// The book of the server.
     #[must_use]
     pub fn of_server(store: &Store) -> Self {
         Self { way: Way::Server(store.clone()), reader: store.reader().clone() }
     }
 
-    /// That of data folder `folder`, for a command.
+    /// Opens the book of data folder `folder` for a command.
     ///
     /// # Errors
-    /// When there is no database, a server has it open, or it is not of this version.
+    /// If there is no database, a server has it open, or it is of another version.
     pub async fn open(folder: &Path) -> Result<Self, StoreError> {
         let file = folder.join(DATABASE);
         if !file.is_file() {
@@ -58,7 +58,7 @@ impl StudyBook {
         Ok(Self { way: Way::CommandLine { pool, _lock: lock }, reader })
     }
 
-    /// The start of the server that writes in it; none for a command.
+    /// The run of the server that writes in it; `None` for a command.
     #[must_use]
     pub fn run(&self) -> Option<i64> {
         match &self.way {
@@ -67,16 +67,16 @@ impl StudyBook {
         }
     }
 
-    /// For reading.
+    /// The reader of the same database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }
 
-    /// Plans a study with its first event. On disk when this returns.
+    /// Writes a new study with its first event. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn plan(&self, new: &NewStudy, planned: &StudyChange) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
             Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
@@ -89,10 +89,10 @@ impl StudyBook {
         done
     }
 
-    /// Writes `change` of `study` with all that goes with it, or nothing. On disk when this returns.
+    /// Writes all of `change` of `study`, or nothing. It is on disk when this returns.
     ///
     /// # Errors
-    /// When the disk or database failed.
+    /// If the disk or database fails.
     pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
             Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
@@ -105,7 +105,7 @@ impl StudyBook {
         done
     }
 
-    /// Ends its connections where it has its own.
+    /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
         if let Way::CommandLine { pool, .. } = &self.way {
             self.reader.close().await;

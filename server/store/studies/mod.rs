@@ -1,4 +1,5 @@
-//! Studies as the database keeps them: read here, written in `writing`, opened from the command line in `book`.
+//! Studies as the database keeps them: read in `reading`, written in `writing`, opened from the command line in `book`,
+//! checked in `verify` and `replay`.
 
 mod book;
 mod reading;
@@ -24,31 +25,31 @@ pub(super) use writing::enrol;
 /// A study to be planned.
 #[derive(Debug, Clone)]
 pub struct NewStudy {
-    /// What is planned.
+    /// Definition of the study.
     pub definition: Definition,
-    /// The sites of it that this database runs.
+    /// Names of its sites that this database runs.
     pub sites: Vec<String>,
-    /// When, by the wall clock.
+    /// When it is planned, by the wall clock.
     pub wall: Timestamp,
 }
 
 /// A study read back.
 #[derive(Debug, Clone)]
 pub struct StoredStudy {
-    /// What was planned, with the protocols as they were then.
+    /// Definition of the study, with the protocols as they were when it was planned.
     pub definition: Definition,
-    /// The sites of it that this database runs.
+    /// Names of its sites that this database runs.
     pub sites: Vec<String>,
-    /// What its orders were drawn from, once they were.
+    /// Seed of its orders; `None` until they are drawn.
     pub seed: Option<Seed>,
-    /// Its events.
+    /// Its events, in order.
     pub events: Vec<StudyEvent>,
     /// Its sessions, in the order in which they were made.
     pub sessions: Vec<Enrolled>,
 }
 
 impl StoredStudy {
-    /// Where it stands.
+    /// The state that its events lead to.
     #[must_use]
     pub fn state(&self) -> StudyState {
         StudyState::after(&self.events)
@@ -58,27 +59,27 @@ impl StoredStudy {
 /// What is written with a change of a study, in one transaction.
 #[derive(Debug, Clone)]
 pub struct StudyChange {
-    /// What happened.
+    /// The event.
     pub event: StudyEvent,
-    /// When it happened by the monotonic clock; only a server has one.
+    /// When it happened, by the monotonic clock; `None` from the command line.
     pub at: Option<Moment>,
-    /// The seed of its orders, where they were drawn.
+    /// Seed of the orders, if this change draws them.
     pub seed: Option<Seed>,
-    /// Events of its sessions that go with it.
+    /// Events of sessions that are written with it.
     pub sessions: Vec<(SessionId, Vec<Event>)>,
 }
 
-/// Where a session belongs in a study.
+/// The place of a session in a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Enrolment {
     /// The study's name.
     pub study: String,
     /// SHA-256 of its definition.
     pub definition_sha256: String,
-    /// The site.
+    /// Name of the site.
     pub site: String,
-    /// The protocol.
+    /// Name of the protocol.
     pub protocol: String,
-    /// The place in the list of both, from 1.
+    /// Place in the list of this site and protocol, from 1.
     pub place: usize,
 }

@@ -1,4 +1,4 @@
-//! Studies read back.
+//! Reads studies.
 
 use jiff::Timestamp;
 use sqlx::Row;
@@ -21,15 +21,15 @@ impl Reader {
     /// The names of all studies, in the order in which they were planned.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn study_names(&self) -> Result<Vec<String>, StoreError> {
         Ok(sqlx::query_scalar("SELECT study FROM studies ORDER BY rowid").fetch_all(self.pool()).await?)
     }
 
-    /// Study `name` whole, or `None` where there is none.
+    /// The whole of study `name`, or `None` if there is none.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn study(&self, name: &str) -> Result<Option<StoredStudy>, StoreError> {
         let row = sqlx::query("SELECT definition, sites FROM studies WHERE study = ?").bind(name);
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
@@ -77,10 +77,10 @@ impl Reader {
         seed.map(read).transpose()
     }
 
-    /// The events of study `study`.
+    /// The events of study `study`, in order.
     ///
     /// # Errors
-    /// When the database failed or holds what this version cannot read.
+    /// If the database fails or holds data that this version cannot read.
     pub async fn study_events(&self, study: &str) -> Result<Vec<StudyEvent>, StoreError> {
         let rows = sqlx::query(
             "SELECT *, (SELECT account FROM actors AS a
@@ -111,10 +111,10 @@ impl Reader {
         rows.iter().map(enrolled).collect()
     }
 
-    /// Where `session` belongs; none where it is outside any study.
+    /// The place of `session` in its study; `None` outside any study.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn enrolment(&self, session: SessionId) -> Result<Option<Enrolment>, StoreError> {
         let row = sqlx::query(
             "SELECT study, definition_sha256, site, protocol, place FROM study_sessions JOIN studies USING (study)
@@ -136,7 +136,7 @@ impl Reader {
         row.map(enrolment).transpose()
     }
 
-    /// When the study of `session` was locked; none where it was not, or the session is outside any study.
+    /// When the study of `session` was locked; `None` if it was not, or if the session is outside any study.
     pub(in crate::store) async fn study_locked(&self, session: SessionId) -> Result<Option<Timestamp>, StoreError> {
         let row = sqlx::query(
             "SELECT e.wall FROM study_sessions AS m JOIN study_events AS e USING (study)

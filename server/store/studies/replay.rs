@@ -1,5 +1,5 @@
-//! Whether each session of a study took the place that was next when it was made: the study's course, replayed in the
-//! order of the chain.
+//! Checks that each session of a study took the place that was next when the session was made. For this, the events of
+//! the study are replayed in the order of the chain.
 
 use sqlx::Row;
 
@@ -10,7 +10,7 @@ use crate::store::{Reader, StoreError};
 use crate::trial::phase::SessionStatus;
 use crate::trial::study::places::{Enrolled, next_place};
 
-/// What happened to a study or one of its sessions, as far as it bears on the places of later sessions.
+/// An event of a study or of one of its sessions that affects the places of later sessions.
 enum Moment {
     /// The study was opened.
     Opened,
@@ -28,11 +28,12 @@ enum Change {
     Aborted,
     Unblinded,
     Withdrawn,
-    /// It was another participant's.
+    /// Its participant was corrected to this code.
     Corrected(String),
 }
 
-/// Replays the course of `study`: nothing where every session took the place that its rules gave it, or what is wrong.
+/// Replays the events of `study`. The inner result is `Ok` if every session took the place that the rules gave it, and
+/// else says what is wrong.
 pub(super) async fn check_places(snapshot: &Reader, study: &StoredStudy) -> Result<Result<(), String>, StoreError> {
     let moments = moments(snapshot, study.definition.name.as_str()).await?;
     Ok(replay(study, &moments))
@@ -67,7 +68,8 @@ fn replay(study: &StoredStudy, moments: &[Moment]) -> Result<(), String> {
     }
 }
 
-/// The new session `session` as it was when it was made, after `earlier` ones.
+/// Session `session` as it was when it was made, after the sessions `earlier`. An error if its place was not the next
+/// one.
 fn made(study: &StoredStudy, earlier: &[Enrolled], session: SessionId) -> Result<Enrolled, String> {
     let stored = study.sessions.iter().find(|enrolled| enrolled.session == session);
     let stored = stored.ok_or_else(|| format!("session {session} is not there"))?;

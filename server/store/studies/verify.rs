@@ -1,4 +1,5 @@
-//! Whether the studies of a database are as they were planned, and their sessions have the orders that were drawn.
+//! Checks that the studies of a database are as they were planned, and that their sessions have the orders that were
+//! drawn.
 
 use sqlx::Row;
 
@@ -9,7 +10,7 @@ use crate::store::{Reader, StoreError};
 use crate::trial::study::lists::Lists;
 use crate::trial::study::places::Enrolled;
 
-/// Checks every study that `snapshot` has: what was found, in words, or what is wrong.
+/// Checks every study in `snapshot`. The inner result says what was found or what is wrong, in words.
 pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<String, String>, StoreError> {
     let names = snapshot.study_names().await?;
     let mut sessions = 0;
@@ -24,7 +25,7 @@ pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<
     Ok(Ok(format!("studies as planned: {studies}; sessions with the next place and its order: {sessions}")))
 }
 
-/// How many sessions of study `name` were checked, or what is wrong.
+/// Checks study `name`. The inner result is the number of sessions that were checked, or what is wrong.
 async fn check_study(snapshot: &Reader, name: &str) -> Result<Result<usize, String>, StoreError> {
     // Reading it compares the protocols with the hashes in the definition.
     let Some(study) = snapshot.study(name).await? else { return Ok(Err("it is not there".to_owned())) };
@@ -47,7 +48,7 @@ async fn check_study(snapshot: &Reader, name: &str) -> Result<Result<usize, Stri
     Ok(check_places(snapshot, &study).await?.map(|()| study.sessions.len()))
 }
 
-/// The orders of `study` if they are those committed to; none where it was never opened.
+/// The orders of `study`, or an error if they are not those committed to; `None` if it was never opened.
 fn committed_lists(study: &StoredStudy) -> Result<Option<Lists>, String> {
     let (seed, commitment) = match (study.seed, study.state().commitment) {
         (None, None) => return Ok(None),

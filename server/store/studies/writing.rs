@@ -1,4 +1,4 @@
-//! Studies, their events and their sessions as they are written.
+//! Writes studies, their events and their sessions.
 
 use sqlx::sqlite::SqliteConnection;
 
@@ -10,7 +10,7 @@ use crate::store::values::{begin, nanoseconds};
 use crate::store::{StoreError, chain};
 use crate::trial::study::definition::StudyName;
 
-/// Plans a study with its first event, or does nothing.
+/// Writes a new study with its first event, or nothing.
 pub(super) async fn insert_study(
     connection: &mut SqliteConnection,
     run: Option<i64>,
@@ -45,7 +45,7 @@ pub(super) async fn insert_study(
     Ok(transaction.commit().await?)
 }
 
-/// Writes `change` of `study` with all that goes with it, or nothing.
+/// Writes all of `change` of `study`, or nothing.
 pub(super) async fn change_study(
     connection: &mut SqliteConnection,
     run: Option<i64>,

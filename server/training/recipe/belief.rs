@@ -1,4 +1,4 @@
-//! How the belief tracker is trained: what a recipe's `[belief]` section holds.
+//! How the belief tracker is trained: a recipe's `[belief]` section.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,22 +8,22 @@ use crate::training::optimiser::Rule;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeliefRecipe {
-    /// Scans side by side.
+    /// Scans that run side by side.
     pub scans: usize,
-    /// Frames that a gradient goes back.
+    /// Frames of a window, through which the gradient is propagated back.
     pub window: usize,
-    /// Windows until a scan is replaced by another.
+    /// Windows after which a scan is replaced by a new one.
     pub windows_a_scan: usize,
-    /// Updates in all.
+    /// Updates of the whole training.
     pub updates: u64,
-    /// Optimiser.
+    /// The optimiser and its learning rate.
     pub optimiser: Rule,
-    /// Largest norm of a gradient.
+    /// Largest norm of the gradient; a larger gradient is scaled down to it.
     pub clip: f64,
-    /// Share of the learning rate that is left at the end; the way there is a half cosine.
+    /// Share of the learning rate that is left at the end. It falls along a half cosine. 1: constant.
     pub final_rate: f64,
     /// Share of scans that differ from the reference in speed, spot, noise, exposure, lens.
     pub variety: f64,
-    /// Share of scans on which the tracker is led astray.
+    /// Share of scans on which the tracker's target is replaced now and then by a wrong one.
     pub wandering: f64,
 }

@@ -1,5 +1,4 @@
-//! Checks the numbers in a recipe before a training begins; an invalid one is rejected with its key
-//! and its range.
+//! Checks the numbers in a recipe before a training begins. An invalid one is rejected with its key and range.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -10,13 +9,13 @@ use super::{LEG, Recipe};
 use crate::autofocus::networks::HISTORY;
 use crate::training::optimiser::Rule;
 
-/// Most updates of a training.
+/// Largest number of updates of a training.
 pub const MAX_UPDATES: u64 = 1_000_000_000;
 
 /// Checks all numbers of `recipe`.
 ///
 /// # Errors
-/// Names the key, the range and the value of the first number outside its range.
+/// If a number is outside its range: names the key, range and value of the first one.
 pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
     within("pictures", recipe.pictures, 1..=100_000)?;
     within("validate_every", recipe.validate_every, LEG..=MAX_UPDATES)?;
@@ -43,7 +42,7 @@ fn check_dqn(dqn: &DqnRecipe) -> Result<(), String> {
     // A state is the latest eight frames.
     within("dqn.window", dqn.window, HISTORY..=4096)?;
     within("dqn.windows", dqn.windows, 1..=4096)?;
-    // From then on each scan's memory holds a window.
+    // After the warm-up, the replay memory of each scan must hold a whole window.
     let least = dqn.window * dqn.scans;
     within("dqn.warm_up", dqn.warm_up, least as u64..=1_000_000_000)?;
     within("dqn.replay", dqn.replay, least..=100_000_000)?;
@@ -63,11 +62,10 @@ fn check_dqn(dqn: &DqnRecipe) -> Result<(), String> {
 fn check_target(dqn: &DqnRecipe) -> Result<(), String> {
     match dqn.target {
         Target::Bellman { discount, steps, .. } => {
-            // With 1 or nearly so, values have no bound that rewards set.
+            // With a discount of 1, or almost 1, the values are not bounded by the rewards.
             within("dqn.target.discount", discount, 0.0..=0.9999)?;
 
-            // A state and the one so many steps later, both with their whole history, must lie in
-            // one window of one scan.
+            // A state and the one `steps` later must lie in one window of one scan, both with their whole history.
             let most = (dqn.window - HISTORY).min(usize::from(dqn.frames_a_scan) - 1);
             if most == 0 {
                 let least = HISTORY + 1;
@@ -128,7 +126,7 @@ mod tests {
 
     use crate::training::recipe::{Recipe, shipped};
 
-    /// The recipe that ships for `name` with `key` set to `value`.
+    /// Parses the recipe that ships as `name`, with `key` set to `value`.
     fn with(name: &str, key: &str, value: &str) -> Result<Recipe, String> {
         let text = shipped(name).unwrap();
         let line = |line: &str| match line.split_once(" = ") {
@@ -184,7 +182,7 @@ mod tests {
         assert!(recipe.epsilon(0).abs() < 1e-12 && recipe.epsilon(u64::MAX) > 0.0);
     }
 
-    /// Numbers of all sizes, as TOML has them.
+    /// Numbers of all sizes, in TOML's notation.
     fn number() -> impl Strategy<Value = String> {
         prop_oneof![
             any::<i64>().prop_map(|value| value.to_string()),

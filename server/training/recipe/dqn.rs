@@ -1,4 +1,4 @@
-//! How a DQN policy is trained: what a recipe's `[dqn]` section holds.
+//! How a DQN policy is trained: a recipe's `[dqn]` section.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,30 +8,30 @@ use crate::training::optimiser::Rule;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
 pub enum Target {
-    /// Bellman's equation, from the action taken: rewards of `steps` frames, then the target network's value.
+    /// Bellman's equation for the action taken: the rewards of `steps` frames plus the target network's value after
+    /// them.
     Bellman {
-        /// Discount a frame.
+        /// Discount per frame.
         discount: f64,
         /// Frames whose rewards are summed.
         steps: usize,
-        /// Whether the online network picks the action that the target network values.
+        /// Double DQN: whether the online network chooses the next action that the target network values.
         double: bool,
-        /// Whether rewards are counted in steps a frame and against what an oracle would get from the
-        /// same place. The policy that is best stays the same, since that is shaping by a potential
-        /// (Ng, Harada, Russell 1999), but how far away the optimum is, which no policy can know, no
-        /// longer drowns what an action changes.
+        /// Whether rewards are measured in steps per frame, relative to what an oracle would get from the same place.
+        /// This is shaping by a potential (Ng, Harada, Russell 1999), so the best policy stays the same. Without it,
+        /// the distance to the optimum, which no policy can know, hides the small difference that an action makes.
         #[serde(default)]
         regret: bool,
     },
-    /// What each of the three actions would have gained over standing still at the next frame, in steps; known in
-    /// simulation for all three whichever was taken.
+    /// What each of the three actions would have gained over standing still at the next frame, in steps. The simulation
+    /// knows it for all three, not only for the action taken.
     Lookahead {
-        /// What moving earns by itself where the picture is well out of focus, in steps: standing
-        /// still does not show on which side the optimum lies.
+        /// Reward for moving at all while the picture is well out of focus, in steps. A policy that stands still does
+        /// not see on which side the optimum lies.
         #[serde(default)]
         restless: f64,
-        /// Share of that which a move against the last one earns: below 1, a policy that looks for
-        /// the optimum sweeps rather than trembles.
+        /// Share of that reward for a move that reverses the last one. Below 1, a policy that searches for the optimum
+        /// sweeps instead of trembling.
         #[serde(default = "whole")]
         turning: f64,
     },
@@ -45,41 +45,41 @@ const fn whole() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DqnRecipe {
-    /// Scans side by side.
+    /// Scans that run side by side.
     pub scans: usize,
     /// Frames of a scan.
     pub frames_a_scan: u16,
-    /// Frames played between updates, over all scans together a multiple of `scans`.
+    /// Frames played between two updates, over all scans together; rounded up to a multiple of `scans`.
     pub frames_an_update: usize,
     /// Frames played before the first update.
     pub warm_up: u64,
-    /// Most frames remembered.
+    /// Capacity of the replay memory, in frames.
     pub replay: usize,
-    /// Windows in a batch.
+    /// Windows of a batch.
     pub windows: usize,
-    /// Consecutive frames in a window.
+    /// Consecutive frames of a window.
     pub window: usize,
-    /// Updates in all.
+    /// Updates of the whole training.
     pub updates: u64,
-    /// What values are fitted to.
+    /// What the action values are fitted to.
     pub target: Target,
-    /// Optimiser.
+    /// The optimiser and its learning rate.
     pub optimiser: Rule,
-    /// Largest norm of a gradient.
+    /// Largest norm of the gradient; a larger gradient is scaled down to it.
     pub clip: f64,
-    /// Share of the learning rate left at the end; the way there is a half cosine. 1: constant.
+    /// Share of the learning rate that is left at the end. It falls along a half cosine. 1: constant.
     pub final_rate: f64,
-    /// Share of random actions at first.
+    /// Share of random actions at the start.
     pub first_epsilon: f64,
-    /// Share of random actions at last.
+    /// Share of random actions at the end.
     pub last_epsilon: f64,
-    /// Frames over which the first decays exponentially to the last, or straight where one of them is 0.
+    /// Frames over which `first_epsilon` decays to `last_epsilon`: exponentially, or linearly if one of them is 0.
     pub epsilon_frames: u64,
-    /// Share of the online network that the target network takes over an update.
+    /// How far the target network moves towards the online network at each update: 0 not at all, 1 all the way.
     pub target_share: f64,
     /// Share of scans that differ from the reference in speed, spot, noise, exposure, lens.
     pub variety: f64,
-    /// Share of scans on which the policy is led astray.
+    /// Share of scans on which the policy's target is replaced now and then by a wrong one.
     pub wandering: f64,
 }
 
@@ -92,10 +92,10 @@ impl DqnRecipe {
         let last = self.last_epsilon;
 
         if first.min(last) > 0.0 {
-            // Rounding must not lead beyond what is a share.
+            // Rounding must not lead above 1.
             (first * (last / first).powf(done)).min(1.0)
         } else {
-            // Nothing decays to or from 0 exponentially.
+            // An exponential decay cannot begin or end at 0.
             first + (last - first) * done
         }
     }

@@ -1,13 +1,13 @@
-//! From a recipe's text to a recipe whose numbers make sense.
+//! Parses a recipe and checks its numbers.
 
 use super::Recipe;
 use super::check::check;
 
 impl Recipe {
-    /// The recipe that `text` (TOML) describes.
+    /// Parses the recipe in `text` (TOML).
     ///
     /// # Errors
-    /// With line and key, when a key is unknown, missing or of the wrong type, or a number makes no sense.
+    /// If a key is unknown, missing or of the wrong type (with its line), or a number is outside its range.
     pub fn parse(text: &str) -> Result<Self, String> {
         let recipe: Self = toml::from_str(text).map_err(|error| sentence(&error, text))?;
         check(&recipe)?;
@@ -15,7 +15,7 @@ impl Recipe {
     }
 }
 
-/// The error in `text` as one sentence; TOML's own is a small drawing.
+/// The error in `text` as one sentence with its line. TOML's own message has several lines.
 fn sentence(error: &toml::de::Error, text: &str) -> String {
     let what = error.message().trim().replace('\n', ", ");
     let before = error.span().and_then(|span| text.get(..span.start));

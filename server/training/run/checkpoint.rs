@@ -1,5 +1,5 @@
-//! Checkpoints: everything a training needs to continue exactly as if it had never stopped, in one
-//! safetensors file that is replaced whole or not at all.
+//! Checkpoints: everything a training needs to continue exactly as if it had never stopped, in one safetensors file
+//! that is replaced atomically.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -13,10 +13,10 @@ use tch::{Kind, Tensor, nn};
 use crate::autofocus::weights::floats;
 use crate::files;
 
-/// The checkpoint's name.
+/// Name of the checkpoint's file in the run folder.
 pub const CHECKPOINT: &str = "checkpoint.safetensors";
 
-/// Longest header that is read: some thousand times what one has.
+/// Longest header that is read, in bytes: about a thousand times the usual length.
 const MAX_HEADER: u64 = 1 << 28;
 
 /// Why a checkpoint could not be used.
@@ -25,22 +25,22 @@ pub enum CheckpointError {
     /// The file cannot be read.
     #[error("cannot read the checkpoint {}: {source}", path.display())]
     File {
-        /// The file.
+        /// The checkpoint's file.
         path: PathBuf,
-        /// Why.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The content is damaged or of another program.
+    /// The content is damaged, or was written by another program.
     #[error("the checkpoint {} is damaged: {reason}; start again in another folder", path.display())]
     Damaged {
-        /// The file.
+        /// The checkpoint's file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
     },
 }
 
-/// Named arrays and notes. Arrays to be written may be borrowed: a replay memory is large.
+/// Named arrays and notes. Arrays to be written may be borrowed, because a replay memory is large.
 #[derive(Debug, Default)]
 pub struct Checkpoint<'a> {
     arrays: BTreeMap<String, (Dtype, Cow<'a, [u8]>)>,
@@ -51,18 +51,18 @@ pub struct Checkpoint<'a> {
 }
 
 impl<'a> Checkpoint<'a> {
-    /// Adds floats.
+    /// Adds an array of floats.
     pub fn put_floats(&mut self, name: &str, values: impl IntoIterator<Item = f32>) {
         let bytes: Vec<u8> = values.into_iter().flat_map(f32::to_le_bytes).collect();
         self.arrays.insert(name.to_owned(), (Dtype::F32, bytes.into()));
     }
 
-    /// Adds bytes.
+    /// Adds an array of bytes.
     pub fn put_bytes(&mut self, name: &str, bytes: impl Into<Cow<'a, [u8]>>) {
         self.arrays.insert(name.to_owned(), (Dtype::U8, bytes.into()));
     }
 
-    /// Adds a tensor's values, without its shape, which the reader knows.
+    /// Adds a tensor's values. Its shape is not stored, since the reader knows it.
     pub fn put_tensor(&mut self, name: &str, tensor: &Tensor) {
         self.put_floats(name, floats(tensor));
     }
@@ -74,36 +74,36 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
-    /// Floats by name.
+    /// The array of floats called `name`.
     ///
     /// # Errors
-    /// When there are none of that name.
+    /// If there is none.
     pub fn floats(&self, name: &str) -> Result<Vec<f32>, CheckpointError> {
         let bytes = self.bytes(name)?;
         Ok(bytes.as_chunks::<4>().0.iter().map(|four| f32::from_le_bytes(*four)).collect())
     }
 
-    /// Bytes by name.
+    /// The array of bytes called `name`.
     ///
     /// # Errors
-    /// When there are none of that name.
+    /// If there is none.
     pub fn bytes(&self, name: &str) -> Result<&[u8], CheckpointError> {
         self.arrays.get(name).map(|array| &*array.1).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
-    /// Bytes by name, out of the checkpoint: large ones need not be there twice.
+    /// Takes the array of bytes called `name` out of the checkpoint, so that a large one is not in memory twice.
     ///
     /// # Errors
-    /// When there are none of that name.
+    /// If there is none.
     pub fn take_bytes(&mut self, name: &str) -> Result<Vec<u8>, CheckpointError> {
         let array = self.arrays.remove(name);
         array.map(|array| array.1.into_owned()).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
-    /// Fills `tensor` with the values of that name.
+    /// Fills `tensor` with the array called `name`.
     ///
     /// # Errors
-    /// When there are none, or not as many as the tensor holds.
+    /// If there is none, or its length is not the tensor's.
     pub fn fill(&self, name: &str, tensor: &mut Tensor) -> Result<(), CheckpointError> {
         let values = self.floats(name)?;
         if values.len() != tensor.numel() {
@@ -114,10 +114,10 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Fills all variables of `store` from under `prefix`.
+    /// Fills all variables of `store` with the arrays under `prefix`.
     ///
     /// # Errors
-    /// When one is missing or does not fit.
+    /// If one is missing or does not fit.
     pub fn fill_store(&self, prefix: &str, store: &nn::VarStore) -> Result<(), CheckpointError> {
         store
             .variables()
@@ -125,28 +125,28 @@ impl<'a> Checkpoint<'a> {
             .try_for_each(|(name, mut tensor)| self.fill(&format!("{prefix}.{name}"), &mut tensor))
     }
 
-    /// A number among the notes.
+    /// The note called `name`, as a number.
     ///
     /// # Errors
-    /// When it is missing or not a number.
+    /// If it is missing or not a number.
     pub fn number<N: std::str::FromStr>(&self, name: &str) -> Result<N, CheckpointError> {
         let text = self.notes.get(name).and_then(|text| text.parse().ok());
         text.ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
-    /// The error that says what is wrong with this checkpoint.
+    /// The error that this checkpoint is damaged, for `reason`.
     #[must_use]
     pub fn damaged(&self, reason: impl Into<String>) -> CheckpointError {
         CheckpointError::Damaged { path: self.path.clone(), reason: reason.into() }
     }
 
-    /// Writes a file beside `path` and moves it into place, so that a reader always finds a whole
-    /// one. The arrays are written one by one, without a copy.
+    /// Writes a temporary file beside `path` and moves it into place, so that a reader always finds a complete one. The
+    /// arrays are written one by one, without a copy.
     ///
     /// # Errors
-    /// When the disk is full or the folder cannot be written.
+    /// If the disk is full or the folder cannot be written.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        // Larger types first, as safetensors' own writer has it: each array is aligned.
+        // Larger types first, as safetensors' own writer does, so that each array is aligned.
         let mut arrays: Vec<_> = self.arrays.iter().collect();
         arrays.sort_by_key(|(_, (kind, _))| std::cmp::Reverse(kind.bitsize()));
 
@@ -161,7 +161,7 @@ impl<'a> Checkpoint<'a> {
         let infos = arrays.iter().map(info).collect();
         let notes: HashMap<String, String> = self.notes.clone().into_iter().collect();
 
-        // A header of no notes is not written as JSON (safetensors 0.8.0).
+        // An empty map of notes cannot be written as JSON (safetensors 0.8.0).
         let header = Metadata::new((!notes.is_empty()).then_some(notes), infos).map_err(io::Error::other)?;
         let mut header = serde_json::to_vec(&header)?;
         header.resize(header.len().next_multiple_of(8), b' ');
@@ -178,15 +178,15 @@ impl Checkpoint<'static> {
     /// Reads what [`Checkpoint::write`] wrote.
     ///
     /// # Errors
-    /// When the file cannot be read or is damaged.
+    /// If the file cannot be read or is damaged.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         Self::open(path, true)
     }
 
-    /// Reads the notes alone of what [`Checkpoint::write`] wrote: a replay memory is large.
+    /// Reads only the notes of what [`Checkpoint::write`] wrote, because a replay memory is large.
     ///
     /// # Errors
-    /// When the file cannot be read or is damaged.
+    /// If the file cannot be read or is damaged.
     pub fn read_notes(path: &Path) -> Result<Self, CheckpointError> {
         Self::open(path, false)
     }
@@ -195,7 +195,7 @@ impl Checkpoint<'static> {
         let failed = |source: io::Error| CheckpointError::File { path: path.to_owned(), source };
         let damaged = |reason: String| CheckpointError::Damaged { path: path.to_owned(), reason };
         let cut = |error: io::Error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => damaged("it is cut short".to_owned()),
+            io::ErrorKind::UnexpectedEof => damaged("it is truncated".to_owned()),
             _ => failed(error),
         };
 
@@ -206,7 +206,7 @@ impl Checkpoint<'static> {
         let mut length = [0; 8];
         file.read_exact(&mut length).map_err(cut)?;
         let length = u64::from_le_bytes(length);
-        // A damaged length must not make us read more than a header can hold.
+        // A damaged length must not make us read more than the longest possible header.
         if length > MAX_HEADER.min(size) {
             return Err(damaged("it is not a safetensors file".to_owned()));
         }
@@ -217,7 +217,7 @@ impl Checkpoint<'static> {
 
         let data = header.data_len() as u64;
         if size.checked_sub(8 + length) != Some(data) {
-            return Err(damaged("it is cut short or has something behind it".to_owned()));
+            return Err(damaged("it is truncated or has extra bytes at the end".to_owned()));
         }
 
         let mut arrays = BTreeMap::new();
@@ -261,7 +261,7 @@ mod tests {
         let notes = Checkpoint::read_notes(&path).unwrap();
         assert_eq!((notes.number::<u64>("updates").unwrap(), notes.floats("b").is_err()), (3, true));
 
-        // Anyone may read it who may read the rest of the run folder.
+        // The file has the same permissions as any other file in the run folder.
         let mode =
             |path: &Path| std::os::unix::fs::PermissionsExt::mode(&std::fs::metadata(path).unwrap().permissions());
         std::fs::write(folder.path().join("b"), "").unwrap();

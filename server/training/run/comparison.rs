@@ -1,4 +1,4 @@
-//! Compares trainings by what their run folders hold, for sweeps of recipes and seeds.
+//! Compares trainings by the content of their run folders, for sweeps of recipes and seeds.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use crate::training::recipe::Recipe;
 
 /// File in a run folder with the figures of its weights on the reference benchmark.
 pub const BENCHMARK: &str = "benchmark.json";
-/// The recipe's key that has a column of its own.
+/// The recipe's key that always has a column.
 const POLICY: &str = "policy";
 
 /// The figures of a training's weights on the reference benchmark.
@@ -25,18 +25,18 @@ pub struct BenchmarkFigures {
     pub scans: usize,
     /// Mean absolute focal power error.
     pub mae: f64,
-    /// Its standard deviation over frames.
+    /// Standard deviation of the absolute focal power error over frames.
     pub sd: f64,
     /// Share of frames in focus, 0..1.
     pub in_focus: f64,
-    /// Mean absolute change of focal power a frame.
+    /// Mean absolute change of focal power per frame.
     pub travel: f64,
-    /// Changes of direction a second.
+    /// Changes of direction per second.
     pub reversals: f64,
 }
 
 impl BenchmarkFigures {
-    /// Those of `row` on `scans` scans.
+    /// The figures of `row`, measured on `scans` scans.
     #[must_use]
     pub fn new(row: &Row, scans: usize) -> Self {
         let Row { mae, sd, in_focus, travel, reversals, .. } = *row;
@@ -44,20 +44,20 @@ impl BenchmarkFigures {
     }
 }
 
-/// A training as its run folder describes it.
+/// A training, as read from its run folder.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrainedRun {
-    /// The folder.
+    /// The run folder.
     pub run: PathBuf,
-    /// What the recipe says, by `section.key`.
+    /// The recipe's values by `section.key`.
     pub recipe: BTreeMap<String, toml::Value>,
     /// Seed of everything random.
     pub seed: u64,
-    /// Updates done.
+    /// Updates done so far.
     pub updates: u64,
     /// Updates of the whole training.
     pub of: u64,
-    /// Lowest mean absolute error in a validation, once there was one.
+    /// Lowest mean absolute error of any validation; `None` before the first.
     pub best_validation: Option<f64>,
     /// Figures of the best weights on the reference benchmark, once the training is complete.
     pub benchmark: Option<BenchmarkFigures>,
@@ -75,18 +75,18 @@ pub enum CompareError {
     /// Its figures on the benchmark cannot be read.
     #[error("cannot read {}: {reason}; delete it, then `parfocal train --resume` makes it again", path.display())]
     Benchmark {
-        /// The file.
+        /// The file [`BENCHMARK`] of the run folder.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with it.
         reason: String,
     },
 }
 
 impl TrainedRun {
-    /// Reads what `folder` says; a training may be running in it.
+    /// Reads the training in `folder`, which may still be running.
     ///
     /// # Errors
-    /// When it holds no training, or what it holds cannot be read.
+    /// If it holds no training, or the training cannot be read.
     pub fn read(folder: &Path) -> Result<Self, CompareError> {
         let file = folder.join(CHECKPOINT);
         if !file.is_file() {
@@ -140,8 +140,8 @@ fn flat(recipe: &Recipe) -> BTreeMap<String, toml::Value> {
     values
 }
 
-/// `runs` as a Markdown table, with a column for each value in which their recipes differ. The best
-/// validation comes first, runs without one last.
+/// `runs` as a Markdown table, with a column for each value in which their recipes differ. The run with the best
+/// validation comes first; runs without a validation come last.
 #[must_use]
 pub fn markdown(runs: &[TrainedRun]) -> String {
     let mut runs: Vec<&TrainedRun> = runs.iter().collect();
@@ -176,7 +176,7 @@ pub fn markdown(runs: &[TrainedRun]) -> String {
     text
 }
 
-/// A recipe's value as it stands there, text without its quotes.
+/// A recipe's value in TOML's notation; text without its quotes.
 fn plain(value: &toml::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

@@ -1,11 +1,11 @@
-//! A training's curves: as lines of text, and as a picture.
+//! A training's curves, as lines of CSV and as SVG.
 
 use crate::plot::{Axis, Plot};
 
-/// Updates done, mean loss since the point before, and the validation's mean absolute error where there was one.
+/// Updates done, mean loss since the previous point, and the validation's mean absolute error if there was one.
 pub(super) type Point = (u64, f64, Option<f64>);
 
-/// `curve` with a line for each point: its three numbers between commas, the last one empty where there is none.
+/// `curve` with one line for each point: its three values separated by commas. A missing third value is empty.
 pub(super) fn text(curve: &[Point]) -> String {
     let line = |&(updates, loss, mae): &Point| {
         format!("{updates},{loss},{}", mae.map_or(String::new(), |mae| mae.to_string()))
@@ -13,7 +13,7 @@ pub(super) fn text(curve: &[Point]) -> String {
     curve.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Parses what [`text`] wrote; lines that it cannot have written are left out.
+/// Parses what [`text`] wrote. Skips lines that do not have that form.
 pub(super) fn parse(text: &str) -> Vec<Point> {
     let point = |line: &str| {
         let mut parts = line.split(',');
@@ -22,7 +22,7 @@ pub(super) fn parse(text: &str) -> Vec<Point> {
     text.lines().filter_map(point).collect()
 }
 
-/// Loss and validation error over updates, in a panel each, from 0 to their largest value.
+/// Loss and validation error over updates, each in its own panel, from 0 to its largest value.
 pub(super) fn svg(curve: &[Point]) -> String {
     let end = curve.last().map_or(1, |point| point.0).max(1) as f64;
     let loss: Vec<_> = curve.iter().map(|point| (point.0 as f64, point.1)).collect();

@@ -1,5 +1,5 @@
-//! The folder of a training: it belongs to one training and one process at a time, and each file in
-//! it is whole.
+//! The folder of a training. It belongs to one training and one process at a time, and is never left with an incomplete
+//! file under its final name.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
@@ -15,15 +15,15 @@ const LOCK: &str = ".lock";
 #[derive(Debug)]
 pub(super) struct RunFolder {
     path: PathBuf,
-    /// Locked as long as this lives.
+    /// Holds the lock until it is dropped.
     _lock: File,
 }
 
 impl RunFolder {
-    /// A new or empty folder for a training that begins.
+    /// Locks a new or empty folder for a new training.
     ///
     /// # Errors
-    /// When it holds anything, another process trains there, or it cannot be written.
+    /// If it holds anything, another process is training there, or it cannot be written.
     pub fn begin(path: &Path) -> Result<Self, TrainError> {
         let unwritable = |source| TrainError::writing(path, source);
         fs::create_dir_all(path).map_err(unwritable)?;
@@ -37,7 +37,7 @@ impl RunFolder {
 
         if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {
             if !was_locked_before {
-                // Nothing of ours stays in a folder of others.
+                // Leave no file of ours in a folder with other files.
                 let _ = fs::remove_file(path.join(LOCK));
             }
 
@@ -49,11 +49,11 @@ impl RunFolder {
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
-    /// The folder of a training that is resumed, and its checkpoint. Removes what a killed process
-    /// left half written.
+    /// Locks the folder of a training that is resumed, and reads its checkpoint. Removes partial files that a killed
+    /// process left.
     ///
     /// # Errors
-    /// When there is no checkpoint, it cannot be used, or another process trains there.
+    /// If there is no checkpoint, it cannot be used, or another process is training there.
     pub fn go_on(path: &Path) -> Result<(Self, Checkpoint<'static>), TrainError> {
         if !path.join(CHECKPOINT).exists() {
             return Err(TrainError::NothingToResume(path.to_owned()));
@@ -72,18 +72,18 @@ impl RunFolder {
         Ok((Self { path: path.to_owned(), _lock: lock }, checkpoint))
     }
 
-    /// Where it is.
+    /// The folder's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes file `name`.
+    /// Writes or replaces file `name`.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path.join(name);
         files::replace(&path, bytes).map_err(|source| TrainError::writing(&path, source))
     }
 
-    /// Writes the checkpoint.
+    /// Writes or replaces the checkpoint.
     pub fn save(&self, checkpoint: &Checkpoint<'_>) -> Result<(), TrainError> {
         let path = self.path.join(CHECKPOINT);
         checkpoint.write(&path).map_err(|source| TrainError::writing(&path, source))
@@ -135,7 +135,7 @@ mod tests {
         assert!(RunFolder::begin(folder.path()).unwrap_err().to_string().contains("holds other files"));
         assert_eq!(folder.path().read_dir().unwrap().count(), 1);
         assert!(RunFolder::go_on(folder.path()).unwrap_err().to_string().contains("no checkpoint to continue from"));
-        // Nor does an empty folder that a training was refused for its footage in stand in anyone's way.
+        // A training that was refused for its footage leaves only the lock file. The folder can be used again.
         fs::remove_file(folder.path().join("MODEL_CARD.md")).unwrap();
         drop(RunFolder::begin(folder.path()).unwrap());
         RunFolder::begin(folder.path()).unwrap();

@@ -1,5 +1,5 @@
-//! What a training trains on: drawn pictures or footage, and a bench's own recordings. Its checkpoint
-//! names them, so that a resumed training uses the same.
+//! What a training trains on: drawn pictures or footage, and a bench's own recordings. The checkpoint holds their paths
+//! and checksums, so that a resumed training uses the same.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,35 +21,35 @@ use crate::scans::stack::source::StackSource;
 use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 
-/// Least number of scans that are looked at for detail.
+/// Least number of scans that are checked for detail to focus on.
 const LEAST_CHECKED: usize = 60;
 
-/// What a training may be given to train on.
+/// Paths of what a training trains on. Both lists may be empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sources {
     /// Videos, images or folders of images, instead of drawn pictures.
     pub footage: Vec<PathBuf>,
-    /// Folders of a bench's recorded scans and focal stacks, beside the pictures.
+    /// Folders of a bench's recorded scans and focal stacks, used besides the pictures.
     pub scans: Vec<String>,
 }
 
-/// What a training trains on.
+/// The pictures and recordings of a training, opened.
 pub(super) struct Material {
     pub clips: Vec<Arc<Clip>>,
-    /// Where the footage lies and the checksum of its pictures; `None` for drawn pictures.
+    /// The footage's paths and the hash of its pictures; `None` for drawn pictures.
     footage: Option<Origin>,
-    /// The bench's recordings, and where they lie.
+    /// The bench's recordings, with their paths and hash; `None` without recordings.
     bench: Option<(BenchScenes, Origin)>,
 }
 
-/// Where pictures lie, and what they were when the training was begun.
+/// The absolute paths of pictures, and a hash of their content.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Origin {
     paths: Vec<String>,
     sha256: String,
 }
 
-/// A kind of source in words: its option, and the name of its notes in a checkpoint.
+/// A kind of source: the name of its notes in a checkpoint, and its command-line option.
 #[derive(Debug, Clone, Copy)]
 struct Kind {
     name: &'static str,
@@ -60,15 +60,14 @@ const FOOTAGE: Kind = Kind { name: "footage", option: "--footage" };
 const SCANS: Kind = Kind { name: "scans", option: "--scans" };
 
 impl Material {
-    /// The footage of `sources`, or `pictures` drawn ones where there is none, and its recordings.
+    /// Opens the footage and recordings of `sources`. Without footage, draws `pictures` pictures instead.
     pub fn open(sources: &Sources, pictures: u64) -> Result<Self, TrainError> {
         let (clips, footage) = clips(&sources.footage, pictures)?;
         let bench = bench(&sources.scans)?;
         Ok(Self { clips, footage, bench })
     }
 
-    /// What the training of `checkpoint` was begun on; `asked` says where its pictures lie now, if
-    /// that was given.
+    /// Opens what the training of `checkpoint` was begun on. `asked` holds its new paths, if any were given.
     pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, pictures: u64) -> Result<Self, TrainError> {
         let paths = |footage: &[PathBuf]| footage.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let footage = Known::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
@@ -83,7 +82,7 @@ impl Material {
         Ok(Self { clips, footage: origin, bench })
     }
 
-    /// Notes where the pictures lie, and their checksums.
+    /// Adds the paths and hashes to the checkpoint's notes.
     pub fn note(&self, checkpoint: &mut Checkpoint<'_>) {
         let bench = self.bench.as_ref().map(|(_, origin)| origin);
         for (kind, origin) in [(FOOTAGE, self.footage.as_ref()), (SCANS, bench)] {
@@ -94,7 +93,7 @@ impl Material {
         }
     }
 
-    /// What the scans of a training by `recipe` go over.
+    /// The scenery for the scans of a training by `recipe`.
     pub fn scenery(&self, recipe: &Recipe) -> Result<Scenery, TrainError> {
         let relief =
             relief::scenes(Split::Training, recipe.reliefs).map_err(|error| TrainError::Recipe(error.to_string()))?;
@@ -103,12 +102,12 @@ impl Material {
         Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share).with(bench, recipe.bench_share))
     }
 
-    /// The bench's recordings to validate on.
+    /// The bench's recordings to validate on; empty without recordings.
     pub fn bench_validation(&self) -> &[Scene] {
         self.bench.as_ref().map_or(&[], |(scenes, _)| &scenes.validation)
     }
 
-    /// The same in words, for a model card.
+    /// Describes the material in words, for a model card.
     pub fn words(&self) -> String {
         let pictures = match self.footage {
             None => format!("{} drawn pictures and brain phantoms", self.clips.len()),
@@ -126,18 +125,18 @@ impl Material {
 }
 
 impl Kind {
-    /// Name of the note of its pictures' checksum.
+    /// Name of the note that holds the hash.
     fn checksum(self) -> String {
         format!("{}_sha256", self.name)
     }
 }
 
-/// What a checkpoint says of a kind of source, and where that lies now.
+/// What a checkpoint says about a kind of source, and its new paths.
 struct Known {
     kind: Kind,
-    /// Where it lay when the training was begun, and its checksum; `None` where there was none.
+    /// Its paths and hash when the training was begun; `None` if the training used no such source.
     begun: Option<Origin>,
-    /// Where it lies now, where that was asked for.
+    /// The paths given when resuming; empty for those of before.
     asked: Vec<String>,
 }
 
@@ -158,7 +157,7 @@ impl Known {
         Ok(Self { kind, begun, asked })
     }
 
-    /// Where it lies now.
+    /// The paths to open now.
     fn paths(&self) -> &[String] {
         match &self.begun {
             Some(begun) if self.asked.is_empty() => &begun.paths,
@@ -166,7 +165,7 @@ impl Known {
         }
     }
 
-    /// Why the training cannot go on, if it is because what it was begun on is gone; else `error`.
+    /// Replaces `error` by one with advice if the cause is that a path of the first run no longer exists.
     fn unusable(&self, error: TrainError) -> TrainError {
         let is_there = |path: &String| Path::new(path).exists() || StackSource::parse(path).folder.exists();
         if !self.asked.is_empty() || self.paths().iter().all(is_there) {
@@ -179,7 +178,7 @@ impl Known {
         ))
     }
 
-    /// Refuses pictures other than those that the training was begun on.
+    /// Rejects pictures that differ from those on which the training was begun.
     fn check(&self, now: Option<&Origin>) -> Result<(), TrainError> {
         let Some(begun) = &self.begun else { return Ok(()) };
         if now.is_some_and(|now| now.sha256 == begun.sha256) {
@@ -203,7 +202,7 @@ impl Known {
     }
 }
 
-/// The footage at `paths` and where it comes from, or `pictures` drawn ones where there is none.
+/// Reads the footage at `paths`, with its origin. Without paths, draws `pictures` pictures instead.
 fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Origin>), TrainError> {
     if paths.is_empty() {
         let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
@@ -226,7 +225,7 @@ fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Ori
     Ok((clips, Some(Origin { paths, sha256: hex::encode(hash.finalize()) })))
 }
 
-/// The recordings in `folders` and where they come from, where there are some.
+/// Reads the recordings in `folders`, with their origin; `None` without folders.
 fn bench(folders: &[String]) -> Result<Option<(BenchScenes, Origin)>, TrainError> {
     if folders.is_empty() {
         return Ok(None);
@@ -249,19 +248,19 @@ fn bench(folders: &[String]) -> Result<Option<(BenchScenes, Origin)>, TrainError
     Ok(Some((scenes, origin)))
 }
 
-/// A training may go on from another folder.
+/// Paths are stored as absolute ones, since a training may be resumed from another working directory.
 fn absolute(path: &str) -> String {
     std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| path.to_string_lossy().into_owned())
 }
 
-/// Tells of scans over `clips` that show nothing to focus on.
+/// Prints a note if scans over `clips` show nothing to focus on.
 fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
     let count = clips.len().max(LEAST_CHECKED);
     let scenes = clips.iter().cloned().map(Scene::Flat).collect();
     let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };
 
     if let Some(warning) = warning(without_detail(&set), count)? {
-        tell(format_args!("note: {warning}; nothing can be learned there"));
+        tell(format_args!("note: {warning}; training learns nothing from those"));
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! One training from beginning to end, in a run folder: legs of updates, validations, checkpoints,
-//! and the best weights so far.
+//! One training from beginning to end, in a run folder: legs of updates, validations, checkpoints, and the best weights
+//! so far.
 
 mod begin;
 pub mod checkpoint;
@@ -45,13 +45,13 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Progress of a training, reported after each leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// Updates done.
+    /// Updates done so far.
     pub updates: u64,
     /// Mean loss over the leg.
     pub loss: f64,
-    /// Share of random actions, for policies that explore so.
+    /// Share of random actions; `None` for policies that do not explore with random actions.
     pub epsilon: Option<f64>,
-    /// Latest validation's mean absolute error.
+    /// Mean absolute error of the validation after this leg; `None` if there was none.
     pub validation: Option<f64>,
 }
 
@@ -67,18 +67,17 @@ pub struct Run {
     best: f64,
     other_version: Option<String>,
     material: Material,
-    /// Weights it began with, if not with random ones.
+    /// File of the weights that it began with; `None` for random ones.
     origin: Option<String>,
 }
 
 impl Run {
-    /// A new training by `recipe` in `folder`, which is new or empty. It trains on what
-    /// `sources` name, from the weights in the file `from` (safetensors), or from random ones, with its
-    /// networks on `device`.
+    /// Begins a training by `recipe` in `folder`, which must be new or empty. It trains on `sources`, with its networks
+    /// on `device`. It begins with the weights in the file `from` (safetensors), or with random ones.
     ///
     /// # Errors
-    /// When the recipe fits no policy, the folder cannot be written, or the weights, footage or
-    /// recordings cannot be used.
+    /// If the recipe fits no policy, the folder cannot be written, or the weights, footage or recordings cannot be
+    /// used.
     pub fn begin(
         recipe: Recipe,
         seed: u64,
@@ -87,7 +86,7 @@ impl Run {
         from: Option<&Path>,
         device: Device,
     ) -> Result<Self, TrainError> {
-        // Drawing pictures takes a while: check first all that can be wrong.
+        // Drawing pictures takes a while, so check everything else first.
         let design = recipe.design()?;
         let weights = from.map(|file| beginning(design, file)).transpose()?;
         let folder = RunFolder::begin(folder)?;
@@ -104,10 +103,11 @@ impl Run {
         Ok(run)
     }
 
-    /// Resumes the training in `folder` from its checkpoint; it must match `request`.
+    /// Resumes the training in `folder` from its checkpoint. It must match `request`.
     ///
     /// # Errors
-    /// When there is no checkpoint, it is damaged or of another training, or its footage is gone.
+    /// If there is no checkpoint, it is damaged or does not match, or the footage or recordings are gone or have
+    /// changed.
     pub fn resume(folder: &Path, request: &ResumeRequest, device: Device) -> Result<Self, TrainError> {
         let (folder, mut checkpoint) = RunFolder::go_on(folder)?;
         let text = checkpoint.notes.get("recipe").map_or("", String::as_str);
@@ -156,36 +156,36 @@ impl Run {
         })
     }
 
-    /// The recipe it is trained by.
+    /// The recipe of this training.
     #[must_use]
     pub const fn recipe(&self) -> &Recipe {
         &self.recipe
     }
 
-    /// Updates done.
+    /// Updates done so far.
     #[must_use]
     pub fn updates(&self) -> u64 {
         self.trainer.updates()
     }
 
-    /// Lowest mean absolute error in a validation so far.
+    /// Lowest mean absolute error of any validation so far; infinite before the first.
     #[must_use]
     pub const fn best(&self) -> f64 {
         self.best
     }
 
-    /// The version of parfocal that made the checkpoint this training resumes from, if it is not
-    /// this one: the result may differ from that version's.
+    /// The version of parfocal that made the checkpoint from which this training resumes; `None` if it is this version.
+    /// With another version the result may differ.
     #[must_use]
     pub fn other_version(&self) -> Option<&str> {
         self.other_version.as_deref()
     }
 
-    /// Trains to the end, or until `stop` says so between two legs; either way leaves a checkpoint. Returns whether the
-    /// training is complete; [`Run::report`] then adds the benchmark's figures to the model card.
+    /// Trains to the end, or until `stop` returns true between two legs. Either way it leaves a checkpoint. Returns
+    /// whether the training is complete. [`Run::report`] then adds the benchmark's figures to the model card.
     ///
     /// # Errors
-    /// When the run folder cannot be written, or the training diverged.
+    /// If the run folder cannot be written, or the training diverged.
     pub fn go(
         &mut self,
         clock: &dyn Clock,
@@ -224,11 +224,11 @@ impl Run {
         Ok(complete)
     }
 
-    /// One leg: as many updates as lie before the next multiple of [`LEG`], on scans that begin anew.
+    /// Trains one leg, up to the next multiple of [`LEG`] updates, on new scans. Returns the mean loss.
     fn leg(&mut self, end: u64) -> f64 {
         let goal = (self.updates() / LEG + 1).saturating_mul(LEG).min(end);
 
-        // A stream of its own for each leg: what follows depends on the seed and on how far the training is, no more.
+        // Each leg has its own random stream, so that it depends only on the seed and the number of updates done.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(self.updates());
         self.trainer.begin_leg(seed);
         let mut sum = 0.0;
@@ -241,14 +241,15 @@ impl Run {
         sum / f64::max(count, 1.0)
     }
 
-    /// The present weights, with where they come from.
+    /// The present weights as safetensors, with a note of how they were made.
     fn weights(&self) -> Result<Vec<u8>, TrainError> {
         let made =
             format!("{}, seed {}, {} updates, parfocal {}", self.recipe.policy, self.seed, self.updates(), VERSION);
         weights::save(self.trainer.store(), &made).map_err(|error| TrainError::Diverged(error.to_string()))
     }
 
-    /// Runs the present weights on the validation scans; keeps them if they are the best so far.
+    /// Evaluates the present weights on the validation scans, and saves them if they are the best so far. Returns their
+    /// mean absolute error.
     fn validate(&mut self) -> Result<f64, TrainError> {
         let bytes = self.weights()?;
         let row = self.figures(bytes.clone(), &self.validation)?;
@@ -269,10 +270,10 @@ impl Run {
         Ok(row.mae)
     }
 
-    /// Runs the best weights on the reference benchmark, for their model card.
+    /// Evaluates the best weights on the reference benchmark and adds the figures to their model card.
     ///
     /// # Errors
-    /// When the run folder cannot be read or written.
+    /// If the run folder cannot be read or written.
     pub fn report(&self) -> Result<(), TrainError> {
         let count = self.recipe.benchmark;
         if count == 0 || !self.best.is_finite() {
@@ -291,11 +292,11 @@ impl Run {
         let figures = serde_json::to_vec_pretty(&BenchmarkFigures::new(&row, count)).unwrap_or_default();
         self.folder.write(BENCHMARK, &figures)?;
 
-        // Last: a card with these figures says that all is done.
+        // Last, because a card with these figures means that everything is done.
         self.folder.write(CARD, model_card::benchmarked(&card, &row, count).as_bytes())
     }
 
-    /// The figures of the weights in `bytes` on `scans`.
+    /// Evaluates the weights in `bytes` on `scans`.
     fn figures(&self, bytes: Vec<u8>, scans: &Benchmark) -> Result<Row, TrainError> {
         let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
         let design = self.design;
@@ -341,9 +342,12 @@ impl Run {
     }
 }
 
-/// The scans by which the best weights are chosen: over the same pictures, scans like the reference
-/// benchmark's and scans as varied as training's can be; where the recipe trains on relief, as many
-/// over scenes with relief; where it trains on a bench's recordings, as many over those.
+/// The scans that decide which weights are best:
+///
+/// - scans over drawn pictures, under the reference benchmark's conditions;
+/// - as many over the same pictures, as varied as scans in training can be;
+/// - if the recipe trains on relief, up to 60 scans over scenes with relief;
+/// - if it trains on a bench's recordings, as many over those as over the pictures.
 fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, TrainError> {
     let unfit = |error: &dyn std::fmt::Display| TrainError::Recipe(error.to_string());
     let flat = varied(Split::Validation, recipe.pictures.min(60)).map_err(|error| unfit(&error))?;
@@ -359,7 +363,7 @@ fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, TrainEr
     Ok(Benchmark { scenes, conditions: Conditions::VariedFrom(plain), seed: 1, count, frames: FRAMES })
 }
 
-/// The weights in `file` for a policy of `design`.
+/// Reads the weights in `file` and checks that they fit a policy of `design`.
 fn beginning(design: Design, file: &Path) -> Result<Vec<u8>, TrainError> {
     let bytes = fs::read(file).map_err(|error| unfit(file, &error))?;
     shipped::build(design, &bytes).map_err(|error| unfit(file, &error))?;

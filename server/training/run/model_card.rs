@@ -1,4 +1,4 @@
-//! The model card: what users of trained weights should know about them, as Markdown.
+//! The model card, as Markdown: what users of trained weights should know about them.
 
 use crate::autofocus::shipped::{Design, design};
 use crate::evaluation::Row;
@@ -10,13 +10,13 @@ pub(super) struct Made<'a> {
     pub seed: u64,
     /// Updates of the training.
     pub updates: u64,
-    /// The weights that it began with, if not with random ones.
+    /// File of the weights that the training began with; `None` for random ones.
     pub origin: Option<&'a str>,
-    /// What it trained on, in words.
+    /// What the training used, in words.
     pub data: &'a str,
 }
 
-/// The card of weights whose figures on `count` validation scans are `row`.
+/// The card of weights, with their figures `row` on `count` validation scans.
 pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
 
@@ -44,12 +44,12 @@ pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
 
 const BENCHMARK: &str = "of the reference benchmark";
 
-/// Whether `card` has figures on the reference benchmark.
+/// Whether `card` already has figures on the reference benchmark.
 pub(super) fn is_benchmarked(card: &str) -> bool {
     card.contains(BENCHMARK)
 }
 
-/// `card` with the figures `row` on `count` scans of the reference benchmark.
+/// Adds to `card` the figures `row` on `count` scans of the reference benchmark.
 pub(super) fn benchmarked(card: &str, row: &Row, count: usize) -> String {
     format!("{card}\nOn {count} scans {BENCHMARK} (seed {SEED}): {}.\n", figures(row))
 }

@@ -6,23 +6,23 @@ use super::material::Sources;
 use crate::training::error::TrainError;
 use crate::training::recipe::{Recipe, shipped};
 
-/// What `--resume` was asked to continue. What is not given stays as when the training was begun.
+/// The arguments of a training that is resumed. Those not given stay as when the training was begun.
 #[derive(Debug, Clone, Default)]
 pub struct ResumeRequest {
-    /// The policy, or the name of a recipe that ships.
+    /// Name of a policy, or of a recipe that ships.
     pub name: String,
-    /// The whole recipe.
+    /// The whole recipe, if one was given.
     pub recipe: Option<Recipe>,
-    /// Updates in all.
+    /// Updates of the whole training, if given.
     pub updates: Option<u64>,
-    /// The seed.
+    /// The seed, if given.
     pub seed: Option<u64>,
-    /// Where footage and recordings lie.
+    /// Where footage and recordings are now; empty for where they were.
     pub sources: Sources,
 }
 
 impl ResumeRequest {
-    /// Checks that this is the training in `folder`, begun by `recipe` with `seed`.
+    /// Checks that the request matches the training in `folder`, which was begun with `recipe` and `seed`.
     pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), TrainError> {
         let folder = folder.display();
         let made = &recipe.policy;

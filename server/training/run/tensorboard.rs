@@ -1,6 +1,5 @@
-//! TensorBoard event files: scalars only. Each record is its length, a masked CRC-32C of that, an
-//! `Event` protocol buffer, and a masked CRC-32C of that
-//! (`tensorflow/core/lib/io/record_writer.h`).
+//! TensorBoard event files: scalars only. Each record consists of its length, a masked CRC-32C of the length, an
+//! `Event` protocol buffer, and a masked CRC-32C of the event (`tensorflow/core/lib/io/record_writer.h`).
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -19,10 +18,10 @@ pub struct EventFile {
 }
 
 impl EventFile {
-    /// A new event file in `folder`, named by the time and by the update the curves start at.
+    /// Creates an event file in `folder`. Its name contains the time and `step`, the update at which the curves start.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn create(folder: &Path, clock: &dyn Clock, step: u64) -> io::Result<Self> {
         let now = clock.wall();
         let mut file = File::create(folder.join(format!("events.out.tfevents.{}.{step}", now.as_second())))?;
@@ -35,7 +34,7 @@ impl EventFile {
     /// Adds the value of curve `tag` at `step`.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn scalar(&mut self, clock: &dyn Clock, step: u64, tag: &str, value: f32) -> io::Result<()> {
         let mut entry = Vec::new();
         put_bytes(&mut entry, 1, tag.as_bytes());
@@ -53,7 +52,7 @@ impl EventFile {
     }
 }
 
-/// An event's beginning: field 1, the wall clock in seconds.
+/// The beginning of an event: field 1, the wall clock in seconds.
 fn seconds(clock: &dyn Clock) -> Vec<u8> {
     let mut event = vec![1 << 3 | 1];
     event.extend((clock.wall().as_millisecond() as f64 / 1000.0).to_le_bytes());
@@ -83,7 +82,7 @@ fn record(event: &[u8]) -> Vec<u8> {
     record
 }
 
-/// `TensorFlow`'s masked checksum: rotated and offset, so that a checksum of checksummed data is none of its own.
+/// `TensorFlow`'s masked checksum: rotated and offset, because a CRC of data that contains its own CRC is weak.
 fn masked(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes).rotate_right(15).wrapping_add(0xa282_ead8)
 }

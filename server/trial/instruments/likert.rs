@@ -1,14 +1,14 @@
-//! A point on a scale whose ends, or whose every point, are named (Likert 1932, Archives of Psychology 140). The point
-//! is its number, from 1.
+//! A Likert scale: the answer is a point on a scale on which either the ends or all points are named (Likert 1932,
+//! Archives of Psychology 140). Points are numbered from 1.
 
 use super::measure::{Measure, given};
 
-/// The point.
+/// The point as a measure.
 pub fn measures(point: u8) -> Vec<Measure> {
     vec![Measure::item("point", "Point", given(point))]
 }
 
-/// The point, and what it means where it has a label.
+/// The point, with its label if it has one.
 pub fn in_words(labels: &[String], point: u8) -> String {
     match usize::from(point).checked_sub(1).and_then(|place| labels.get(place)) {
         Some(label) => format!("{point} ({label})"),

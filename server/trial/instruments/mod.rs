@@ -1,5 +1,5 @@
-//! Instruments: which answers each sort of question takes, and what they score, as published. Missing stays missing: a
-//! questionnaire with an open item has no score.
+//! Instruments: which answers each kind of question takes, and how they are scored, as published. Missing values stay
+//! missing: a questionnaire with an unanswered item has no score.
 
 mod likert;
 mod measure;
@@ -16,7 +16,8 @@ pub use measure::Measure;
 use super::question::{AnswerValue, QuestionKind};
 use measure::MISSING;
 
-/// Whether `value` answers a question of `kind` in a session of `settings` settings; of a questionnaire also a part.
+/// Whether `value` is an answer to a question of `kind` in a session of `settings` settings. A questionnaire also takes
+/// partial answers.
 #[must_use]
 pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
     match (kind, value) {
@@ -35,7 +36,7 @@ pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
     }
 }
 
-/// What a question of `kind` takes in a session of `settings` settings, in words.
+/// The answers that a question of `kind` takes in a session of `settings` settings, in words.
 #[must_use]
 pub fn expected(kind: &QuestionKind, settings: usize) -> String {
     match kind {
@@ -65,10 +66,10 @@ pub fn expected(kind: &QuestionKind, settings: usize) -> String {
     }
 }
 
-/// What an open item of a questionnaire is given as.
-const OPEN: &str = "0 for an item that it leaves as it was";
+/// Tells how to write an item that an answer does not give.
+const OPEN: &str = "0 for an item that stays as it was";
 
-/// The items and scores of an answer. Words have none.
+/// The items and scores of an answer; empty for a text.
 #[must_use]
 pub fn measures(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
     match (kind, value) {
@@ -85,7 +86,7 @@ pub fn measures(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
     }
 }
 
-/// An answer in words, for reading.
+/// An answer in words, for people. Without `kind` the points are listed without their meaning.
 #[must_use]
 pub fn in_words(kind: Option<&QuestionKind>, value: &AnswerValue) -> String {
     match (kind, value) {

@@ -29,7 +29,7 @@ fn scales() -> Vec<Scale> {
     ]
 }
 
-/// The six ratings and their mean, none where a rating is missing.
+/// The six ratings and their mean. The mean is missing if a rating is.
 #[must_use]
 pub fn measures(scales: &[Scale], items: &[u8]) -> Vec<Measure> {
     let mut measures = workload::ratings(scales, items);
@@ -48,8 +48,8 @@ mod tests {
 
     #[test]
     fn the_score_is_the_mean_of_the_six_ratings() {
-        // We found no worked example of the unweighted index in print. By hand, from its definition: gradations 7, 4,
-        // 13, 9, 7 and 9 of 21 are ratings of 30, 15, 60, 40, 30 and 40; 215 / 6 = 35.83.
+        // We found no published worked example of the unweighted index. Computed by hand from its definition:
+        // gradations 7, 4, 13, 9, 7 and 9 of 21 are ratings of 30, 15, 60, 40, 30 and 40; 215 / 6 = 35.83.
         let score = raw_tlx(&[7, 4, 13, 9, 7, 9]).unwrap();
         assert!((score - 215.0 / 6.0).abs() < 1e-9, "{score}");
         assert_eq!(raw_tlx(&[1; 6]), Some(0.0));

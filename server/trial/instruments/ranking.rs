@@ -1,10 +1,10 @@
-//! An order of all settings. Without ties the answer names the settings, best first; with ties it gives each setting,
-//! in the order of their numbers, a place. Settings that share a place get the mean of the ranks that they take up
-//! together, as rank statistics want it (Friedman 1937, Journal of the American Statistical Association 32:675).
+//! A ranking of all settings. Without ties, the answer lists the settings, best first. With ties, it lists the place of
+//! each setting, in the order of the settings' numbers. Settings that share a place get the mean of the ranks that they
+//! occupy together, as rank statistics require (Friedman 1937, Journal of the American Statistical Association 32:675).
 
 use super::measure::{MISSING, Measure};
 
-/// Whether `order` names each of `settings` settings once.
+/// Whether `order` lists each of the settings 1 to `settings` exactly once.
 pub fn is_order(order: &[u8], settings: usize) -> bool {
     let mut sorted = order.to_vec();
     sorted.sort_unstable();
@@ -12,7 +12,7 @@ pub fn is_order(order: &[u8], settings: usize) -> bool {
         && sorted.iter().zip(1_usize..).all(|(&setting, expected)| usize::from(setting) == expected)
 }
 
-/// Whether `places` are places of `settings` settings, or a part of them.
+/// Whether `places` holds the places of `settings` settings. Some, but not all, may be 0, which means not given.
 pub fn are_places(places: &[u8], settings: usize) -> bool {
     places.len() == settings
         && places.iter().all(|place| usize::from(*place) <= settings)
@@ -28,7 +28,7 @@ pub fn measures(points: &[u8], ties: bool) -> Vec<Measure> {
     (1..).zip(ranks).map(measure).collect()
 }
 
-/// The rank of each setting of an order.
+/// The rank of each setting in `order`, which lists settings from best to worst.
 fn ranks(order: &[u8]) -> Vec<Option<f64>> {
     let rank = |setting: usize| {
         let place = order.iter().position(|named| usize::from(*named) == setting)?;
@@ -37,12 +37,14 @@ fn ranks(order: &[u8]) -> Vec<Option<f64>> {
     (1..=order.len()).map(rank).collect()
 }
 
-/// The rank of each setting by its place. All are missing where one has no place: the others' ranks depend on it.
+/// The rank of each setting, computed from the places. If one place is missing, all ranks are, because they depend on
+/// it.
 fn shared_ranks(places: &[u8]) -> Vec<Option<f64>> {
     if places.contains(&0) {
         return vec![None; places.len()];
     }
-    // Settings in better places take up the ranks up to `better`; those in this place the next, up to `up_to_it`.
+    // Settings in better places occupy the ranks up to `better`. Those in this place occupy the next ranks, up to
+    // `up_to_it`.
     let rank = |place: &u8| {
         let better = places.iter().filter(|other| *other < place).count();
         let up_to_it = places.iter().filter(|other| *other <= place).count();
@@ -76,7 +78,7 @@ mod tests {
 
     #[test]
     fn settings_that_share_a_place_share_their_ranks() {
-        // scipy.stats.rankdata([1, 2, 2, 4]) and ([1, 1, 1, 2]) and ([2, 5, 5]).
+        // The ranks are those of scipy.stats.rankdata for the same places.
         assert_eq!(values(&[1, 2, 2, 4], true), [Some(1.0), Some(2.5), Some(2.5), Some(4.0)]);
         assert_eq!(values(&[1, 1, 1, 2], true), [Some(2.0), Some(2.0), Some(2.0), Some(4.0)]);
         assert_eq!(values(&[2, 3, 3], true), [Some(1.0), Some(2.5), Some(2.5)]);

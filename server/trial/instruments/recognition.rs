@@ -1,6 +1,6 @@
-//! Whether the surgeon thinks to have recognised settings: the question by which the success of blinding is judged
-//! (Bang, Ni & Davis 2004, Controlled Clinical Trials 25:143, who ask for a guess and take "don't know" as an answer).
-//! Nobody is asked which policy it was: surgeons know none by name.
+//! Whether the surgeon thinks they recognised settings. This question is used to judge how well the blinding worked
+//! (Bang, Ni & Davis 2004, Controlled Clinical Trials 25:143; they ask for a guess and accept "don't know"). It does
+//! not ask which policy ran, because surgeons know no policy by name.
 
 use super::measure::{Measure, given};
 

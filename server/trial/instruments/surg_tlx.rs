@@ -1,13 +1,14 @@
-//! The Surgery Task Load Index (Wilson et al. 2011, World Journal of Surgery 35:1961, doi 10.1007/s00268-011-1141-4):
-//! six ratings, and, where it is asked with weights, which of the two dimensions of each of the 15 pairs contributed
-//! more to the workload. It takes both from the NASA Task Load Index (Hart & Staveland 1988): a dimension's weight is
-//! how often it was chosen, 0..=5, and the weighted index is the sum of weight times rating, divided by 15.
+//! The Surgery Task Load Index (Wilson et al. 2011, World Journal of Surgery 35:1961, doi 10.1007/s00268-011-1141-4).
+//! It consists of six ratings. The weighted form also asks, for each of the 15 pairs of dimensions, which of the two
+//! contributed more to the workload. Ratings and weights are those of the NASA Task Load Index (Hart & Staveland 1988):
+//! a dimension's weight is how often it was chosen, 0..=5, and the weighted index is the sum of weight times rating,
+//! divided by 15.
 
 use super::measure::Measure;
 use super::workload;
 use crate::trial::question::{Pair, QuestionKind, Scale};
 
-/// The question with its six scales; with its pairs where it is `weighted`.
+/// The question with its six scales. If it is `weighted`, it also has the 15 pairs.
 #[must_use]
 pub fn question(weighted: bool) -> QuestionKind {
     let scales = scales();
@@ -27,14 +28,14 @@ fn scales() -> Vec<Scale> {
     ]
 }
 
-/// Each pair of `count` scales once.
+/// Lists each pair of `count` scales once.
 fn pairs(count: usize) -> Vec<Pair> {
     let places: Vec<u8> = (0..u8::MAX).take(count).collect();
     let later = |first: u8| places.iter().filter(move |second| **second > first);
     places.iter().flat_map(|&first| later(first).map(move |&second| Pair { first, second })).collect()
 }
 
-/// How often each of `scales` scales was chosen. `None` when a pair is open.
+/// How often each of the `scales` scales was chosen. `None` if a pair is unanswered.
 fn weights(scales: usize, pairs: &[Pair], choices: &[u8]) -> Option<Vec<f64>> {
     let mut weights = vec![0.0; scales];
     for (pair, choice) in pairs.iter().zip(choices) {
@@ -48,8 +49,8 @@ fn weights(scales: usize, pairs: &[Pair], choices: &[u8]) -> Option<Vec<f64>> {
     Some(weights)
 }
 
-/// The six ratings and their mean; with pairs also the six weights and the weighted index. What needs a missing item is
-/// missing too.
+/// The six ratings and their mean. With pairs, also the six weights and the weighted index. A measure that needs a
+/// missing item is missing too.
 #[must_use]
 pub fn measures(scales: &[Scale], pairs: &[Pair], items: &[u8]) -> Vec<Measure> {
     let (gradations, choices) = items.split_at_checked(scales.len()).unwrap_or((items, &[]));
@@ -71,7 +72,7 @@ pub fn measures(scales: &[Scale], pairs: &[Pair], items: &[u8]) -> Vec<Measure> 
     measures
 }
 
-/// The sum of weight times rating, divided by the sum of the weights, which is 15. `None` when a rating is missing.
+/// The sum of weight times rating, divided by the sum of the weights, which is 15. `None` if a rating is missing.
 fn weighted(weights: &[f64], ratings: &[Option<f64>]) -> Option<f64> {
     let product = |(weight, rating): (&f64, &Option<f64>)| Some(weight * (*rating)?);
     let sum: f64 = weights.iter().zip(ratings).map(product).sum::<Option<f64>>()?;
@@ -110,7 +111,7 @@ mod tests {
         assert_eq!(value(&EARLIER, true, "weight-of-mental-demands"), Some(5.0));
         assert_eq!(value(&EARLIER, true, "weight-of-distractions"), Some(0.0));
 
-        // The later one of each pair: 0, 1, 2, 3, 4 and 5.
+        // If the later dimension of each pair is chosen, the weights are 0, 1, 2, 3, 4 and 5.
         let mut later = EARLIER;
         later[6..].fill(2);
         let weighted = value(&later, true, "weighted-surg-tlx").unwrap();

@@ -3,18 +3,18 @@
 
 use super::measure::{Measure, given};
 
-/// Its items.
+/// Number of items.
 pub const ITEMS: usize = 10;
 
-/// Whether these are points of its items, or a part of them.
+/// Whether `items` are points of all items (1 to 5), or of some of them (0 for the others).
 #[must_use]
 pub fn fits(items: &[u8]) -> bool {
     items.len() == ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
 }
 
 /// The score, 0..=100 in steps of 2.5, of ten items from 1 (strongly disagree) to 5 (strongly agree): odd items count
-/// `item - 1`, even ones `5 - item`, the sum times 2.5 (Brooke 1996). `None` when an item is missing. Brooke has a
-/// respondent mark the middle point instead; that is left to the surgeon.
+/// `item - 1`, even ones `5 - item`, and the sum is multiplied by 2.5 (Brooke 1996). `None` if an item is missing.
+/// Brooke asks respondents to mark the middle point instead of omitting an item; we leave that to the surgeon.
 #[must_use]
 pub fn score(items: &[u8]) -> Option<f64> {
     if items.len() != ITEMS || !items.iter().all(|item| (1..=5).contains(item)) {
@@ -24,7 +24,7 @@ pub fn score(items: &[u8]) -> Option<f64> {
     Some(f64::from(sum) * 2.5)
 }
 
-/// The items and the score.
+/// The ten items and the score.
 #[must_use]
 pub fn measures(items: &[u8]) -> Vec<Measure> {
     let item = |(number, &point): (usize, &u8)| {
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn the_score_is_that_of_the_papers_example() {
-        // Brooke 1996, the completed form: contributions 4+1+1+4+1+2+1+1+4+3 = 22; 22 * 2.5 = 55.
+        // The completed form in Brooke 1996: contributions 4+1+1+4+1+2+1+1+4+3 = 22; 22 * 2.5 = 55.
         assert_eq!(score(&[5, 4, 2, 1, 2, 3, 2, 4, 5, 2]), Some(55.0));
     }
 
@@ -50,7 +50,7 @@ mod tests {
         assert_eq!(score(&[5, 1, 5, 1, 5, 1, 5, 1, 5, 1]), Some(100.0));
         assert_eq!(score(&[1, 5, 1, 5, 1, 5, 1, 5, 1, 5]), Some(0.0));
         assert_eq!(score(&[3; 10]), Some(50.0));
-        // By hand: odd items 4+3+4+2+4 = 17 less 5 = 12, even 25 less (2+1+3+2+2) = 15; 27 * 2.5.
+        // By hand: odd items (4+3+4+2+4) - 5 = 12, even items 25 - (2+1+3+2+2) = 15; 27 * 2.5 = 67.5.
         assert_eq!(score(&[4, 2, 3, 1, 4, 3, 2, 2, 4, 2]), Some(67.5));
         assert_eq!(score(&[3; 9]), None);
         assert_eq!(score(&[0; 10]), None);

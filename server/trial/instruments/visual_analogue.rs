@@ -1,10 +1,10 @@
-//! A visual analogue scale: a line whose ends are named and that has no marks between (Hayes & Patterson 1921,
-//! Psychological Bulletin 18:98). The answer is the distance from the lower end in hundredths of the line, which is a
-//! millimetre of the usual line of 100 mm. A line that was not touched has no answer.
+//! A visual analogue scale: a line with named ends and no marks between them (Hayes & Patterson 1921, Psychological
+//! Bulletin 18:98). The answer is the distance from the lower end in hundredths of the line, that is, in millimetres of
+//! the usual line of 100 mm. A line that was not touched has no answer.
 
 use super::measure::Measure;
 
-/// The upper end.
+/// The highest answer: the upper end of the line.
 pub const LONGEST: u8 = 100;
 
 /// Whether `place` is on the line.
@@ -12,7 +12,7 @@ pub const fn fits(place: u8) -> bool {
     place <= LONGEST
 }
 
-/// The place on the line, 0..=100; 0 is the lower end and not a missing answer.
+/// The place on the line, 0..=100. 0 is the lower end, not a missing answer.
 pub fn measures(place: u8) -> Vec<Measure> {
     vec![Measure::item("position", "Position, 0 to 100", Some(f64::from(place)))]
 }

@@ -1,16 +1,17 @@
-//! What the task load indices share: scales of twenty intervals, which a surgeon marks at one of 21 gradations, and
-//! that count from 0 to 100 in steps of 5 (Hart & Staveland 1988, in Human Mental Workload, pages 139-183).
+//! The common parts of the task load indices: scales of twenty intervals. A surgeon marks one of the 21 gradations,
+//! which count from 0 to 100 in steps of 5 (Hart & Staveland 1988, in Human Mental Workload, pages 139-183).
 
 use super::measure::{MISSING, Measure, given};
 use crate::trial::question::Scale;
 
-/// Gradations of a scale, ends included.
+/// Number of gradations of a scale, ends included.
 pub const GRADATIONS: u8 = 21;
 
-/// Rating between two gradations.
+/// Difference between the ratings of two neighbouring gradations.
 const STEP: f64 = 5.0;
 
-/// Whether these are the gradations of `scales` scales and the choices of `pairs` pairs, or a part of them.
+/// Whether `items` are the gradations of `scales` scales (1 to 21) and then the choices of `pairs` pairs (1 or 2).
+/// Some, but not all, may be 0, which means not given.
 pub fn fits(items: &[u8], scales: usize, pairs: usize) -> bool {
     let highest = std::iter::repeat_n(GRADATIONS, scales).chain(std::iter::repeat_n(2, pairs));
     items.len() == scales + pairs
@@ -18,24 +19,24 @@ pub fn fits(items: &[u8], scales: usize, pairs: usize) -> bool {
         && items.iter().any(|item| *item > 0)
 }
 
-/// The rating at a gradation, 0..=100; none where no gradation was marked.
+/// The rating at a gradation, 0..=100; none if no gradation was marked.
 pub fn rating(gradation: u8) -> Option<f64> {
     given(gradation).map(|gradation| (gradation - 1.0) * STEP)
 }
 
-/// The rating of each scale.
+/// The rating of each scale, as measures.
 pub fn ratings(scales: &[Scale], items: &[u8]) -> Vec<Measure> {
     let measure = |(scale, &item): (&Scale, &u8)| Measure::item(&scale.name, &scale.title, rating(item));
     scales.iter().zip(items).map(measure).collect()
 }
 
-/// The mean of all ratings: the index without weights. `None` when one is missing.
+/// The mean of all ratings: the index without weights. `None` if a rating is missing.
 pub fn mean(ratings: &[Option<f64>]) -> Option<f64> {
     let ratings: Vec<f64> = ratings.iter().copied().collect::<Option<_>>()?;
     (!ratings.is_empty()).then(|| ratings.iter().sum::<f64>() / ratings.len() as f64)
 }
 
-/// Each scale with its rating.
+/// Each scale with its rating, in words.
 pub fn in_words(scales: &[Scale], items: &[u8]) -> String {
     let part = |(scale, &item): (&Scale, &u8)| {
         let rating = rating(item).map_or_else(|| MISSING.to_owned(), |rating| rating.to_string());
@@ -44,7 +45,7 @@ pub fn in_words(scales: &[Scale], items: &[u8]) -> String {
     scales.iter().zip(items).map(part).collect::<Vec<_>>().join(", ")
 }
 
-/// A scale whose name in exports is its title in lower case.
+/// Makes a scale. Its name in exports is its title in lower case, with dashes for spaces.
 pub fn scale(title: &str, text: &str, low: &str, high: &str) -> Scale {
     Scale {
         name: title.to_lowercase().replace(' ', "-"),

@@ -1,38 +1,38 @@
-//! What is wrong with a protocol, and where: file, line and key.
+//! Errors in a protocol, with their place: file, line and key.
 
 use std::ops::Range;
 
-/// A malformed protocol.
+/// An error in a protocol or in a study's definition.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}, line {line}: {}{message}", .key.as_ref().map(|key| format!("key '{key}': ")).unwrap_or_default())]
 pub struct ProtocolError {
-    /// The file.
+    /// Name of the file.
     pub file: String,
-    /// Line, from 1.
+    /// Line number, from 1.
     pub line: usize,
-    /// The key, where one is at fault.
+    /// The faulty key; none if it is not known.
     pub key: Option<String>,
-    /// What is wrong.
+    /// Description of the fault.
     pub message: String,
 }
 
-/// Something wrong at a place in the text.
+/// A fault at a place in the text.
 pub(in crate::trial) struct Fault {
-    /// Bytes of the text at fault.
+    /// Byte range of the faulty text.
     pub span: Range<usize>,
-    /// The key, where it is known already.
+    /// The faulty key, if it is already known.
     pub key: Option<String>,
-    /// What is wrong.
+    /// Description of the fault.
     pub message: String,
 }
 
 impl Fault {
-    /// `message` about `key` at `span`.
+    /// A fault of `key` at `span`.
     pub fn new(span: Range<usize>, key: &str, message: impl Into<String>) -> Self {
         Self { span, key: Some(key.to_owned()), message: message.into() }
     }
 
-    /// The fault as the reader of `file` needs it.
+    /// The fault as an error with file name, line and key.
     pub fn in_file(self, file: &str, source: &str) -> ProtocolError {
         let start = floor_char_boundary(source, self.span.start);
         let line = source[..start].bytes().filter(|&byte| byte == b'\n').count() + 1;
@@ -44,7 +44,7 @@ impl Fault {
 impl From<toml::de::Error> for Fault {
     fn from(error: toml::de::Error) -> Self {
         let message = error.message().trim().replace('\n', "; ");
-        // A missing key has none to point at: the message names it.
+        // A missing key has no place in the text, so its name is taken from the message.
         let key = message.starts_with("missing field").then(String::new);
         let mut fault = Self { span: error.span().unwrap_or(0..0), key: None, message };
         if let Some(missing) = key.and(fault.message.split('`').nth(1)) {
@@ -54,7 +54,7 @@ impl From<toml::de::Error> for Fault {
     }
 }
 
-/// The key whose value stands on line `line` (from 1): the nearest `key =` at or above it.
+/// The key whose value is on line `line` (from 1): the nearest `key =` at or above it in the same table.
 fn key_at(source: &str, line: usize) -> Option<String> {
     let above: Vec<&str> = source.lines().take(line).collect();
     above

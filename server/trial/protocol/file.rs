@@ -1,4 +1,4 @@
-//! The protocol's file: its TOML shape, and the rules that a shape cannot express.
+//! The protocol's file: its TOML structure, and the rules that the structure cannot express.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -17,30 +17,30 @@ use crate::trial::grace::DEFAULT_GRACE;
 use crate::trial::instruments::{nasa_tlx, surg_tlx};
 use crate::trial::question::{Question, QuestionKind};
 
-/// Most segments in a session: what a surgeon can still compare, and the ranking's limit.
+/// Maximum number of segments in a session: more can no longer be compared or ranked by a surgeon.
 const MOST_SETTINGS: usize = 24;
-/// Most segments in a balanced session: its base order is drawn by rejection, which is slow for long ones.
+/// Maximum number of segments in a balanced session. Its base order is drawn by rejection, which is slow for more.
 const MOST_BALANCED_SETTINGS: usize = 12;
-/// How many points with labels a scale may have: more cannot be told apart, or reached with gloves.
+/// Allowed number of labelled points on a scale. More cannot be distinguished, or tapped with gloves.
 const LABELS: std::ops::RangeInclusive<u8> = 2..=9;
-/// Longest time for which a protocol keeps voice: thirty years, as the records of some trials.
+/// Longest time for which a protocol may keep voice: thirty years, as for the records of some trials.
 const LONGEST_VOICE_DAYS: u32 = 30 * 366;
-/// Longest text that surgeons read, in characters.
+/// Maximum length of a text that surgeons read, in characters.
 const LONGEST_TEXT: usize = 400;
 
 impl Protocol {
-    /// Reads a protocol. `file` is named in errors; `known` are the policies that there are.
+    /// Reads a protocol. Errors name `file`. `known` are the available policies.
     ///
     /// # Errors
-    /// At the first thing wrong, with its line and key.
+    /// If the text is not a valid protocol. The error describes the first fault, with its line and key.
     pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
         parse(source, known).map_err(|fault| fault.in_file(file, source))
     }
 
-    /// Reads a protocol as it was kept with a study: the policies that it names are known, whatever this version has.
+    /// Reads a protocol that was stored with a study. It may name policies that this version does not have.
     ///
     /// # Errors
-    /// When this version cannot read it otherwise.
+    /// If this version cannot read the protocol for another reason.
     pub fn parse_kept(source: &str, file: &str) -> Result<Self, ProtocolError> {
         #[derive(Deserialize)]
         struct Policies {
@@ -126,7 +126,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// The keys that only questions of some kinds have, and this one has.
+    /// The keys that questions of this kind have, beyond those of all questions.
     const fn own_keys(self) -> &'static [&'static str] {
         match self {
             Self::Likert => &["points", "low", "high", "labels"],
@@ -139,7 +139,7 @@ impl Kind {
 }
 
 impl FileQuestion {
-    /// The keys that only questions of some kinds have, as far as they are given, each with its place.
+    /// The given keys that not every kind of question has, each with its place in the text.
     fn own_keys(&self) -> impl Iterator<Item = (&'static str, Range<usize>)> {
         let given = [
             ("points", self.points.as_ref().map(Spanned::span)),
@@ -217,7 +217,7 @@ fn check_order(file: &File, settings: usize) -> Result<(), Fault> {
     Ok(())
 }
 
-/// For how many days voice is kept.
+/// Reads the number of days for which voice is kept; none if it is kept until somebody erases it.
 fn voice_days(file: &File) -> Result<Option<u32>, Fault> {
     let Some(days) = &file.voice_days else { return Ok(None) };
     if !file.voice {
@@ -233,7 +233,7 @@ fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {
     })
 }
 
-/// The version of the consent text that is required.
+/// Reads the version of the consent text that is required.
 fn consent_version(given: &Spanned<String>) -> Result<String, Fault> {
     let version = given.get_ref().trim();
     let length = version.chars().count();
@@ -299,7 +299,7 @@ impl Reader<'_> {
         Ok(names)
     }
 
-    /// A text for surgeons: not empty, not endless, and without a policy's name.
+    /// Checks a text for surgeons: it must be neither empty nor too long, and must not name a policy.
     fn shown(&self, value: &Spanned<String>, key: &str) -> Result<String, Fault> {
         let text = value.get_ref().trim();
         let length = text.chars().count();
@@ -309,12 +309,12 @@ impl Reader<'_> {
         }
 
         let lower = text.to_lowercase();
-        // A name without a dash ("fixed") is a plain word too, and may be used as one.
+        // A name without a dash ("fixed") is also an ordinary word, which texts may use.
         let named = self.known.iter().map(PolicyName::as_str).find(|name| name.contains('-') && lower.contains(name));
         named.map_or_else(
             || Ok(text.to_owned()),
             |name| {
-                Err(Fault::new(value.span(), key, format!("names the policy '{name}', but surgeons are blind to it")))
+                Err(Fault::new(value.span(), key, format!("names the policy '{name}', which surgeons must not know")))
             },
         )
     }
@@ -359,7 +359,7 @@ impl Reader<'_> {
     fn kind(&self, question: &FileQuestion, closing: bool) -> Result<QuestionKind, Fault> {
         let kind = *question.kind.get_ref();
         if let Some((key, span)) = question.own_keys().find(|(key, _)| !kind.own_keys().contains(key)) {
-            return Err(Fault::new(span, key, "questions of this kind do not have it"));
+            return Err(Fault::new(span, key, "this kind of question does not have this key"));
         }
 
         match kind {
@@ -396,10 +396,10 @@ impl Reader<'_> {
         Ok(QuestionKind::Likert { points: *points.get_ref(), low, high, labels: Vec::new() })
     }
 
-    /// A Likert scale of which every point has a label.
+    /// Reads a Likert scale with a label on every point.
     fn labelled(&self, question: &FileQuestion) -> Result<QuestionKind, Fault> {
         if let Some((key, span)) = question.own_keys().find(|(key, _)| *key != "labels") {
-            return Err(Fault::new(span, key, "'labels' says it already"));
+            return Err(Fault::new(span, key, "not allowed together with 'labels'"));
         }
 
         let labels = question.labels.as_ref().map_or(&[][..], |labels| labels.get_ref().as_slice());
@@ -419,7 +419,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What an end of a scale means.
+    /// Reads the meaning of an end of a scale.
     fn end(&self, question: &FileQuestion, end: Option<&Spanned<String>>, key: &str) -> Result<String, Fault> {
         let kind = if *question.kind.get_ref() == Kind::Likert { "likert" } else { "visual-analogue" };
         let missing = || Fault::new(question.kind.span(), key, format!("a '{kind}' question needs it"));

@@ -1,5 +1,5 @@
-//! Protocols: what a trial compares, for how long, and what it asks. Written in TOML
-//! (docs/trial.md); valid once parsed.
+//! Protocols: what a trial compares, for how long, and which questions it asks. Protocols are written in TOML
+//! (docs/trial.md); a parsed protocol is valid.
 
 pub(in crate::trial) mod fault;
 mod file;
@@ -22,72 +22,73 @@ use crate::lens::FocalPower;
 /// A valid protocol, with the text that it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Protocol {
-    /// Name: lower case letters, digits and dashes.
+    /// Name: lower-case letters, digits and dashes.
     pub name: String,
-    /// Title as surgeons read it.
+    /// Title for surgeons.
     pub title: String,
-    /// Title as researchers and operators read it before a session; never sent to a surgeon.
+    /// Title for researchers and operators, shown before a session. It is never sent to a surgeon.
     pub researcher_title: String,
-    /// Whether its sessions are practice: kept apart from real data everywhere.
+    /// Whether sessions with this protocol are practice. They are kept apart from real data everywhere.
     pub practice: bool,
-    /// Policies compared, in the order that the allocation algorithm takes them.
+    /// Policies to compare, in the order in which the allocation algorithm takes them.
     pub policies: Vec<PolicyName>,
-    /// Segments of each policy.
+    /// Number of segments for each policy.
     pub repeats: usize,
-    /// How the segments are ordered.
+    /// Rule by which the order of the segments is drawn.
     pub order: Order,
-    /// Longest inspection in a segment.
+    /// Maximum time inspected in a segment.
     pub segment_limit: Duration,
-    /// Focal power at which every segment begins, so that the start tells nothing.
+    /// Focal power at which every segment begins, so that the start reveals nothing about the policy.
     pub start: FocalPower,
-    /// What the surgeon is prompted to comment on, by time.
+    /// Prompts to comment, in the order of their times.
     pub prompts: Vec<Prompt>,
-    /// How long a prompt stays.
+    /// How long a prompt stays on the page.
     pub prompt_stay: Duration,
-    /// One-tap comments.
+    /// Comments that the surgeon can give with one tap.
     pub quick_comments: Vec<String>,
     /// Whether the surgeon may comment aloud.
     pub voice: bool,
-    /// For how many days the sound of voice comments is kept; none: until somebody erases it.
+    /// Number of days for which the sound of voice comments is kept; none if it is kept until somebody erases it.
     pub voice_days: Option<u32>,
-    /// How long after the end what a surgeon's device still holds counts.
+    /// Grace period after a session's end: what a surgeon's device still holds counts if it arrives in this time.
     pub grace: Duration,
-    /// What is recorded.
+    /// What is recorded during a session.
     pub record: Record,
-    /// The version of the consent text without which a session does not start; none where none is required.
+    /// Version of the consent text that a participant must have consented to before a session starts; none if no
+    /// consent is required.
     pub consent: Option<String>,
-    /// Questions after each segment.
+    /// Questions asked after each segment.
     pub after_segment: Vec<Question>,
-    /// Questions at the end.
+    /// Closing questions, asked at the end.
     pub closing: Vec<Question>,
     /// The TOML text, byte for byte.
     pub source: Arc<str>,
 }
 
-/// What of a session is recorded, from its start to its end.
+/// What is recorded during a session, from its start to its end.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Record {
     /// Nothing.
     #[default]
     None,
-    /// The pictures as viewers get them.
+    /// The pictures that viewers get.
     View,
-    /// Every mosaic of the camera, lossless.
+    /// Every mosaic of the camera, without loss.
     Mosaic,
 }
 
 /// A prompt to comment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Prompt {
-    /// Time of inspection in the segment at which it appears.
+    /// When the prompt appears: time inspected in the segment.
     pub at: Duration,
-    /// What it says.
+    /// Text of the prompt.
     pub text: String,
 }
 
 impl Protocol {
-    /// Segments in a session.
+    /// Number of segments in a session.
     #[must_use]
     pub fn settings(&self) -> usize {
         self.policies.len() * self.repeats
@@ -99,20 +100,21 @@ impl Protocol {
         Sha256::digest(self.source.as_bytes()).into()
     }
 
-    /// The question `id`, among those after a segment (`true`) or at the end (`false`).
+    /// The question with this id: among those after a segment if `after_segment`, otherwise among the closing
+    /// questions.
     #[must_use]
     pub fn question(&self, id: &str, after_segment: bool) -> Option<&Question> {
         let questions = if after_segment { &self.after_segment } else { &self.closing };
         questions.iter().find(|question| question.id == id)
     }
 
-    /// The prompt to show after `inspected` in a segment.
+    /// The prompt to show when `inspected` has been inspected in a segment; none if none is due.
     #[must_use]
     pub fn prompt_at(&self, inspected: Duration) -> Option<&Prompt> {
         self.prompts.iter().rev().find(|prompt| prompt.at <= inspected && inspected < prompt.at + self.prompt_stay)
     }
 
-    /// Time of inspection after `inspected` at which the prompt shown next changes.
+    /// The next time inspected, after `inspected`, at which the shown prompt changes; none if it stays as it is.
     #[must_use]
     pub fn next_prompt_change(&self, inspected: Duration) -> Option<Duration> {
         self.prompts
@@ -225,7 +227,7 @@ mod tests {
     fn what_surgeons_read_may_not_name_a_policy() {
         let said =
             error(&PAPER.replace("text = \"How does the focus feel now?\"", "text = \"Is MGM-hill-climber good?\""));
-        assert!(said.contains("mgm-hill-climber") && said.contains("blind"), "{said}");
+        assert!(said.contains("mgm-hill-climber") && said.contains("must not know"), "{said}");
     }
 
     #[test]

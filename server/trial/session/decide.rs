@@ -1,5 +1,5 @@
-//! What an action brings about: the events to record, none where it was done already, or why not.
-//! Who may do what is decided here too.
+//! Decides what an action causes: the events to record, no events if it was done before, or a refusal. This includes
+//! the decision which role may do what.
 
 use std::time::Duration;
 
@@ -15,11 +15,10 @@ use crate::trial::reason;
 use crate::trial::refusal::Refusal;
 use crate::trial::role::Role;
 
-/// The events that `action` by `by` brings about at `now`; none when it was done before (a double
-/// click, a stale tab).
+/// The events that `action` by `by` causes at `now`. Empty if the action was done before (a double click, a stale tab).
 ///
 /// # Errors
-/// When `by` may not, or it does not fit where the session stands.
+/// If `by` may not do this, or the action does not fit the state of the session.
 pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     allowed(state, by, action)?;
     match action {
@@ -36,7 +35,7 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
     }
 }
 
-/// The events that the passing of time brings about: the end of a segment at its limit.
+/// The events that the passing of time causes: the end of a segment at its time limit.
 #[must_use]
 pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
     if !state.running() || state.inspected(now) < state.plan.limit {
@@ -45,8 +44,7 @@ pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
     state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
 }
 
-/// The events that a restart of the server brings about; `inspected` is the time inspected as far
-/// as is known.
+/// The events that a restart of the server causes. `inspected` is the known time inspected in the segment.
 #[must_use]
 pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
     if state.ended() || state.phase == Phase::Ready {
@@ -72,7 +70,10 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
     if fits { Ok(()) } else { Err(Refusal::only(who)) }
 }
 
-/// Where `segment` stands to the one under way: already left (`None`), or under way and not paused.
+/// The phase of `segment` if it is the current one; `None` if it is already done.
+///
+/// # Errors
+/// If the session has no such segment or has not reached it, or was aborted.
 fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
     let position = state.plan.position(segment).ok_or(Refusal::UnknownSegment)?;
     if position < state.done {
@@ -149,7 +150,7 @@ fn finish(state: &SessionState, segment: SegmentId, inspected: Duration) -> Vec<
     if state.plan.after_segment.is_empty() { with_completion(state, finished) } else { vec![finished] }
 }
 
-/// `last`, which leaves the segment under way, and the completion if nothing follows.
+/// The event `last`, which ends the current segment, and the session's completion if nothing follows.
 fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
     let completes = state.done + 1 == state.plan.segments.len() && state.plan.closing.is_empty();
     let mut events = vec![last];

@@ -1,5 +1,5 @@
-//! The session's state machine. Events are the truth: [`SessionState::apply`] folds them into a state, [`decide`] says
-//! which events an action brings about, and neither reads a clock or keeps anything elsewhere.
+//! The session's state machine. Events are the only source of truth: [`SessionState::apply`] folds them into a state,
+//! and [`decide`] says which events an action causes. Neither reads a clock, and neither stores anything elsewhere.
 //!
 //! ```text
 //! Ready -Start-> Notice -Acknowledge-> Inspecting -FinishSegment, or time is up-> Questions -FinishQuestions-+
@@ -8,7 +8,7 @@
 //!                                                                                                             |
 //!                                    Completed <-FinishQuestions- Closing <-----------------------------------+
 //! ```
-//! Without questions the step is left out. Every phase from Notice to Closing can be paused and aborted.
+//! If there are no questions, their step is skipped. Every phase from Notice to Closing can be paused and aborted.
 
 mod decide;
 #[cfg(test)]
@@ -27,23 +27,24 @@ use super::standing::{Given, counted};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
 
-/// What of a session never changes and decides its course.
+/// The parts of a session that never change and that determine its course.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The segments, in order.
     pub segments: Vec<SegmentId>,
-    /// Longest inspection in a segment.
+    /// Maximum time inspected in a segment.
     pub limit: Duration,
-    /// Questions after each segment.
+    /// Questions asked after each segment.
     pub after_segment: Vec<Question>,
-    /// Questions at the end.
+    /// Closing questions, asked at the end.
     pub closing: Vec<Question>,
-    /// The version of the consent text without which it does not start; none where the protocol requires no consent.
+    /// Version of the consent text that the participant must have consented to before the start; none if the protocol
+    /// requires no consent.
     pub consent: Option<String>,
 }
 
 impl Plan {
-    /// The plan of a session by `protocol` with these `segments`.
+    /// The plan of a session with this protocol and these segments.
     #[must_use]
     pub fn new(protocol: &Protocol, segments: Vec<SegmentId>) -> Self {
         Self {
@@ -62,29 +63,29 @@ impl Plan {
     }
 }
 
-/// Who or what paused a session.
+/// What paused a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PauseCause {
-    /// The operator: only the operator lets it go on.
+    /// The operator. Only the operator can resume the session.
     Operator,
-    /// A restart of the server: the surgeon may let it go on too.
+    /// A restart of the server. The surgeon can resume the session too.
     Restart,
 }
 
-/// Where a session stands.
+/// The state of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionState {
     plan: Plan,
     phase: Phase,
     done: usize,
-    /// Segments whose questions were shown.
+    /// Number of segments whose inspection has ended, so that their questions may be answered.
     asked: usize,
     paused: Option<PauseCause>,
     inspected: Duration,
     running_since: Option<Moment>,
     unblinded: bool,
     withdrawn: bool,
-    /// The version of the text that the participant last consented to.
+    /// Version of the consent text that the participant consented to last.
     consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
 }
@@ -92,14 +93,14 @@ pub struct SessionState {
 /// The answers to one question.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Answered {
-    /// All, as they arrived.
+    /// All answers, in the order of their arrival.
     given: Vec<Given>,
-    /// What counts of them.
+    /// The answer that counts.
     counts: Option<AnswerValue>,
 }
 
 impl SessionState {
-    /// A session just made.
+    /// The state of a new session.
     #[must_use]
     pub const fn new(plan: Plan) -> Self {
         Self {
@@ -117,7 +118,7 @@ impl SessionState {
         }
     }
 
-    /// Where `events`, all from the first, lead to; with the answers and the consent kept so far.
+    /// The state after `events`, which are all events from the first on. Keeps the present answers and the consent.
     #[must_use]
     pub fn replayed(&self, events: &[Event]) -> Self {
         let mut state = Self::new(self.plan.clone());
@@ -129,31 +130,31 @@ impl SessionState {
         state
     }
 
-    /// Its plan.
+    /// The session's plan.
     #[must_use]
     pub const fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Its phase.
+    /// The session's phase. It does not change while the session is paused.
     #[must_use]
     pub const fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// Who paused it, if it is paused.
+    /// What paused the session; none if it is not paused.
     #[must_use]
     pub const fn paused(&self) -> Option<PauseCause> {
         self.paused
     }
 
-    /// Whether nothing more will happen in it but late comments and unblinding.
+    /// Whether the session was completed or aborted.
     #[must_use]
     pub const fn ended(&self) -> bool {
         self.phase.has_ended()
     }
 
-    /// Whether it was told which policies ran.
+    /// Whether the session was unblinded.
     #[must_use]
     pub const fn unblinded(&self) -> bool {
         self.unblinded
@@ -165,38 +166,38 @@ impl SessionState {
         self.withdrawn
     }
 
-    /// Takes in a consent to version `text_version` of the text.
+    /// Records a consent to version `text_version` of the consent text.
     pub fn keep_consent(&mut self, text_version: &str) {
         self.consented = Some(text_version.to_owned());
     }
 
-    /// Segments done with, their questions included.
+    /// Number of segments that are done, including their questions.
     #[must_use]
     pub const fn done(&self) -> usize {
         self.done
     }
 
-    /// The segment under way: from its notice to the end of its questions.
+    /// The current segment, from its notice to the end of its questions; none outside that.
     #[must_use]
     pub fn segment(&self) -> Option<SegmentId> {
         let under_way = matches!(self.phase, Phase::Notice | Phase::Inspecting | Phase::Questions);
         self.plan.segments.get(self.done).copied().filter(|_| under_way)
     }
 
-    /// Time inspected in the segment under way, pauses excluded, never more than the limit.
+    /// Time inspected in the current segment, without pauses, and never more than the limit.
     #[must_use]
     pub fn inspected(&self, now: Moment) -> Duration {
         let running = self.running_since.map_or(Duration::ZERO, |since| now.since(since));
         (self.inspected + running).min(self.plan.limit)
     }
 
-    /// Whether the segment's clock runs.
+    /// Whether the segment's clock is running.
     #[must_use]
     pub const fn running(&self) -> bool {
         self.running_since.is_some()
     }
 
-    /// The questions asked now.
+    /// The questions that are asked now.
     #[must_use]
     pub fn questions(&self) -> &[Question] {
         match self.phase {
@@ -206,21 +207,21 @@ impl SessionState {
         }
     }
 
-    /// The answer that counts to `question`, asked after `segment` or (none) at the end.
+    /// The answer to `question` that counts. The question was asked after `segment`, or at the end if that is `None`.
     #[must_use]
     pub fn answer(&self, segment: Option<SegmentId>, question: &str) -> Option<&AnswerValue> {
         self.answers.get(&(segment, question.to_owned()))?.counts.as_ref()
     }
 
-    /// Takes in an answer that arrived; of all to the question the one given last counts.
+    /// Adds an answer that has arrived. Of all answers to a question, the one given last counts.
     pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, given: Given) {
         let answered = self.answers.entry((segment, question.to_owned())).or_default();
         answered.given.push(given);
         answered.counts = counted(&answered.given);
     }
 
-    /// Whether answers to questions about `segment` (none: about the whole) are kept: always, once
-    /// they have been shown. Whether a late one counts, [`Grace`](super::grace::Grace) says.
+    /// Whether answers to the questions about `segment` (`None`: the closing questions) are kept. They always are once
+    /// the questions have been shown. [`Grace`](super::grace::Grace) decides whether a late answer counts.
     #[must_use]
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {
@@ -229,7 +230,7 @@ impl SessionState {
         }
     }
 
-    /// Takes in what happened.
+    /// Applies an event.
     pub fn apply(&mut self, event: &Event) {
         match &event.kind {
             EventKind::Created | EventKind::QuestionsFinished { segment: None } => {}

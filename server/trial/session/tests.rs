@@ -1,4 +1,4 @@
-//! The state machine under every order of actions.
+//! Tests the state machine, also with random sequences of actions.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
     }
 }
 
-/// A session with its log and a clock.
+/// A session with its event log and a clock.
 struct Run {
     state: SessionState,
     log: Vec<Event>,
@@ -78,7 +78,7 @@ impl Run {
     }
 }
 
-/// An answer as it arrives at once.
+/// An answer that arrives at once, in time.
 fn said(text: &str) -> Given {
     let value = AnswerValue::Text(text.to_owned());
     Given { device: None, sequence: None, at: Timestamp::UNIX_EPOCH, late: false, value }
@@ -224,7 +224,7 @@ fn questions_take_answers_from_when_they_are_asked_on() {
     assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(Some(segment(1))));
     run.act(Role::Operator, &Action::Pause { reason: String::new() }).unwrap();
     assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(None));
-    // A tablet out of the network's reach may have them still to send.
+    // A tablet without a network may still have to send them.
     run.act(Role::Operator, &Action::Abort { reason: "the tablet is silent".to_owned() }).unwrap();
     assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(Some(segment(1))));
 }

@@ -1,5 +1,5 @@
-//! A study's definition: what is planned, written in TOML (docs/study.md) before the first session. The same file has
-//! the same SHA-256 at every site.
+//! A study's definition: the plan, written in TOML (docs/study.md) before the first session. All sites use the same
+//! file, which its SHA-256 proves.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -14,18 +14,18 @@ use crate::trial::allocation::Order;
 use crate::trial::protocol::fault::{Fault, ProtocolError};
 use crate::trial::protocol::{Protocol, between, identifier};
 
-/// Most sites of a study.
+/// Maximum number of sites in a study.
 const MOST_SITES: usize = 50;
-/// Most protocols of a study.
+/// Maximum number of protocols in a study.
 const MOST_PROTOCOLS: usize = 10;
-/// Most surgeons, and most spare places, of a site.
+/// Maximum number of surgeons, and of spare places, at a site.
 const MOST_PLACES: usize = 500;
-/// Longest text, in characters.
+/// Maximum length of a text, in characters.
 const LONGEST_TEXT: usize = 4000;
-/// Longest title or name of a person, in characters.
+/// Maximum length of a title or of a person's name, in characters.
 const LONGEST_LINE: usize = 200;
 
-/// A study's name: it identifies the study at every site.
+/// A study's name, which identifies the study at every site: lower-case letters, digits and dashes.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, ToSchema)]
 #[serde(transparent)]
 pub struct StudyName(String);
@@ -47,23 +47,23 @@ impl fmt::Display for StudyName {
 /// A valid definition, with the text that it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Definition {
-    /// Its name.
+    /// Name of the study.
     pub name: StudyName,
-    /// Its title, for everyone but surgeons.
+    /// Title, shown to everyone but surgeons.
     pub title: String,
-    /// How sessions are ordered: the same as in each protocol.
+    /// Rule by which the orders of sessions are drawn. It is the same in each protocol.
     pub order: Order,
-    /// The protocols, each in the version that the definition names by its hash.
+    /// Protocols of the study, each in the version with the hash that the definition names.
     pub protocols: Vec<Protocol>,
-    /// The sites.
+    /// Sites of the study, in the definition's order.
     pub sites: Vec<Site>,
-    /// What becomes of places whose session does not stand.
+    /// Rules for the places of aborted and withdrawn sessions, and for repeated sessions.
     pub rules: PlaceRules,
-    /// What to do when a list is used up, for the operator to read.
+    /// Advice to the operator when a list has no place left.
     pub when_used_up: String,
-    /// Who may unblind the whole study.
+    /// People who may unblind the whole study, by name or function.
     pub may_unblind: Vec<String>,
-    /// How the study will be analysed.
+    /// Planned analysis of the study, in words.
     pub analysis: String,
     /// The TOML text, byte for byte.
     pub source: Arc<str>,
@@ -72,54 +72,54 @@ pub struct Definition {
 /// A site of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Site {
-    /// Its name: lower case letters, digits and dashes.
+    /// Name of the site: lower-case letters, digits and dashes.
     pub name: String,
-    /// Its title.
+    /// Title of the site.
     pub title: String,
-    /// Surgeons planned: the places of each list that are open from the beginning.
+    /// Number of surgeons planned: places of each list that are open from the beginning.
     pub surgeons: usize,
-    /// Further places at the end of each list, which the rules open one by one.
+    /// Number of spare places at the end of each list. The rules open them one by one.
     pub spares: usize,
 }
 
 impl Site {
-    /// The length of each of its lists.
+    /// Number of places in each list of the site.
     #[must_use]
     pub const fn places(&self) -> usize {
         self.surgeons + self.spares
     }
 }
 
-/// What becomes of places whose session does not stand.
+/// Rules for the places of aborted and withdrawn sessions, and for repeated sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 pub struct PlaceRules {
-    /// Of an aborted session.
+    /// What happens to the place of an aborted session.
     pub aborted: Replacement,
-    /// Of a session whose surgeon withdrew.
+    /// What happens to the place of a session whose surgeon withdrew.
     pub withdrawn: Replacement,
-    /// Whether a surgeon may have a second session.
+    /// Whether a surgeon may have a second session with the same protocol.
     pub repeated: Repetition,
 }
 
-/// What becomes of the place of a session that does not stand.
+/// What happens to the place of a session that was aborted or withdrawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Replacement {
-    /// It stays used: nobody takes it, and nobody is added.
+    /// The place stays used. Nobody takes it, and no place is added.
     Keep,
-    /// The next session takes it, with the same order, unless the order has become known.
+    /// The next session takes the place, with the same order, unless the order has become known.
     SamePlace,
-    /// It stays used, and one spare place at the end of the list opens.
+    /// The place stays used, and one spare place at the end of the list opens.
     NextSpare,
 }
 
-/// Whether a surgeon who has a session that stands may have another by the same protocol.
+/// Whether a surgeon who already has a session with a protocol may have another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Repetition {
-    /// No.
+    /// No: the session is refused.
     Refuse,
-    /// Yes: it takes the next place, and one spare place at the end of the list opens.
+    /// Yes: the session takes the next place, and one spare place at the end of the list opens.
     NextSpare,
 }
 
@@ -156,27 +156,27 @@ struct FileSite {
 }
 
 impl Definition {
-    /// Reads a definition. `file` is named in errors; `installed` are the protocols that there are.
+    /// Reads a definition. Errors name `file`. `installed` are the available protocols.
     ///
     /// # Errors
-    /// At the first thing wrong, with its line and key.
+    /// If the text is not a valid definition. The error describes the first fault, with its line and key.
     pub fn parse(source: &str, file: &str, installed: &[Protocol]) -> Result<Self, ProtocolError> {
         parse(source, installed).map_err(|fault| fault.in_file(file, source))
     }
 
-    /// SHA-256 of the TOML text, in hexadecimal: what `sha256sum` says of the file.
+    /// SHA-256 of the TOML text, in hexadecimal, as `sha256sum` prints it for the file.
     #[must_use]
     pub fn sha256(&self) -> String {
         hex::encode(Sha256::digest(self.source.as_bytes()))
     }
 
-    /// Site `name`.
+    /// The site with this name, if there is one.
     #[must_use]
     pub fn site(&self, name: &str) -> Option<&Site> {
         self.sites.iter().find(|site| site.name == name)
     }
 
-    /// Protocol `name`.
+    /// The protocol with this name, if the study has it.
     #[must_use]
     pub fn protocol(&self, name: &str) -> Option<&Protocol> {
         self.protocols.iter().find(|protocol| protocol.name == name)
@@ -201,7 +201,7 @@ fn parse(source: &str, installed: &[Protocol]) -> Result<Definition, Fault> {
     })
 }
 
-/// A text that is neither empty nor endless.
+/// Checks that a text is neither empty nor longer than `longest` characters, and returns it without surrounding blanks.
 fn text(value: &Spanned<String>, key: &str, longest: usize) -> Result<String, Fault> {
     let text = value.get_ref().trim();
     let length = text.chars().count();
@@ -281,7 +281,7 @@ fn protocols(file: &File, installed: &[Protocol]) -> Result<Vec<Protocol>, Fault
     Ok(protocols)
 }
 
-/// The protocol that `named` names, if it is installed in that version.
+/// Finds the installed protocol with the name and the hash that `named` gives.
 fn installed_version<'a>(named: &FileProtocol, installed: &'a [Protocol]) -> Result<&'a Protocol, Fault> {
     let name = named.name.get_ref();
     let protocol = installed.iter().find(|protocol| protocol.name == *name).ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! What happens to a study, in order: its state follows from it. Each event names a person and a reason.
+//! A study's events, in order. The study's state is computed from them. Each event names a person and a reason.
 
 use jiff::Timestamp;
 
@@ -8,48 +8,48 @@ use crate::ids::SessionId;
 /// Something that happened to a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StudyEvent {
-    /// Counts up from 1 in the study, without gaps.
+    /// Number of the event in its study: from 1, without gaps.
     pub number: u32,
-    /// By which way.
+    /// How it was done: on a page, or with a command.
     pub way: Way,
-    /// Who and why.
+    /// Person who did it, and the reason.
     pub signature: Signature,
-    /// When, by the wall clock. The order of events is that of their numbers, whatever the clock did.
+    /// Time by the wall clock. The order of events is that of their numbers, whatever the clock did.
     pub wall: Timestamp,
-    /// What.
+    /// What happened, with its details.
     pub kind: StudyEventKind,
 }
 
-/// What happened.
+/// What happened to a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StudyEventKind {
     /// The study was planned.
     Planned,
-    /// It was opened. The first opening makes the commitment to its orders known.
+    /// The study was opened. The first opening publishes the commitment to the orders.
     Opened {
-        /// The commitment; none when it was opened again.
+        /// Commitment to the orders; none if the study was opened again.
         commitment: Option<String>,
     },
-    /// It was closed.
+    /// The study was closed.
     Closed,
-    /// It was locked.
+    /// The study was locked.
     Locked,
-    /// All of it was unblinded.
+    /// The whole study was unblinded.
     Unblinded,
     /// The surgeon of a session withdrew.
     SessionWithdrawn {
-        /// The session.
+        /// Session whose surgeon withdrew.
         session: SessionId,
     },
     /// One session was unblinded in an emergency.
     SessionUnblinded {
-        /// The session.
+        /// Session that was unblinded.
         session: SessionId,
     },
 }
 
 impl StudyEventKind {
-    /// Name of the kind, as in the database and in exports.
+    /// The kind's name, as in the database and in exports.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -63,7 +63,7 @@ impl StudyEventKind {
         }
     }
 
-    /// The kind called `name` with what else its record has; none where that does not fit.
+    /// The kind with this name, with the other fields of its record. None if they do not fit together.
     #[must_use]
     pub fn of(name: &str, session: Option<SessionId>, commitment: Option<String>) -> Option<Self> {
         Some(match (name, session) {
@@ -78,7 +78,7 @@ impl StudyEventKind {
         })
     }
 
-    /// The session that it is about.
+    /// The session that the event is about, if any.
     #[must_use]
     pub const fn session(&self) -> Option<SessionId> {
         match self {
@@ -87,7 +87,7 @@ impl StudyEventKind {
         }
     }
 
-    /// The commitment that it makes known.
+    /// The commitment that the event publishes, if any.
     #[must_use]
     pub fn commitment(&self) -> Option<&str> {
         match self {
@@ -96,7 +96,7 @@ impl StudyEventKind {
         }
     }
 
-    /// What happened, in words; `participant` tells the code of a session's participant.
+    /// A description in words. `participant` returns the code of a session's participant.
     #[must_use]
     pub fn in_words(&self, participant: impl Fn(SessionId) -> String) -> String {
         match self {

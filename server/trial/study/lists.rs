@@ -1,9 +1,9 @@
-//! The orders of a study: a list for each site and protocol, all drawn from one seed when the study is first opened,
-//! and the commitment that binds them.
+//! The orders of a study: a list for each site and protocol. All lists are drawn from one seed when the study is first
+//! opened, and a commitment binds them.
 //!
-//! Places of a list are grouped in sets of as many sessions as the algorithm balances. The seed of set `n` (from 1) is
-//! the SHA-256 of four lines, each ended by a line feed: `parfocal-study-set-1`, `seed SEED`, `list SITE PROTOCOL`,
-//! `set N`. So the seed of one set tells nothing of another.
+//! The places of a list are grouped into sets. A set has as many sessions as the algorithm balances. The seed of set
+//! `n` (from 1) is the SHA-256 of four lines, each ending with a line feed: `parfocal-study-set-1`, `seed SEED`,
+//! `list SITE PROTOCOL`, `set N`. So the seed of one set reveals nothing about another set.
 
 use std::fmt::Write;
 
@@ -14,40 +14,40 @@ use crate::autofocus::PolicyName;
 use crate::trial::allocation::{Algorithm, Seed};
 use crate::trial::protocol::Protocol;
 
-/// All orders of a study that a database has.
+/// All orders of a study in one database.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lists {
-    /// The study's name.
+    /// Name of the study.
     study: String,
-    /// SHA-256 of its definition.
+    /// SHA-256 of the study's definition, in hexadecimal.
     definition_sha256: String,
-    /// What all of it was drawn from.
+    /// Seed from which all lists are drawn.
     seed: Seed,
-    /// Each list, by site and then by protocol, in the definition's order.
+    /// The lists by site and then by protocol, in the definition's order.
     each: Vec<List>,
 }
 
-/// The list of a site and a protocol.
+/// The list of orders for one site and one protocol.
 #[derive(Debug, Clone, PartialEq)]
 pub struct List {
-    /// The site's name.
+    /// Name of the site.
     pub site: String,
-    /// The protocol's name.
+    /// Name of the protocol.
     pub protocol: String,
-    /// How it was drawn.
+    /// Algorithm that drew the list.
     pub algorithm: Algorithm,
-    /// Its places.
+    /// Places of the list, in the order in which sessions take them.
     pub places: Vec<Place>,
 }
 
 /// A place of a list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// The seed of its set.
+    /// Seed of the place's set.
     pub seed: Seed,
-    /// Its index in the set, from 0.
+    /// Index of the place in its set, from 0.
     pub index: usize,
-    /// Its order.
+    /// Policy of each segment, in order.
     pub schedule: Vec<PolicyName>,
 }
 
@@ -68,14 +68,14 @@ impl Lists {
         }
     }
 
-    /// Place `number`, from 1, of the list of `site` and `protocol`.
+    /// Place `number` (from 1) of the list for `site` and `protocol`; none if there is no such place.
     #[must_use]
     pub fn place(&self, site: &str, protocol: &str, number: usize) -> Option<&Place> {
         let list = self.each.iter().find(|list| list.site == site && list.protocol == protocol)?;
         list.places.get(number.checked_sub(1)?)
     }
 
-    /// The text that is hashed: lines, each ended by a line feed.
+    /// The text that is hashed: lines, each ending with a line feed.
     #[must_use]
     pub fn statement(&self) -> String {
         let mut text = format!(
@@ -102,7 +102,7 @@ impl Lists {
 }
 
 impl List {
-    /// Draws `places` places of the list of `site` and `protocol`, `seed` being that of the whole study.
+    /// Draws the list for `site` and `protocol`, with `places` places. `seed` is the seed of the whole study.
     #[must_use]
     pub fn draw(site: &str, protocol: &Protocol, places: usize, seed: Seed) -> Self {
         let algorithm = protocol.order.algorithm();
@@ -125,19 +125,19 @@ impl List {
     }
 }
 
-/// SHA-256 of the statement of all orders, in hexadecimal.
+/// The commitment: SHA-256 of the statement of all orders, in hexadecimal.
 #[must_use]
 pub fn commitment(statement: &str) -> String {
     hex::encode(Sha256::digest(statement))
 }
 
-/// The line to print, publish or mail before the first session.
+/// The line with the commitment, to be printed, published or mailed before the first session.
 #[must_use]
 pub fn commitment_line(study: &str, definition_sha256: &str, commitment: &str) -> String {
     format!("parfocal study {study} definition {definition_sha256} orders {commitment}")
 }
 
-/// An order as a statement has it.
+/// An order as it is written in a statement: policy names, separated by commas.
 #[must_use]
 pub fn in_words(schedule: &[PolicyName]) -> String {
     schedule.iter().map(PolicyName::as_str).collect::<Vec<_>>().join(",")

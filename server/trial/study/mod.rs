@@ -1,5 +1,5 @@
-//! Studies: many sessions by one plan. What is planned, which orders were drawn for it, who gets which place, and what
-//! may be done when. Pure: clock and random source are handed in.
+//! Studies: many sessions with one plan. Holds the definition, the drawn orders, the rules for places, and the rules
+//! for what may be done when. Pure code: callers pass in the time and the random source.
 
 pub mod definition;
 pub mod event;

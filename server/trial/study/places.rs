@@ -1,4 +1,4 @@
-//! Which place of its list a new session gets: the rules of the definition, and nobody's choice.
+//! Decides which place of its list a new session gets. The rules of the definition decide, not a person.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,58 +10,59 @@ use crate::trial::phase::SessionStatus;
 /// A session of a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Enrolled {
-    /// The session.
+    /// Id of the session.
     pub session: SessionId,
-    /// Its participant's code, as it was recorded.
+    /// Code of the session's participant, as it was recorded.
     pub participant: String,
-    /// The right code, where it was corrected.
+    /// Corrected code of the participant; none if it was not corrected.
     pub corrected_participant: Option<String>,
-    /// Its site.
+    /// Name of the session's site.
     pub site: String,
-    /// Its protocol.
+    /// Name of the session's protocol.
     pub protocol: String,
-    /// Its place in the list of both, from 1.
+    /// Place in the list for the site and the protocol, from 1.
     pub place: usize,
-    /// How far it came.
+    /// Whether the session is under way, completed or aborted.
     pub status: SessionStatus,
-    /// Whether it was unblinded.
+    /// Whether the session was unblinded.
     pub unblinded: bool,
-    /// Whether its surgeon withdrew.
+    /// Whether the session's surgeon withdrew.
     pub withdrawn: bool,
 }
 
 impl Enrolled {
-    /// Whose session it was: the code as it was corrected.
+    /// The surgeon whose session it was: the corrected code if there is one, otherwise the recorded one.
     #[must_use]
     pub fn surgeon(&self) -> &str {
         self.corrected_participant.as_ref().unwrap_or(&self.participant)
     }
 
-    /// What becomes of its place; none where the session stands.
+    /// What happens to the session's place; none if the session is valid, that is, neither withdrawn nor aborted.
     const fn replacement(&self, rules: PlaceRules) -> Option<Replacement> {
         let rule = match (self.withdrawn, self.status) {
             (true, _) => rules.withdrawn,
             (false, SessionStatus::Aborted) => rules.aborted,
             (false, SessionStatus::UnderWay | SessionStatus::Completed) => return None,
         };
-        // Whoever knows the order could tell it to the next surgeon.
+        // A person who knows the order could tell it to the next surgeon.
         Some(match rule {
             Replacement::SamePlace if self.unblinded => Replacement::NextSpare,
             rule => rule,
         })
     }
 
-    /// Whether a further session of its participant by the same protocol is a repetition.
+    /// Whether another session of the same surgeon with the same protocol is a repetition: this session is valid, or
+    /// its place is not replaced.
     fn stands(&self, rules: PlaceRules) -> bool {
         matches!(self.replacement(rules), None | Some(Replacement::Keep))
     }
 }
 
-/// The place, from 1, of a new session of `participant` at `site` by `protocol`. `sessions` are all sessions of the
+/// The place (from 1) of a new session of `participant` at `site` with `protocol`. `sessions` are all sessions of the
 /// study, in the order in which they were made.
 ///
 /// # Errors
-/// When the participant may not have a session, or no place is left.
+/// If the participant may not have a session, or no place is left.
 pub fn next_place(
     definition: &Definition,
     sessions: &[Enrolled],
@@ -76,7 +77,7 @@ pub fn next_place(
 
     let list: Vec<&Enrolled> =
         sessions.iter().filter(|session| session.site == site.name && session.protocol == protocol).collect();
-    // A surgeon who works at two sites is one surgeon.
+    // Counts sessions at all sites: a surgeon who works at two sites is still one surgeon.
     let repeats = sessions
         .iter()
         .any(|session| session.surgeon() == participant && session.protocol == protocol && session.stands(rules));
@@ -102,19 +103,19 @@ pub fn next_place(
     Ok(next)
 }
 
-/// The first place whose latest session gave it back.
+/// The first place that its latest session freed.
 fn given_back(list: &[&Enrolled], rules: PlaceRules) -> Option<usize> {
     let places: BTreeSet<usize> = list.iter().map(|session| session.place).collect();
     places.into_iter().find(|&place| {
         let mut at_this_place = list.iter().filter(move |session| session.place == place);
-        // Once the order of a place has become known, nobody takes it again.
+        // Once the order of a place is known, no session may take it again.
         let known = at_this_place.clone().any(|session| session.unblinded);
         let latest = at_this_place.next_back();
         !known && latest.is_some_and(|session| session.replacement(rules) == Some(Replacement::SamePlace))
     })
 }
 
-/// How many spare places the sessions of a list have opened.
+/// The number of spare places that the sessions of a list have opened.
 fn spares_opened(list: &[&Enrolled], rules: PlaceRules) -> usize {
     let mut latest = BTreeMap::new();
     for session in list {

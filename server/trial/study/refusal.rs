@@ -1,132 +1,132 @@
-//! Why something was not done to a study.
+//! Why a request about a study was refused.
 
 use super::stage::Stage;
 use crate::trial::refusal::Refusal;
 
-/// Why something was not done to a study. Nothing was changed.
+/// Why a request about a study was refused. Nothing was changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StudyRefusal {
-    /// Another role does this.
+    /// Only the researcher may change a study.
     #[error("only the researcher can change a study")]
     NotTheResearcher,
-    /// Nobody signed.
+    /// The person's name is missing or too long.
     #[error("say who you are, in 1 to {longest} characters: it is kept with the change")]
     NoPerson {
-        /// Most characters.
+        /// Maximum number of characters.
         longest: usize,
     },
-    /// No reason was given.
+    /// The reason is missing or too long.
     #[error("give a reason, in 1 to {longest} characters: it is kept with the change")]
     NoReason {
-        /// Most characters.
+        /// Maximum number of characters.
         longest: usize,
     },
-    /// Nobody could act in it.
+    /// No account is enabled, so nobody could act in the study.
     #[error(
         "in a study everybody but the surgeon acts under a personal account, and nobody has one: make accounts first, \
          with `parfocal account add NAME --role lead`"
     )]
     NoAccounts,
-    /// It is open.
+    /// The study is already open.
     #[error("the study is open already")]
     AlreadyOpen,
-    /// It cannot be closed before it was opened.
+    /// The study cannot be closed because it was never opened.
     #[error("the study has not been opened yet")]
     NotOpenedYet,
-    /// It is closed.
+    /// The study is already closed.
     #[error("the study is closed already")]
     AlreadyClosed,
-    /// It has to be closed first.
+    /// The study must be closed first.
     #[error("the study is {}; close it first, then lock it", .0.name())]
     NotClosed(Stage),
-    /// It is locked.
+    /// The study is locked.
     #[error("the study is locked: nothing of it can be changed any more")]
     Locked,
-    /// It has to be locked first.
+    /// The study must be locked first.
     #[error("the study is {}; a whole study can be unblinded only after it was locked", .0.name())]
     NotLocked(Stage),
-    /// It is unblinded.
+    /// The study is already unblinded.
     #[error("the study is unblinded already")]
     AlreadyUnblinded,
-    /// A session has not ended.
+    /// A session has not ended, or is still on the operator's page.
     #[error("the session of {participant} has not ended, or is still on the operator's page; close it there first")]
     SessionUnderWay {
-        /// Its participant.
+        /// Code of the session's participant.
         participant: String,
     },
-    /// Something may still come in.
+    /// Comments or answers may still arrive.
     #[error(
-        "for {sessions} of its sessions a surgeon's device may still hold something that would then not count; \
-         wait, or confirm it (despite_outstanding)"
+        "for {sessions} of its sessions, a surgeon's device may still hold comments or answers, which would then not \
+         count; wait, or confirm it (despite_outstanding)"
     )]
     Outstanding {
-        /// How many.
+        /// Number of sessions for which they may arrive.
         sessions: usize,
     },
-    /// The definition names others.
+    /// The definition does not allow this person to unblind the study.
     #[error("'{person}' is not among those who may unblind this study: {}", .may.join("; "))]
     MayNotUnblind {
-        /// Who asked.
+        /// Person who asked.
         person: String,
-        /// Who may.
+        /// People who may unblind the study.
         may: Vec<String>,
     },
-    /// The reason would tell.
-    #[error("the reason names the policy '{policy}', and every export tells the reason; write it without")]
+    /// The reason would reveal a policy.
+    #[error("the reason names the policy '{policy}', and every export shows the reason; remove the name")]
     ReasonNamesPolicy {
-        /// Which.
+        /// Name of the policy in the reason.
         policy: String,
     },
-    /// It has no such session.
+    /// The study has no such session.
     #[error("the study has no such session; reload the page")]
     UnknownSession,
-    /// The surgeon withdrew before.
+    /// The surgeon's withdrawal is already recorded.
     #[error("the withdrawal of {participant} is recorded already")]
     AlreadyWithdrawn {
-        /// Whose.
+        /// Code of the participant.
         participant: String,
     },
-    /// It takes no sessions now.
+    /// The study takes no sessions now, because it is not open.
     #[error("the study is {}; sessions can be made only while it is open", .0.name())]
     NotOpen(Stage),
-    /// It is not run at this site.
+    /// The study has no such site in this database.
     #[error("the study has no site '{site}' here; there are: {}", .here.join(", "))]
     UnknownSite {
-        /// The site asked for.
+        /// Name of the requested site.
         site: String,
-        /// Those of this database.
+        /// Sites of the study in this database.
         here: Vec<String>,
     },
-    /// It does not have this protocol.
+    /// The study does not have this protocol.
     #[error("the study has no protocol '{protocol}'; it has: {}", .known.join(", "))]
     UnknownProtocol {
-        /// The protocol asked for.
+        /// Name of the requested protocol.
         protocol: String,
-        /// Those of the study.
+        /// Protocols of the study.
         known: Vec<String>,
     },
-    /// The participant withdrew.
+    /// The participant withdrew from the study.
     #[error("{participant} withdrew from the study; choose another participant")]
     Withdrew {
-        /// Who.
+        /// Code of the participant.
         participant: String,
     },
-    /// The study wants one session of each surgeon.
+    /// The study allows only one session for each surgeon and protocol.
     #[error("{participant} has a session by this protocol, and the study allows no second one")]
     Repeated {
-        /// Who.
+        /// Code of the participant.
         participant: String,
     },
-    /// There is no place left.
+    /// No place is left in the list.
     #[error("no place is left in the list of {site}: {open} of {places} were open, all are used. {advice}")]
     UsedUp {
-        /// The site.
+        /// Name of the site.
         site: String,
-        /// Places that the rules opened.
+        /// Number of places that are open by the rules.
         open: usize,
-        /// The length of the list.
+        /// Number of places in the list, spare places included.
         places: usize,
-        /// What the definition says to do.
+        /// Advice of the definition for this case.
         advice: String,
     },
 }

@@ -1,25 +1,25 @@
-//! Who changes a study, by which way, and why.
+//! Signatures: who changes a study, how, and why.
 
 use super::refusal::StudyRefusal;
 use crate::trial::account::{Account, AccountName};
 use crate::trial::role::Role;
 
-/// Longest reason, characters.
+/// Maximum length of a reason, in characters.
 const LONGEST_REASON: usize = 1000;
-/// Longest name of a person, characters.
+/// Maximum length of a person's name, in characters.
 const LONGEST_PERSON: usize = 200;
 
-/// By which way something was done.
+/// How something was done to a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// On a page or through the interface, by this role.
+    /// On a page or through the HTTP interface, in this role.
     Role(Role),
-    /// By a command.
+    /// With a command.
     CommandLine,
 }
 
 impl Way {
-    /// Its name, as in the database and in exports.
+    /// The way's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -28,29 +28,29 @@ impl Way {
         }
     }
 
-    /// The way called `name`.
+    /// The way with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         if name == Self::CommandLine.name() { Some(Self::CommandLine) } else { Role::named(name).map(Self::Role) }
     }
 }
 
-/// Who does something to a study, and why.
+/// The person who does something to a study, and the reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signature {
-    /// The person, by name or function: the display name of the account, or what the command line was told.
+    /// Name or function of the person: the display name of the account, or as given on the command line.
     pub person: String,
-    /// Why.
+    /// Reason for the change.
     pub reason: String,
-    /// The account under which the person signed in; none for the command line.
+    /// Account to which the person is signed in; none on the command line.
     pub account: Option<AccountName>,
 }
 
 impl Signature {
-    /// A signature of `person` with `reason`, by the command line, where nobody signs in.
+    /// A signature of `person` with `reason`, from the command line, where nobody is signed in.
     ///
     /// # Errors
-    /// When one of them is missing or too long.
+    /// If the name or the reason is missing or too long.
     pub fn new(person: &str, reason: &str) -> Result<Self, StudyRefusal> {
         let person = person.trim();
         let reason = reason.trim();
@@ -63,10 +63,10 @@ impl Signature {
         }
         Ok(Self { person: person.to_owned(), reason: reason.to_owned(), account: None })
     }
-    /// A signature of whoever is signed in to `account`, with `reason`.
+    /// A signature of the person who is signed in to `account`, with `reason`.
     ///
     /// # Errors
-    /// When the reason is missing or too long.
+    /// If the reason is missing or too long.
     pub fn of_account(account: &Account, reason: &str) -> Result<Self, StudyRefusal> {
         Ok(Self { account: Some(account.account.clone()), ..Self::new(&account.display, reason)? })
     }

@@ -1,26 +1,26 @@
-//! How far a study has come.
+//! The stages of a study.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// How far a study has come.
+/// The stage of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
-    /// Defined; nothing was drawn.
+    /// The study is defined. No orders are drawn yet.
     Planned,
     /// Sessions can be made.
     Open,
-    /// No sessions can be made. It can be opened again, or locked.
+    /// No sessions can be made. The study can be opened again, or locked.
     Closed,
-    /// Nothing changes any more.
+    /// Nothing can be changed any more. The study can be unblinded.
     Locked,
-    /// It is told which policies ran.
+    /// The policies that ran are revealed.
     Unblinded,
 }
 
 impl Stage {
-    /// Its name.
+    /// The stage's name, as it is shown.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

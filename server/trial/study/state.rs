@@ -1,4 +1,4 @@
-//! Where a study stands, and what may be done to it then.
+//! The state of a study, and the changes that it allows.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -15,55 +15,55 @@ use crate::ids::SessionId;
 use crate::trial::phase::SessionStatus;
 use crate::trial::role::Role;
 
-/// What a person wants to do to a study.
+/// A change to a study that a person requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "change", rename_all = "kebab-case")]
 #[schema(as = StudyAction)]
 pub enum Change {
-    /// To let sessions be made. The first time, the orders are drawn.
+    /// Allow sessions to be made. The first time, the orders are drawn.
     Open,
-    /// To let no more sessions be made.
+    /// Allow no more sessions to be made.
     Close,
-    /// To let nothing be changed any more.
+    /// Allow no more changes to the study or its sessions.
     Lock {
-        /// Whether to do it though what a surgeon's device still holds would then not count.
+        /// Whether to lock even though comments and answers that a surgeon's device still holds will then not count.
         #[serde(default)]
         despite_outstanding: bool,
     },
-    /// To tell which policies ran.
+    /// Reveal which policies ran.
     Unblind,
-    /// To record that the surgeon of a session withdrew.
+    /// Record that the surgeon of a session withdrew.
     Withdraw {
-        /// The session.
+        /// Session of the surgeon.
         session: SessionId,
     },
 }
 
-/// Where a study stands.
+/// The state of a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StudyState {
-    /// How far it has come.
+    /// Stage of the study.
     pub stage: Stage,
-    /// The commitment to its orders, once they were drawn.
+    /// Commitment to the study's orders; none before they are drawn.
     pub commitment: Option<String>,
-    /// When it was locked, by the wall clock.
+    /// When the study was locked, by the wall clock; none if it was not.
     pub locked: Option<Timestamp>,
-    /// How many events it has.
+    /// Number of the study's events.
     pub events: u32,
 }
 
-/// What bears on a change besides the study's own state.
+/// Facts besides the study's own state that a change depends on.
 #[derive(Debug, Clone, Copy)]
 pub struct StudyCircumstances<'a> {
-    /// What was planned.
+    /// Definition of the study.
     pub definition: &'a Definition,
-    /// The study's sessions.
+    /// Sessions of the study, in the order in which they were made.
     pub sessions: &'a [Enrolled],
-    /// A session that the operator's page shows, whether or not it has ended.
+    /// Session that the operator's page shows, whether or not it has ended; none if it shows none.
     pub on_screens: Option<SessionId>,
-    /// Sessions for which a surgeon's device may still hold something that counts.
+    /// Number of sessions for which a surgeon's device may still hold something that counts.
     pub outstanding: usize,
-    /// Whether somebody can sign in.
+    /// Whether any account is enabled, so that somebody can sign in.
     pub has_accounts: bool,
 }
 
@@ -98,10 +98,10 @@ impl StudyState {
         }
     }
 
-    /// Checks `change` by a person who signed with `signature`.
+    /// Checks whether the person with this signature may make `change`.
     ///
     /// # Errors
-    /// When it does not fit where the study stands, or the person may not.
+    /// If the change does not fit the state of the study, or the person may not make it.
     pub fn check(
         &self,
         change: Change,
@@ -122,7 +122,7 @@ impl StudyState {
     /// Checks whether sessions can be made.
     ///
     /// # Errors
-    /// When the study is not open.
+    /// If the study is not open.
     pub const fn check_takes_sessions(&self) -> Result<(), StudyRefusal> {
         match self.stage {
             Stage::Open => Ok(()),
@@ -205,7 +205,7 @@ impl StudyState {
 /// Checks whether a study may be changed by `way`.
 ///
 /// # Errors
-/// When only another role may.
+/// If `way` is a role other than the researcher.
 pub fn check_way(way: Way) -> Result<(), StudyRefusal> {
     match way {
         Way::CommandLine | Way::Role(Role::Researcher) => Ok(()),
@@ -213,11 +213,11 @@ pub fn check_way(way: Way) -> Result<(), StudyRefusal> {
     }
 }
 
-/// Checks that the reason of an unblinding, which every export tells, names none of `policies`. A name
-/// without a dash ("fixed") is a plain word too, and may be used as one.
+/// Checks that the reason for an unblinding names none of `policies`, because every export shows the reason. A name
+/// without a dash ("fixed") is also an ordinary word, which the reason may use.
 ///
 /// # Errors
-/// When it does.
+/// If the reason names one of the policies.
 pub fn check_unblinding_reason<'a>(
     reason: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,

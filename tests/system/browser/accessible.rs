@@ -1,5 +1,5 @@
-//! Whether everyone can use a page: what axe-core finds wrong with it, and whether a gloved finger hits what is to be
-//! tapped. Called for every state of every page of which a screenshot is taken.
+//! Whether everyone can use a page: the faults that axe-core finds, and whether tap targets are large enough for gloved
+//! fingers. Called for every state of every page that gets a screenshot.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::driver::{Browser, Driver};
 use super::theatre;
 
-/// Where `.ci/setup test` puts axe-core, by Deque. It is used here and shipped nowhere.
+/// Where `.ci/setup test` puts axe-core, by Deque. Only the tests use it; it is not shipped.
 const AXE: &str = "web/node_modules/axe-core/axe.min.js";
 
 /// Each violation of a rule, with the elements that break it and what to do.
@@ -18,10 +18,10 @@ const VIOLATIONS: &str = "const { violations } = await axe.run(document, { resul
         return `${id} (${help})\\n    ` + where.join('\\n    ');
     });";
 
-/// The smallest side of what is tapped on the surgeon's page, in CSS pixels: for gloves.
+/// Smallest side of a tap target on the surgeon's page, in CSS pixels: large enough for gloves.
 const TOUCH: f64 = 48.0;
 
-/// What can be tapped and is smaller. The label of a box or a point is tapped as a whole.
+/// Finds tap targets that are smaller. The label of a box or a point is tapped as a whole.
 const SMALL: &str = "const open = document.querySelector('dialog[open]') ?? document;
     const tapped = open.querySelectorAll('button, a, summary, textarea, [role=slider], label:has(input)');
     const small = [];
@@ -34,7 +34,7 @@ const SMALL: &str = "const open = document.querySelector('dialog[open]') ?? docu
     }
     return small;";
 
-/// What reaches beyond the page's sides, text that its box cuts off, and controls that lie on each other.
+/// Finds elements beyond the page's sides, text that its box cuts off, and controls that overlap.
 const UNREACHABLE: &str = "const open = document.querySelector('dialog[open]') ?? document.body;
     const shown = (element) => element.checkVisibility({ visibilityProperty: true });
     const name = (element) => element.outerHTML.slice(0, 120);
@@ -70,19 +70,19 @@ const UNREACHABLE: &str = "const open = document.querySelector('dialog[open]') ?
     });
     return found;";
 
-/// Panics at anything that axe-core finds wrong with the page, which shows the state `name`.
+/// Panics if axe-core finds a fault in the page, which shows the state `name`.
 pub async fn check(browser: &Browser, name: &str) {
     none(&format!("axe-core finds fault with {name}"), &violations(browser).await);
 }
 
-/// Panics where something on the surgeon's page is too small to be tapped in gloves.
+/// Panics if something on the surgeon's page is too small to be tapped in gloves.
 pub async fn check_targets(browser: &Browser, name: &str) {
     if browser.count("body.surgeon").await > 0 {
         none(&format!("too small to be tapped in gloves, in {name}"), &small(browser).await);
     }
 }
 
-/// Panics where something on the page, which shows the state `name`, cannot be read or reached.
+/// Panics if something on the page, which shows the state `name`, cannot be read or reached.
 pub async fn check_reach(browser: &Browser, name: &str) {
     none(&format!("not to be read or reached, in {name}"), &unreachable(browser).await);
 }
@@ -115,7 +115,7 @@ fn none(what: &str, found: &[String]) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_nobody_can_use_is_found() {
-    // A picture without words, a button beyond the side, a small one on another, and text that is cut off.
+    // A picture without words, a button beyond the side, a small link on another button, and text that is cut off.
     const SPOIL: &str = "const add = (tag, text, style, more = {}) => {
             const element = Object.assign(document.createElement(tag), { textContent: text, ...more });
             Object.assign(element.style, style);

@@ -9,7 +9,7 @@ use super::screenshots::shoot;
 use super::theatre::Theatre;
 use super::wait::until;
 
-/// The researcher looks at the session and unblinds it; gives its id.
+/// The researcher reads the session and unblinds it. Returns its id.
 pub async fn researcher(theatre: &Theatre) -> String {
     let page = &theatre.operator;
     page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
@@ -35,7 +35,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
 
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
-    // A tablet might hold something that still counts: the dialog says so, and wants to be told that it is known.
+    // A tablet might hold something that still counts. The dialog says so, and requires a confirmation.
     page.sees("#reason-confirm", "Unblind anyway").await;
     let consequence = page.text("#reason-consequence").await;
     assert!(consequence.contains("Comments and answers still on a tablet count until"), "{consequence}");
@@ -46,7 +46,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
 
     shoot(page, "researcher-3-unblinding").await;
 
-    // Not without the box ticked.
+    // Nothing happens without the box ticked.
     page.click("#reason-go").await;
     assert!(page.is("#reason-dialog", "open").await);
     page.click("#reason-confirmed").await;
@@ -68,7 +68,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
     session
 }
 
-/// What is in the database, read by another program than the server.
+/// Reads the database with another program than the server.
 pub async fn database(theatre: &Theatre, session: &str) {
     let pool = super::theatre::database(theatre.server.data.path()).await;
     let rows = sqlx::query(
@@ -98,11 +98,11 @@ pub async fn database(theatre: &Theatre, session: &str) {
                   WHERE answers.session = ? AND question = ? ORDER BY setting, answers.number";
     let values =
         |question: &'static str| sqlx::query_scalar::<_, String>(latest).bind(session).bind(question).fetch_all(&pool);
-    // The first setting's answer was changed once; both stand.
+    // The first setting's answer was changed once; both answers are stored.
     assert_eq!(values("sharpness").await.unwrap(), ["3", "5", "2", "6", "4", "7", "1"]);
     assert_eq!(values("remarks").await.unwrap(), ["\"Good at rest\""]);
     assert_eq!(values("preference").await.unwrap(), ["[1,2,3,5,4,6]"]);
-    // Each item was kept by itself, as it was given.
+    // Each item was stored by itself, as it was given.
     let items = [4, 2, 3, 1, 4, 3, 2, 2, 4, 2].iter().enumerate().map(|(place, point)| {
         let mut items = [0; 10];
         items[place] = *point;
@@ -125,7 +125,7 @@ pub async fn database(theatre: &Theatre, session: &str) {
     pool.close().await;
 }
 
-/// The command's export is whole by the verifier's word.
+/// The verifier accepts the command's export.
 pub fn export(theatre: &Theatre, session: &str) {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("export");

@@ -7,13 +7,13 @@ use super::screenshots::shoot;
 use crate::http::analysis::{STUDY, Study};
 use crate::support::PASSPHRASE;
 
-/// Pages of the open page on paper.
+/// Number of paper pages when the open page is printed.
 async fn printed_pages(page: &Browser) -> usize {
     use base64::Engine;
     let printed = page.tools("Page.printToPDF", json!({ "preferCSSPageSize": true })).await;
     let pdf = base64::prelude::BASE64_STANDARD.decode(printed["data"].as_str().unwrap()).unwrap();
     assert!(pdf.starts_with(b"%PDF-"));
-    // The document's own counts of its pages: of all of them, and of branches of the tree that they hang on.
+    // The counts in the document: of all its pages, and of branches of its page tree.
     let text = String::from_utf8_lossy(&pdf);
     let number = |text: &str| text.chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok();
     text.split("/Count ").skip(1).filter_map(number).max().unwrap()

@@ -1,6 +1,6 @@
-//! An open study on a bad day: the server is killed again and again, most times while something else fails too.
-//! Everything that the tablet took stands in the database once and in order, the orders stay as they were drawn, the
-//! chain is whole, and nothing tells the surgeon which policy runs.
+//! An open study on a bad day: the server is killed again and again, mostly while something else fails too. The
+//! database has everything that the tablet took, once and in order. The orders stay as they were drawn, the chain is
+//! complete, and nothing tells the surgeon which policy runs.
 //!
 //! The test kills the server 8 times. With `PARFOCAL_KILLS=50` it takes five minutes, `PARFOCAL_KILLS=100` ten.
 
@@ -27,10 +27,10 @@ use crate::http::studies::{ask, post};
 use crate::support::disk::SmallDisk;
 use crate::support::{PASSPHRASE, Server};
 
-/// How often the server is killed where `PARFOCAL_KILLS` says nothing: once in each trouble, and once in none.
+/// Number of kills without `PARFOCAL_KILLS`: one for each trouble, including none.
 const KILLS: usize = 8;
 
-/// Comments in a setting: two, each cut short by a kill, so that the next setting comes while the day goes on.
+/// Comments per setting: two, each interrupted by a kill, so that the day reaches the next setting.
 const COMMENTS_A_SETTING: usize = 2;
 
 const SURGEONS: usize = 40;
@@ -99,20 +99,20 @@ struct Day {
     lens: Emulator,
     camera: Camera,
     protocols: TempDir,
-    /// Where backups go.
+    /// Folder for backups.
     elsewhere: TempDir,
-    /// The lead's, who acts as operator and researcher.
+    /// Token of the lead, who acts as operator and researcher.
     token: String,
-    /// The session under way, if any, and the settings of it that have begun.
+    /// The session under way, if any, and how many of its settings have begun.
     session: Option<(String, usize)>,
-    /// What the surgeon said, by session.
+    /// The surgeon's comments, by session.
     said: BTreeMap<String, Vec<String>>,
-    /// The seed of all orders, as it was drawn.
+    /// The seed of all orders, as drawn.
     seed: String,
 }
 
 impl Day {
-    /// A study is planned and opened.
+    /// Plans and opens a study.
     async fn begin(driver: &Driver) -> Self {
         let disk = SmallDisk::of_megabytes(64);
         let folder =
@@ -156,7 +156,7 @@ impl Day {
         self.theatre.server.data.path()
     }
 
-    /// The next setting begins; of the next surgeon, where a session is over.
+    /// Begins the next setting; if the session is over, the first setting of the next surgeon's.
     async fn next_setting(&mut self) {
         let mut under_way = self.session.take();
         if let Some((session, begun)) = &under_way {
@@ -176,7 +176,7 @@ impl Day {
         self.session = Some((session, begun + 1));
     }
 
-    /// A session of the next surgeon is prepared and started, and the tablet opens its link.
+    /// Prepares and starts a session of the next surgeon; the tablet opens its link.
     async fn prepare(&mut self) -> String {
         let server = &self.theatre.server;
         let participant = format!("S-{:02}", self.said.len() + 1);
@@ -196,7 +196,7 @@ impl Day {
         session
     }
 
-    /// The surgeon says something while `trouble` lasts, and the server is killed before anybody waits for an answer.
+    /// The surgeon says something during `trouble`, and the server is killed before anybody waits for an answer.
     async fn speak_and_kill(&mut self, trouble: Trouble, number: usize) {
         let (session, _) = self.session.clone().unwrap();
         let mut locked = self.begin_trouble(trouble, number).await;
@@ -207,7 +207,7 @@ impl Day {
         said.push(text);
         let total = said.len();
 
-        // Taken by the tablet: the box is free again, whatever became of it.
+        // The tablet has taken the comment if the box is free again, even if nothing was sent.
         until("the tablet to take the comment", || async { self.theatre.comment_box().await.is_empty() }).await;
         kill(&mut self.theatre.server);
         if let Some(locked) = locked.take() {
@@ -226,7 +226,7 @@ impl Day {
         self.theatre.surgeon.sees("#remaining", "left").await;
     }
 
-    /// What fails from now on. A connection that holds the database locked, where that is it.
+    /// Starts a trouble. Returns the connection that locks the database, for [`Trouble::LockedDatabase`].
     async fn begin_trouble(&mut self, trouble: Trouble, number: usize) -> Option<SqliteConnection> {
         match trouble {
             Trouble::Nothing => {}
@@ -273,7 +273,7 @@ impl Day {
         self.elsewhere.path().join(format!("{number}.db"))
     }
 
-    /// What all orders are drawn from.
+    /// The seed from which all orders are drawn.
     async fn drawn(&self) -> String {
         let pool = database(self.folder()).await;
         let seed = sqlx::query_scalar("SELECT seed FROM study_seeds").fetch_one(&pool).await.unwrap();
@@ -281,7 +281,7 @@ impl Day {
         seed
     }
 
-    /// The evening: everything is there, and proves itself.
+    /// Ends the day: everything is there, and verifies.
     async fn end(mut self) {
         let (session, _) = self.session.take().unwrap();
         let abort = json!({"session": session, "action": "abort", "reason": "the day is over"});
@@ -307,7 +307,7 @@ impl Day {
             assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
         }
 
-        // The chain is whole, and each session had the order that was drawn for its place.
+        // The chain is complete, and each session had the order that was drawn for its place.
         for change in ["close", "lock", "unblind"] {
             let signed = json!({"change": change, "reason": "it is over", "passphrase": PASSPHRASE, "despite_outstanding": true});
             post(&self.theatre.server, "researcher", "/api/researcher/studies/bad-day/changes", signed).await;
@@ -315,7 +315,7 @@ impl Day {
         let said = succeeds(&["verify"], self.folder());
         assert!(said.contains("order"), "the orders were looked at: {said}");
 
-        // A backup of the day opens on another folder, and verifies.
+        // A backup of the day can be restored into another folder, and verifies.
         let restored = tempfile::tempdir().unwrap();
         if let Some(backup) = std::fs::read_dir(self.elsewhere.path()).unwrap().next() {
             let backup = backup.unwrap().path();
@@ -325,7 +325,7 @@ impl Day {
     }
 }
 
-/// `parfocal` with `arguments` on data folder `folder`: what it said.
+/// Runs `parfocal` with `arguments` on data folder `folder`, and returns its output.
 fn succeeds(arguments: &[&str], folder: &Path) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.args(arguments);
@@ -346,7 +346,7 @@ fn start(data: Arc<TempDir>, address: &str, protocols: &Path, lens: &Emulator, c
     Server::on(data, &arguments)
 }
 
-/// Requests as operator and researcher show the lead's token.
+/// Makes requests as operator and researcher use the lead's token.
 fn show(server: &mut Server, token: &str) {
     server.use_key("operator", token);
     server.use_key("researcher", token);
@@ -363,7 +363,7 @@ fn definition() -> String {
     )
 }
 
-/// A camera whose power can be taken away, where there is one.
+/// A camera that can be switched off, if the fake camera is available.
 #[cfg(feature = "aravis")]
 struct Camera(Option<crate::support::fake_camera::Fake>);
 

@@ -1,5 +1,5 @@
 //! Reads every byte that the surgeon's browser received and looks for anything that could tell which policy ran. Only
-//! pixels are left out: the picture is what the surgeon is to judge.
+//! pixels are left out, because the surgeon is to judge the picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -85,29 +85,29 @@ const KEYS: [&str; 53] = [
     "remarks",
     "sharpness",
 ];
-/// Ids of questions are keys too, where answers are told.
+/// Question ids, which are keys too where answers are listed.
 const QUESTION_IDS: [&str; 7] =
     ["usability", "closing-remarks", "effort", "how-often", "workload", "seen-before", "surgical-workload"];
 
-/// What the NASA Task Load Index asks of every setting, in its published words.
+/// A question of the NASA Task Load Index about every setting, in its published words.
 const PUBLISHED: &str = "what you were asked to do";
 
-/// What the check has seen, so that it can be seen to have looked.
+/// What the check has seen, as evidence that it looked.
 #[derive(Debug, Default)]
 pub struct Seen {
     /// Pages, JSON answers, messages and picture headers searched.
     pub texts: usize,
     /// Static files compared.
     pub files: BTreeSet<String>,
-    /// Pictures, whose headers were searched.
+    /// Pictures whose headers were searched.
     pub pictures: usize,
     /// The id of each setting's segment, by session and setting.
     pub segments: BTreeMap<(String, u64), BTreeSet<String>>,
-    /// What a surgeon is told while inspecting, by session, without what differs from moment to moment.
+    /// The surgeon's views while inspecting, by session, without the fields that change from moment to moment.
     inspecting: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Checks everything on `connections`; panics at what tells.
+/// Checks everything on `connections`; panics if something could tell the policy.
 pub fn check(connections: &[Connection]) -> Seen {
     let mut seen = Seen::default();
     for received in connections.iter().flat_map(take_apart) {
@@ -129,8 +129,8 @@ pub fn check(connections: &[Connection]) -> Seen {
     finish(seen)
 }
 
-/// Checks what a browser keeps to open a page without a network: each with its address and headers. The one entry that
-/// is no answer of the server's is the session as it was last told, JSON.
+/// Checks the entries that a browser keeps to open a page without a network, each with its address and headers. The one
+/// entry that is not an answer of the server is the session's last view, as JSON.
 pub fn check_kept(kept: &[(String, String, Vec<u8>)], last_told: &Value) -> Seen {
     let mut seen = Seen::default();
     for (path, head, body) in kept {
@@ -164,7 +164,7 @@ fn answer(seen: &mut Seen, path: &str, head: &str, body: &[u8]) {
     }
 }
 
-/// A static file is the same whatever runs if it is the file of the repository.
+/// A static file that equals the repository's file is the same whichever policy runs.
 fn file(seen: &mut Seen, name: &str, body: &[u8]) {
     if body.is_empty() {
         return; // kept by the browser from before: 304
@@ -175,7 +175,7 @@ fn file(seen: &mut Seen, name: &str, body: &[u8]) {
 }
 
 fn json(seen: &mut Seen, text: &str) {
-    // Cut off where the server was killed.
+    // The message may be cut off because the server was killed.
     let Ok(value) = serde_json::from_str::<Value>(text) else {
         return search("cut-off message", &text.to_ascii_lowercase());
     };

@@ -1,4 +1,4 @@
-//! The operator focuses by hand: the lens ends where the slider was let go, however slow the network.
+//! The operator focuses by hand: the lens ends where the slider was released, however slow the network is.
 
 use super::driver::Driver;
 use super::theatre::operator;

@@ -1,4 +1,5 @@
-//! The operator changes a real camera's settings: typed, tapped, refused, and seen to take effect.
+//! The operator changes a real camera's settings by typing and tapping; the page refuses wrong values and shows the
+//! effect.
 
 use serde_json::Value;
 
@@ -11,12 +12,12 @@ use crate::support::fake_camera::Fake;
 
 const DELETE: &str = "\u{e017}";
 
-/// Everything in the field, then `text`, then Enter, as `WebDriver` names these keys.
+/// The keys, in `WebDriver`'s code, that select everything in a field, type `text` and press Enter.
 fn keys(text: &str) -> String {
     format!("\u{e009}a\u{e000}{text}\u{e007}")
 }
 
-/// A setting's value as the camera has it.
+/// The camera's value of a setting.
 async fn value(server: &Server, setting: &str) -> f64 {
     let offer: Value = server.get_as("operator", "/api/operator/camera").send().await.unwrap().json().await.unwrap();
     let settings = offer["settings"].as_array().unwrap();
@@ -30,7 +31,7 @@ async fn becomes(server: &Server, setting: &str, expected: f64) {
     .await;
 }
 
-/// What stands in the field of a setting.
+/// The text in the field of a setting.
 async fn field(operator: &Browser, setting: &str) -> String {
     operator.property(&format!("#camera-{setting}"), "value").await.unwrap()
 }
@@ -48,7 +49,7 @@ async fn the_operator_sets_exposure_gain_and_frame_rate() {
     assert_eq!(field(&operator, "exposure").await, "10");
     until("a picture", || async { operator.brightness().await > 20.0 }).await;
 
-    // The fake camera's ramp is as dark as the exposure is short: at a millisecond nothing is left of it.
+    // The fake camera's ramp gets darker with a shorter exposure: at 1 ms it is black.
     operator.type_into("#camera-exposure", &keys("1")).await;
     becomes(&server, "exposure", 1000.0).await;
     until("a dark picture", || async { operator.brightness().await < 10.0 }).await;
@@ -69,8 +70,7 @@ async fn the_operator_sets_exposure_gain_and_frame_rate() {
     assert_eq!(operator.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
 }
 
-/// A value that the camera cannot have: said with the bounds in the unit that is shown, and the old
-/// one stands there again.
+/// The camera refuses a value. The page names the bounds in the displayed unit, and shows the old value again.
 async fn refused(operator: &Browser, server: &Server) {
     operator.type_into("#camera-exposure", &keys("99999999")).await;
     operator.sees("#camera-trouble", "Exposure must be from ").await;

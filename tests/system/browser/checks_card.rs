@@ -1,4 +1,4 @@
-//! The operator reads whether everything is ready for a trial, and checks again once the tablet is there.
+//! The operator reads whether everything is ready for a trial, and checks again after the tablet connects.
 
 use super::driver::Driver;
 use super::screenshots::shoot;

@@ -1,5 +1,5 @@
-//! Sessions off the regular course: practice, a setting ended by its time limit, an emergency unblinding, an abort; and
-//! what the surgeon is shown of all that.
+//! Sessions with unusual events: practice, a setting ended by its time limit, an emergency unblinding, an abort; and
+//! what the surgeon sees of them.
 
 use serde_json::{Value, json};
 use sqlx::Row;
@@ -10,7 +10,7 @@ use super::screenshots::shoot;
 use super::theatre::Theatre;
 use crate::support::client;
 
-/// What a researcher might write: it names a policy, and so is for the researcher's eyes alone.
+/// A reason that a researcher might write. It names a policy, so only the researcher may see it.
 const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
 
 #[tokio::test(flavor = "multi_thread")]
@@ -58,7 +58,7 @@ async fn practice(theatre: &Theatre) {
     let operator = &theatre.operator;
 
     theatre.begin("S-03", "practice").await;
-    // That the policy has a belief would name it.
+    // A choice of belief would reveal the policy.
     operator.sees_no("#belief-choice").await;
     operator.sees("#session-badges", "Practice").await;
 
@@ -84,7 +84,7 @@ async fn practice(theatre: &Theatre) {
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
-/// Another operator closes the session while this one is asked why to pause it, and adds a participant.
+/// Another operator closes the session while this one is asked for a reason to pause it, and adds a participant.
 async fn beside_another_operator(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     let operator = &theatre.operator;
@@ -108,7 +108,7 @@ async fn beside_another_operator(theatre: &Theatre) {
     other("/api/operator/actions", abort).await;
     other("/api/operator/dismissals", json!({ "session": session })).await;
 
-    // This operator only now gives the reason to pause.
+    // This operator gives the reason to pause only now.
     operator.sees("#new-session", "Prepare session").await;
     theatre.give_reason("Too late").await;
     operator.sees("#reason-trouble", "This session was closed in the meantime").await;
@@ -117,7 +117,7 @@ async fn beside_another_operator(theatre: &Theatre) {
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
-/// The page finds out by itself, and follows what happened meanwhile.
+/// The connection breaks silently. The page notices this itself, and catches up.
 async fn a_link_that_breaks_without_a_word(theatre: &Theatre) {
     theatre.proxy.break_silently();
     theatre.begin("S-05", "practice").await;
@@ -131,7 +131,7 @@ async fn a_link_that_breaks_without_a_word(theatre: &Theatre) {
     theatre.surgeon.sees("#panel", "No trial is under way").await;
 }
 
-/// Nobody ends the setting: its ten seconds do.
+/// Nobody ends the setting; its limit of ten seconds does.
 async fn time_limit(theatre: &Theatre) {
     theatre.begin("S-04", "limited").await;
     theatre.tap_notice(1).await;
@@ -140,13 +140,13 @@ async fn time_limit(theatre: &Theatre) {
     theatre.surgeon.sees("#panel h2", "Setting 1: a few questions").await;
     theatre.operator.sees("#log", "Setting 1 finished after 10.0 s · system").await;
 
-    // The half-written comment is still there to be finished.
+    // The half-written comment is still there and can be finished.
     assert_eq!(theatre.comment_box().await, "Cut off in the mid");
     theatre.say("dle", 1).await;
     theatre.answer_questions(3).await;
 }
 
-/// The researcher unblinds the session while it is under way; gives the address of the list of sessions.
+/// The researcher unblinds the session while it is under way. Returns the address of the list of sessions.
 async fn emergency_unblinding(theatre: &Theatre) -> String {
     let surgeon = &theatre.surgeon;
     let page = &theatre.operator;
@@ -161,7 +161,7 @@ async fn emergency_unblinding(theatre: &Theatre) -> String {
     page.click("#unblind").await;
     page.sees("#reason-consequence", "under way").await;
 
-    // Not without a reason.
+    // Nothing happens without a reason.
     page.click("#reason-go").await;
     assert!(page.fails("#reason", "valueMissing").await);
     shoot(page, "researcher-6-emergency").await;
@@ -203,7 +203,7 @@ async fn abort(theatre: &Theatre) {
     shoot(operator, "operator-7-aborted").await;
 }
 
-/// The list of sessions has practice in a place of its own.
+/// The list of sessions shows practice sessions separately.
 async fn practice_stays_apart(theatre: &Theatre, researcher: &str) {
     let page = &theatre.operator;
     page.open(researcher).await;

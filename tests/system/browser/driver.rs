@@ -1,6 +1,6 @@
-//! A browser to drive: headless Chromium through chromedriver, by the W3C `WebDriver` protocol.
+//! Controls a browser: headless Chromium through chromedriver, by the W3C `WebDriver` protocol.
 //!
-//! Elements are named by CSS selectors. What a test does waits until it can be done; what it asks is asked once.
+//! Elements are named by CSS selectors. Actions wait until they are possible; queries ask once.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
@@ -36,21 +36,21 @@ const ARGUMENTS: [&str; 9] = [
     "--window-size=1180,960",
 ];
 
-/// What chromedriver says before the port that it has chosen.
+/// Chromedriver's words before the port that it has chosen.
 const STARTED: &str = "started successfully on port ";
 
 /// A running chromedriver; ends, with its browsers, when dropped.
 pub struct Driver {
     process: Child,
     port: u16,
-    /// Kept open: closed, it would end a chromedriver that says more.
+    /// Kept open, because a closed pipe would end chromedriver at its next output.
     _said: BufReader<ChildStdout>,
 }
 
 impl Driver {
     /// Starts chromedriver on a free port.
     pub fn start() -> Self {
-        // It looks for a port that is free with IPv4, and ends where another program has that port with IPv6.
+        // It looks for a port that is free with IPv4, and ends if another program has that port with IPv6.
         let mut attempts = (0..5).filter_map(|_| Self::try_start());
         attempts.next().expect("chromedriver finds a port and says which")
     }
@@ -78,25 +78,25 @@ impl Driver {
         self.browser_with(&[]).await
     }
 
-    /// The same, with these options of Chromium.
+    /// The same, with additional options of Chromium.
     pub async fn browser_with(&self, options: &[String]) -> Browser {
         self.browser_as(options, json!({})).await
     }
 
-    /// A browser of somebody who has set text to twice its usual size.
+    /// A browser whose user has doubled the text size.
     pub async fn browser_with_large_text(&self) -> Browser {
         self.browser_as(&[], json!({ "webkit.webprefs.default_font_size": 32 })).await
     }
 
-    /// The browser of a tablet that has lost its power and is switched on again: `browser` ends at once,
-    /// without writing anything more, and another begins on what is on its disk.
+    /// The browser of a tablet that lost power and is switched on again: `browser` ends at once, without writing
+    /// anything more, and another starts with what is on its disk.
     pub async fn after_power_cut(&self, browser: &Browser, options: &[String]) -> Browser {
         // Chromium's lock on its profile names its process.
         let lock = std::fs::read_link(browser.profile.path().join("SingletonLock")).unwrap();
         let process = lock.to_str().and_then(|lock| lock.rsplit('-').next()?.parse().ok()).and_then(Pid::from_raw);
         let process = process.expect("the lock ends with a process's number");
         kill_process(process, Signal::KILL).unwrap();
-        // A process that ended stays listed, as a zombie, until its parent has asked for it.
+        // An ended process stays listed as a zombie until its parent waits for it.
         let stat = format!("/proc/{process}/stat");
         let is_gone = || std::fs::read_to_string(&stat).map_or(true, |stat| stat.contains(") Z "));
         until("the browser to be gone", || async { is_gone() }).await;
@@ -131,7 +131,7 @@ impl Driver {
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // It ends its browsers when asked to; ended by a signal, it would leave them running.
+        // Chromedriver ends its browsers when asked to. Ended by a signal, it would leave them running.
         let asked = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).and_then(|mut line| {
             line.set_read_timeout(Some(Duration::from_secs(10)))?;
             let head = "POST /shutdown HTTP/1.1\r\nHost: 127.0.0.1";
@@ -146,7 +146,7 @@ impl Drop for Driver {
     }
 }
 
-/// A command of chromedriver's own.
+/// A command that only chromedriver has.
 #[derive(Debug)]
 struct ChromeCommand {
     path: &'static str,
@@ -191,7 +191,7 @@ impl Area {
 /// A browser with a profile of its own.
 pub struct Browser {
     client: Client,
-    /// The folder in which Chromium keeps what a tablet has on its disk; removed with the last browser on it.
+    /// Chromium's profile, which stands for a tablet's disk; removed with the last browser that uses it.
     profile: Arc<TempDir>,
 }
 
@@ -202,12 +202,12 @@ impl Browser {
         self.client.goto(url).await.unwrap();
     }
 
-    /// Loads the page anew.
+    /// Reloads the page.
     pub async fn reload(&self) {
         self.client.refresh().await.unwrap();
     }
 
-    /// Opens a second tab on `url` and goes there; gives the first.
+    /// Opens a second tab on `url` and switches to it. Returns the first.
     pub async fn new_tab(&self, url: &str) -> WindowHandle {
         let first = self.client.window().await.unwrap();
         let tab = self.client.new_window(true).await.unwrap();
@@ -216,30 +216,30 @@ impl Browser {
         first
     }
 
-    /// Goes to `tab`; gives the one left.
+    /// Switches to `tab`. Returns the tab that was left.
     pub async fn to_tab(&self, tab: &WindowHandle) -> WindowHandle {
         let left = self.client.window().await.unwrap();
         self.client.switch_to_window(tab.clone()).await.unwrap();
         left
     }
 
-    /// Closes the tab and goes back to `tab`.
+    /// Closes the tab and switches back to `tab`.
     pub async fn close_tab(&self, tab: &WindowHandle) {
         self.client.close_window().await.unwrap();
         self.client.switch_to_window(tab.clone()).await.unwrap();
     }
 
-    /// The page as it is seen, as a PNG.
+    /// The visible page as a PNG.
     pub async fn screenshot(&self) -> Vec<u8> {
         self.client.screenshot().await.unwrap()
     }
 
-    /// A command of the developer tools.
+    /// Executes a command of the developer tools.
     pub async fn tools(&self, command: &str, parameters: Value) -> Value {
         self.chrome("goog/cdp/execute", json!({ "cmd": command, "params": parameters })).await
     }
 
-    /// What the page's scripts complained of since the last call.
+    /// Errors logged by the page's scripts since the last call.
     pub async fn complaints(&self) -> Vec<String> {
         let log = self.chrome("se/log", json!({ "type": "browser" })).await;
         let severe = log.as_array().into_iter().flatten().filter(|line| line["level"] == "SEVERE");
@@ -251,20 +251,20 @@ impl Browser {
         answer.unwrap_or_else(|error| panic!("{path}: {error}"))
     }
 
-    /// Runs `script`, the body of a function of `arguments`, and gives what it returns. See [`super::scripts`].
+    /// Runs `script`, the body of a function of `arguments`, and returns its result. See [`super::scripts`].
     pub async fn run(&self, script: &str, arguments: &[Value]) -> Value {
         self.client.execute(script, arguments.to_vec()).await.unwrap_or_else(|error| panic!("{error}: {script}"))
     }
 }
 
-/// What is done on a page.
+/// Actions on a page.
 impl Browser {
-    /// Clicks, as a pointer does, once that is possible.
+    /// Clicks with the pointer as soon as that is possible.
     pub async fn click(&self, css: &str) {
         until(&format!("{css} to be clickable"), || async { self.try_click(css).await }).await;
     }
 
-    /// Clicks; whether that was possible.
+    /// Clicks if that is possible. Returns whether it was.
     pub async fn try_click(&self, css: &str) -> bool {
         let Ok(element) = self.find(css).await else { return false };
         element.click().await.is_ok()
@@ -295,7 +295,7 @@ impl Browser {
         self.client.perform_actions(mouse).await.unwrap();
     }
 
-    /// Types `text` at the end of what stands there, once the element takes keys.
+    /// Types `text` after the existing text, as soon as the element accepts keys.
     pub async fn type_into(&self, css: &str, text: &str) {
         until(&format!("{css} to take keys"), || async {
             let Ok(element) = self.find(css).await else { return false };
@@ -304,7 +304,7 @@ impl Browser {
         .await;
     }
 
-    /// Presses and lets go `key`, wherever the focus is.
+    /// Presses and releases `key`, wherever the focus is.
     pub async fn press(&self, key: char) {
         let keys = KeyActions::new("keyboard".to_owned());
         let keys = keys.then(KeyAction::Down { value: key }).then(KeyAction::Up { value: key });
@@ -316,7 +316,7 @@ impl Browser {
         self.find(css).await.unwrap().clear().await.unwrap();
     }
 
-    /// Pastes `text` in place of what stands there.
+    /// Replaces the existing text by pasting `text`.
     pub async fn paste(&self, css: &str, text: &str) {
         self.click(css).await;
         let all = format!("{}a{}", char::from(Key::Control), char::from(Key::Null));
@@ -324,7 +324,7 @@ impl Browser {
         self.tools("Input.insertText", json!({ "text": text })).await;
     }
 
-    /// Writes `text` where the cursor is, as a tablet's keyboard does.
+    /// Inserts `text` at the cursor, as a tablet's keyboard does.
     pub async fn insert(&self, text: &str) {
         self.tools("Input.insertText", json!({ "text": text })).await;
     }
@@ -340,7 +340,7 @@ impl Browser {
     }
 }
 
-/// What is seen on a page.
+/// What a page shows.
 impl Browser {
     /// Waits until the element is shown and its text contains `text`.
     pub async fn sees(&self, css: &str, text: &str) {
@@ -351,7 +351,7 @@ impl Browser {
     pub async fn sees_no(&self, css: &str) {
         until(&format!("{css} to be gone"), || async {
             for element in self.all(css).await {
-                // An element that has left the page meanwhile is not shown.
+                // An element that has left the page in the meantime is not shown.
                 if element.is_displayed().await.unwrap_or(false) {
                     return false;
                 }
@@ -362,7 +362,7 @@ impl Browser {
         .await;
     }
 
-    /// Text of the element, or empty where there is none or it is not shown.
+    /// Text of the element; empty if there is none or it is not shown.
     pub async fn text(&self, css: &str) -> String {
         loop {
             let text = match self.find(css).await {
@@ -373,19 +373,19 @@ impl Browser {
 
             match text {
                 Ok(text) => return text,
-                // The page has drawn it anew meanwhile.
+                // The page has redrawn the element in the meantime.
                 Err(error) if has_left(&error) => {}
                 Err(error) => panic!("{css}: {error}"),
             }
         }
     }
 
-    /// What stands in a field.
+    /// The value of a field.
     pub async fn value(&self, css: &str) -> String {
         self.property(css, "value").await.unwrap_or_default()
     }
 
-    /// What stands in each of several fields.
+    /// The value of each field.
     pub async fn values(&self, css: &str) -> Vec<String> {
         self.properties(css, "value").await
     }
@@ -395,7 +395,7 @@ impl Browser {
         self.property(css, property).await.as_deref() == Some("true")
     }
 
-    /// A property of the element; none where it is null, or where there is no such element.
+    /// A property of the element; `None` if it is null or there is no such element.
     pub async fn property(&self, css: &str, property: &str) -> Option<String> {
         self.find(css).await.ok()?.prop(property).await.ok().flatten()
     }
@@ -409,7 +409,7 @@ impl Browser {
         values
     }
 
-    /// An attribute of the element, if there are both.
+    /// An attribute of the element; `None` if there is no such element or attribute.
     pub async fn attribute(&self, css: &str, attribute: &str) -> Option<String> {
         self.find(css).await.ok()?.attr(attribute).await.ok().flatten()
     }
@@ -419,17 +419,17 @@ impl Browser {
         self.find(css).await.unwrap().css_value(property).await.unwrap()
     }
 
-    /// How many elements there are, shown or not.
+    /// Number of elements, shown or not.
     pub async fn count(&self, css: &str) -> usize {
         self.all(css).await.len()
     }
 
-    /// Where the element is.
+    /// Position and size of the element.
     pub async fn area(&self, css: &str) -> Area {
         area(&self.find(css).await.unwrap()).await
     }
 
-    /// Where each element is.
+    /// Position and size of each element.
     pub async fn areas(&self, css: &str) -> Vec<Area> {
         let mut areas = Vec::new();
         for element in self.all(css).await {
@@ -452,8 +452,8 @@ async fn area(element: &Element) -> Area {
     Area { left, top, width, height }
 }
 
-/// Whether an element has left the page since it was found. While a page is loaded anew, the driver says so in words
-/// of its own or of the browser's.
+/// Whether an element has left the page since it was found. During a reload, only the text of the driver's or browser's
+/// message says so.
 fn has_left(error: &CmdError) -> bool {
     const IN_WORDS: [&str; 2] = ["does not belong to the document", "aborted by navigation"];
     let words = error.to_string();

@@ -22,7 +22,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     theatre.say("There is room", 1).await;
     surgeon.sees("#panel h2", "a few questions").await;
     disk.fill();
-    // Some room may be left within the files: long comments until none is.
+    // There may be space left within the files: send long comments until it is used up.
     let mut said = vec!["There is room".to_owned()];
     until("the disk to refuse", || {
         let text = format!("{} {}", said.len(), "long ".repeat(2000));

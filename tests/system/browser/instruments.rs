@@ -9,7 +9,7 @@ use super::screenshots::shoot;
 use super::theatre::Theatre;
 use super::wait::until;
 
-/// Marks the line that `css` selects at `fraction` of its length, by a touch that slides there.
+/// Marks the line that `css` selects at `fraction` of its length, by a sliding touch.
 async fn mark(page: &Browser, css: &str, fraction: f64) {
     page.show(css).await;
     let rail = page.area(&format!("{css} .rail")).await;
@@ -28,7 +28,7 @@ fn state(question: &str) -> String {
     format!("[data-question={question}] > .state")
 }
 
-/// The operator prepares a session, which does not start before the consent is recorded.
+/// The operator prepares a session. It cannot start before the consent is recorded.
 async fn prepare(theatre: &Theatre) {
     let operator = &theatre.operator;
     until("the dialog for a new participant", || async {
@@ -55,7 +55,7 @@ async fn prepare(theatre: &Theatre) {
     operator.click_labelled("#session-actions", "Start").await;
 }
 
-/// The questions after the first setting, half of them before the page is loaded anew.
+/// Answers the questions after the first setting; half of them are answered before the page is reloaded.
 async fn first_setting(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(1).await;
@@ -136,7 +136,7 @@ async fn closing(theatre: &Theatre) {
     surgeon.sees("#panel h2", "Thank you").await;
 }
 
-/// What the researcher does to the records, on the operator's browser.
+/// The researcher changes the records, in the operator's browser.
 async fn researcher(theatre: &Theatre) {
     let page = &theatre.operator;
     page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
@@ -177,7 +177,7 @@ async fn researcher(theatre: &Theatre) {
     page.type_into("#reason", "wants no part in it").await;
     page.click("#reason-go").await;
     page.sees("main", "no longer shown, analysed or exported").await;
-    page.sees("#words-left", "Texts that still stand in the database: 1").await;
+    page.sees("#words-left", "Texts that are still in the database: 1").await;
     for gone in ["#timeline", "#comment-list", ".answers", ".closing"] {
         assert_eq!(page.count(gone).await, 0, "{gone}");
     }

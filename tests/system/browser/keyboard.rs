@@ -1,4 +1,4 @@
-//! A whole session on the surgeon's page by the keyboard alone.
+//! A whole session on the surgeon's page using only the keyboard.
 
 use fantoccini::key::Key;
 
@@ -6,20 +6,20 @@ use super::driver::{Browser, Driver};
 use super::theatre::Theatre;
 use super::wait::until;
 
-/// What has the focus, and whether that can be seen.
+/// Gets the focused element, and whether its focus is visible.
 const FOCUS: &str = "const at = document.activeElement;
     const marked = at.matches('.likert input') ? at.nextElementSibling : at.querySelector('.go') ?? at;
     const { outlineStyle, outlineWidth } = getComputedStyle(marked);
     return [at.id || at.name || at.textContent.trim(), outlineStyle !== 'none' && parseFloat(outlineWidth) >= 2];";
 
-/// Longer than two keys of one text are apart.
+/// Longer than the pause between two keys of one text.
 const A_WHILE: &str = "return new Promise((done) => setTimeout(done, 700))";
 
 /// More presses of the Tab key than any page has stops.
 const STOPS: usize = 60;
 
 impl Browser {
-    /// The id, name or label of what has the focus. Panics where nobody sees that it has.
+    /// The id, name or label of the focused element. Panics if its focus is not visible.
     async fn focused(&self) -> String {
         let focus = self.run(FOCUS, &[]).await;
         let name = focus[0].as_str().unwrap().to_owned();

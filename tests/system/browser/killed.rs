@@ -1,5 +1,5 @@
-//! A server killed, as by a power cut, right after it acknowledged a comment, at every point of a
-//! session: it goes on at the same place, and nothing acknowledged is lost.
+//! A server that is killed, as by a power cut, right after it acknowledged a comment, at every point of a session. It
+//! continues at the same place, and loses nothing that it acknowledged.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use uuid::Uuid;
 use super::theatre;
 use crate::support::{Server, client};
 
-/// The surgeon's and the operator's programs.
+/// A session driven by plain requests as surgeon and operator.
 struct Trial {
     server: Server,
     session: String,
@@ -53,7 +53,8 @@ impl Trial {
         trial
     }
 
-    /// A comment, the server's word that it is kept, and the power cut; then the same place as before.
+    /// Sends a comment, waits for the acknowledgement, and cuts the power. Then checks that the session is where it
+    /// was.
     async fn say_and_kill(&mut self, phase: &str, setting: u64) {
         let before = self.view().await;
         assert_eq!((before["phase"].as_str(), before["setting"].as_u64()), (Some(phase), Some(setting)));
@@ -67,7 +68,7 @@ impl Trial {
         self.acknowledged.push(text);
         theatre::kill(&mut self.server);
         theatre::start_again(&mut self.server);
-        // A tablet that never got the answer sends it again.
+        // A tablet that never got the answer sends the comment again.
         self.post("surgeon", "comments", comment).await;
         let after = self.view().await;
         assert_eq!((&after["phase"], &after["segment"]), (&before["phase"], &before["segment"]));
@@ -80,7 +81,7 @@ impl Trial {
         request.send().await.unwrap().json().await.unwrap()
     }
 
-    /// The surgeon acts on what is under way.
+    /// The surgeon acts on the session under way.
     async fn act(&self, mut action: Value) {
         action["session"] = json!(self.session);
         action["segment"] = self.view().await["segment"].clone();

@@ -1,5 +1,5 @@
-//! Text at 200 %: on the pages of surgeon and operator nothing is cut off, lies on something else or cannot be reached,
-//! on a tablet held either way.
+//! Text at 200 %: on the pages of surgeon and operator nothing is cut off, overlaps or is out of reach, with the tablet
+//! held upright or across.
 
 use super::accessible;
 use super::driver::{Browser, Driver};
@@ -9,7 +9,7 @@ use super::theatre::Theatre;
 /// A tablet held upright and across.
 const TABLET: [(u32, u32); 2] = [(820, 1180), (1180, 820)];
 
-/// Looks at the state `name` of a page, held either way.
+/// Checks the state `name` of a page in both positions of the tablet.
 async fn look(browser: &Browser, name: &str) {
     for (width, height) in TABLET {
         resize(browser, width, height).await;

@@ -1,4 +1,4 @@
-//! The operator reads in words what is wrong with a lens.
+//! The operator's page says in words what is wrong with a lens.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ async fn the_operator_reads_what_is_wrong_with_the_lens() {
     operator.sees("#devices", "Optotune lens").await;
     operator.sees_no("#warnings .bad").await;
 
-    // A fault shows only once the lens is used.
+    // A fault shows only when the lens is used.
     operator.select("#policy", "mgm-hill-climber").await;
     for (fault, words) in [
         (Fault::Silent, "nothing answers at"),

@@ -1,5 +1,5 @@
-//! A whole blinded trial in real browsers on the real server, as surgeon, operator and researcher
-//! do it; what reached the surgeon's browser; and a server killed again and again.
+//! A whole blinded trial in real browsers on the real server, as surgeon, operator and researcher do it; a check of all
+//! data that reached the surgeon's browser; and a server that is killed again and again.
 
 mod accessible;
 mod aftermath;

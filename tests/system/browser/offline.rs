@@ -1,5 +1,6 @@
-//! A tablet without a network: out of reach of the Wi-Fi, before a server that is restarted, without storage. What is
-//! said there is kept, lands once and at the time at which it was said; and what the browser keeps tells nothing.
+//! A tablet without a network: out of Wi-Fi reach, while the server restarts, without storage. Comments and answers
+//! given then are kept, and arrive once and with the time at which they were given. What the browser keeps reveals
+//! nothing.
 
 use serde_json::{Value, json};
 
@@ -9,7 +10,7 @@ use super::screenshots::shoot;
 use super::theatre::{Theatre, kill, start_again};
 use super::wait::until;
 
-/// Everything in the caches of this address: address, headers, body in hexadecimal.
+/// All entries in this site's caches: path, headers, body in hexadecimal.
 const CACHES: &str = "const all = [];
     for (const name of await caches.keys()) {
         const cache = await caches.open(name);
@@ -23,7 +24,7 @@ const CACHES: &str = "const all = [];
     }
     return all;";
 
-/// What was said in the session, in the order in which the server has it.
+/// The comments of the session, in the order in which the server has them.
 const COMMENTS: &str = "SELECT COALESCE(text, kind) FROM comments ORDER BY number";
 
 const LAST_VIEW: &str = "return localStorage.getItem('parfocal.last-view')";
@@ -38,7 +39,7 @@ impl Browser {
         until("the browser to keep the page", || async { self.run(kept, &[]).await == true }).await;
     }
 
-    /// Everything that the browser keeps to open the page without a network.
+    /// All entries that the browser keeps to open the page without a network.
     async fn cached(&self) -> Vec<(String, String, Vec<u8>)> {
         let all = self.run(&format!("return (async () => {{ {CACHES} }})()"), &[]).await;
         let text = |value: &Value| value.as_str().unwrap().to_owned();
@@ -46,7 +47,7 @@ impl Browser {
         entries.map(|entry| (text(&entry[0]), text(&entry[1]), hex::decode(text(&entry[2])).unwrap())).collect()
     }
 
-    /// The session as this device was last told of it; null where nothing is kept.
+    /// The last view of the session that this device keeps; null if it keeps none.
     async fn last_view(&self) -> Value {
         let kept = self.run(LAST_VIEW, &[]).await;
         kept.as_str().map_or(Value::Null, |kept| serde_json::from_str(kept).unwrap())
@@ -60,20 +61,20 @@ impl Theatre {
         self.surgeon.type_into("#comment", "\u{e007}").await;
     }
 
-    /// Waits until the tablet says that it holds `many`.
+    /// Waits until the tablet says that it holds `many` unsent items.
     async fn holds(&self, many: &str) {
         self.surgeon.sees("#comment-state", &format!("Saved here, not sent yet: {many}.")).await;
     }
 
-    /// The surgeon's page is loaded again while nobody answers, and comes all the same.
+    /// Reloads the surgeon's page while no server answers; the page opens anyway.
     async fn reload_without_network(&self, setting: &str) {
         self.surgeon.reload().await;
         self.surgeon.sees("#setting", setting).await;
         self.surgeon.sees("#now", "No server since").await;
     }
 
-    /// By how many milliseconds the time of each of `table`'s rows, what it waited on the tablet taken off, differs from
-    /// the tablet's own clock, which is the server's in these tests. As it stands in the database.
+    /// Time of each row of `sql`, minus its wait on the tablet, minus the tablet's own time, in milliseconds. The
+    /// tablet's clock is the server's in these tests. Read from the database.
     async fn time_errors(&self, sql: &'static str) -> Vec<f64> {
         let pool = super::theatre::database(self.server.data.path()).await;
         let errors = sqlx::query_scalar::<_, f64>(sql).fetch_all(&pool).await.unwrap();
@@ -82,15 +83,15 @@ impl Theatre {
     }
 }
 
-/// Milliseconds between the tablet's clock and the server's, for each comment.
+/// Milliseconds between the server's time and the tablet's, for each comment.
 const COMMENT_ERRORS: &str =
     "SELECT (julianday(wall) - 2440587.5) * 86400000.0 - waited_ms - client_millis FROM comments ORDER BY number";
 /// The same for each answer.
 const ANSWER_ERRORS: &str =
     "SELECT (julianday(wall) - 2440587.5) * 86400000.0 - waited_ms - client_millis FROM answers ORDER BY number";
 
-/// What was said waited longer than this. How long the last attempt was on its way nobody knows: on a busy machine, to a
-/// server that is just starting, some seconds.
+/// Tolerance of the times. The comments and answers waited longer than this. Nobody knows how long the last attempt to
+/// send took: on a busy machine, to a server that is just starting, some seconds.
 const TOLERANCE_MS: f64 = 4000.0;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -203,20 +204,20 @@ async fn what_a_browser_keeps_tells_nothing_and_goes_with_the_session() {
     assert_eq!(pages, ["/surgeon"], "no answer of the interface, and no other page");
     assert!(cached.iter().all(|(path, ..)| !path.contains("/operator/") && !path.contains("/researcher/")));
 
-    // What the page may load and use of the device is as strict without a network.
+    // The policies for what the page may load and use are as strict without a network.
     let (_, head, _) = cached.iter().find(|(path, ..)| path == "/surgeon").unwrap();
     for strict in ["content-security-policy: default-src 'none'", "permissions-policy: camera=()"] {
         assert!(head.contains(strict), "{head}");
     }
 
-    // Neither the page nor its files know a session.
+    // Neither the page nor its files contain anything of a session.
     let session = last["view"]["session"].as_str().unwrap();
     for (path, head, body) in &cached {
         let text = format!("{head}{}", String::from_utf8_lossy(body));
         assert!(!text.contains(session) && !text.contains("S-32") && !text.contains("Uttered"), "{path}");
     }
 
-    // The next surgeon's page knows nothing of this one.
+    // The next surgeon's page contains nothing of this session.
     theatre.put_away().await;
     surgeon.sees("#panel", "No trial is under way").await;
     assert_eq!(surgeon.last_view().await, Value::Null);
@@ -227,13 +228,13 @@ async fn what_a_browser_keeps_tells_nothing_and_goes_with_the_session() {
     theatre.proxy.come_back();
     surgeon.sees("#panel", "No trial is under way").await;
 
-    // A tablet that is not let in any more does not open the page by itself either.
+    // A tablet that has lost its access does not open the kept page either.
     surgeon.tools("Network.clearBrowserCookies", json!({})).await;
     surgeon.reload().await;
     surgeon.sees("h1", "Not open to this browser").await;
     assert!(surgeon.cached().await.iter().all(|(path, ..)| path.starts_with("/static/")));
 
-    // Operator and researcher have no worker at all.
+    // Operator and researcher have no service worker at all.
     let workers = "return (async () => (await navigator.serviceWorker.getRegistrations()).length)()";
     assert_eq!(theatre.operator.run(workers, &[]).await, 0);
 }
@@ -261,7 +262,7 @@ async fn a_device_that_keeps_nothing_says_so_before_the_trial_and_loses_nothing_
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_screen_is_kept_on_during_a_session_and_where_it_is_not_the_page_says_what_to_do() {
-    // The locks that the page holds, counted in place of the browser's own.
+    // Counts the locks that the page holds, in place of the browser's own.
     const COUNT: &str = "window.locks = 0;
         navigator.wakeLock.request = async () => {
             window.locks += 1;

@@ -1,12 +1,12 @@
-//! What the surgeon's page keeps until it is saved: the outbox in a real browser, before a server
-//! that answers as each test says.
+//! The outbox of the surgeon's page, which keeps entries until they are saved, in a real browser. Each test decides how
+//! the server answers.
 
 use serde_json::{Value, json};
 
 use super::driver::{Browser, Driver};
 use super::theatre;
 
-/// A fresh outbox as `outbox`; `answers` are given in turn, and what was posted is in `posted`.
+/// A fresh outbox as `outbox`. `answers` are given in turn; `posted` collects what was posted.
 const OUTBOX: &str = r#"
     localStorage.clear();
     const page = document.querySelector('script[src$="surgeon/page.js"]').src;
@@ -41,7 +41,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     let page = driver.browser().await;
     page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
 
-    // An answer changed while its first value is on its way to a server whose disk is full.
+    // An answer is changed while its first value is on its way to a server whose disk is full.
     let script = r#"
         const outbox = openOutbox();
         let fail;
@@ -63,7 +63,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         "nothing is dropped, and each says as which of all it was given, so that the server knows the last"
     );
 
-    // The same, when the tablet's clock was set back between the two.
+    // The same, with the tablet's clock set back between the two.
     let script = r#"
         const outbox = openOutbox();
         const clock = Date.now;
@@ -82,7 +82,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!([[3, 5, 3], 0, 1]), "what was said last is known as the last");
 
-    // Only the server's own word that it is kept takes it off the device.
+    // Only the server's own acknowledgement removes an entry from the device.
     let script = r#"
         const outbox = openOutbox();
         answers.push(Promise.resolve(new Response("", { status: 200 })));
@@ -94,7 +94,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!([["d", "d", "d"], 0]));
 
-    // A page of a proxy's is no answer of the server's.
+    // A proxy's page is not an answer of the server.
     let script = r#"
         const outbox = openOutbox();
         answers.push(Promise.resolve(new Response("<h1>Not found</h1>", { status: 404 })));
@@ -105,7 +105,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!([["a", "a"], 0]), "it is sent again until the server has it");
 
-    // What the server refuses stays on the device, and is tried again by the next page.
+    // An entry that the server refuses stays on the device, and the next page tries it again.
     let script = r#"
         const outbox = openOutbox();
         answers.push(Promise.resolve(ours(404)));
@@ -119,7 +119,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!([["b", "b"], 1, 1, 0, 0, 0]));
 
-    // Half an emoji, where a text was cut, does not stop the rest.
+    // Half an emoji, from a text that was cut, does not stop the other entries.
     let script = r#"
         const outbox = openOutbox();
         const done = saved(outbox);
@@ -129,7 +129,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!(["cut \u{fffd}"]));
 
-    // Who waits for the answers hears that the server is not heard, also while a comment is the first in line.
+    // A caller that waits for the answers learns that the server is unreachable, even if a comment is first in line.
     let script = r#"
         const outbox = openOutbox();
         answers.push(Promise.reject(new TypeError("Failed to fetch")));
@@ -142,7 +142,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     assert_eq!(run(&page, script).await, json!([false, ["c", "c", 4]]));
 }
 
-/// What a page tells of an entry's wait: whether that was about as many seconds as `expected`, and by which clock.
+/// Checks the reported wait of an entry: whether it is about `expected` seconds, and by which clock.
 const WAIT: &str = r#"
     const clock = Date.now;
     const wait = ({ waited_millis: waited, waited_by: by }, expected) =>
@@ -177,7 +177,7 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
     let back = "return wait(await heldBack(() => (Date.now = () => clock() - 600000)), 0)";
     assert_eq!(waits(back).await, json!([true, "page-clock"]));
 
-    // Asleep for ten minutes: the page is out of sight, and its own clock stands still.
+    // Asleep for ten minutes: the page is hidden, and its own clock stands still.
     let asleep = "const sight = (hidden) => {
             Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
             document.dispatchEvent(new Event('visibilitychange'));
@@ -190,8 +190,8 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
         }), 600)";
     assert_eq!(waits(asleep).await, json!([true, "wall-clock"]));
 
-    // Kept over a reload, where no page's clock knows how long; the real server knows no such
-    // address and takes nothing.
+    // The entry is kept over a reload, so that no page's clock knows the wait. The real server has no such address and
+    // accepts nothing.
     let keep = "answers.push(new Promise(() => {}));
         Date.now = () => clock() - 600000;
         openOutbox().add('/comments', { session: 's', value: 'kept' });

@@ -17,7 +17,7 @@ async fn press(page: &Browser, key: &str) {
     }
 }
 
-/// Clicks on a place of the page, which must be in sight.
+/// Clicks at a point of the page, which must be visible.
 async fn tap(page: &Browser, x: f64, y: f64) {
     for kind in ["mousePressed", "mouseReleased"] {
         let click = json!({"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1});
@@ -25,12 +25,12 @@ async fn tap(page: &Browser, x: f64, y: f64) {
     }
 }
 
-/// Seconds of the timeline at which the playhead stands.
+/// Position of the playhead, in seconds of the timeline.
 async fn playhead(page: &Browser) -> f64 {
     page.value(SCRUB).await.parse().unwrap()
 }
 
-/// The frame that is drawn, counted over all recordings; -1 before the first is.
+/// Number of the drawn frame, counted over all recordings; -1 before the first is drawn.
 async fn drawn(page: &Browser) -> i64 {
     let frame = page.attribute("#player-picture", "data-frame").await;
     frame.and_then(|frame| frame.parse().ok()).unwrap_or(-1)
@@ -50,17 +50,17 @@ async fn picture(page: &Browser) -> (u64, f64) {
     (found[0].as_u64().unwrap(), found[1].as_f64().unwrap())
 }
 
-/// Where the playhead's line stands on the drawing `css`.
+/// Horizontal position of the playhead's line in the drawing `css`.
 async fn line(page: &Browser, css: &str) -> f64 {
     page.attribute(&format!("{css} .playhead"), "x1").await.unwrap().parse().unwrap()
 }
 
-/// A session of two settings with a comment in each, recorded, which has ended.
+/// Runs and completes a recorded session of two settings with a comment in each.
 async fn session(theatre: &Theatre) {
     theatre.begin("S-08", "filmed").await;
     for (setting, comment) in [(1, "Sharp where I look"), (2, "It wanders")] {
         theatre.tap_notice(setting).await;
-        // Long enough for three seconds before the comment to lie in its own setting.
+        // Long enough that three seconds before the comment are in its own setting.
         let before = recorded_seconds(&theatre.operator.text("#recording-now").await);
         until("some seconds of recording", || async {
             recorded_seconds(&theatre.operator.text("#recording-now").await) >= before + 5.0
@@ -130,21 +130,21 @@ async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
     press(page, "ArrowLeft").await;
     until_drawn(page, 1).await;
 
-    // It plays at the recording's pace at most, and the lines on the drawings go with it.
+    // It plays at most at the recording's pace, and the lines on the drawings move with it.
     let from = playhead(page).await;
     let before = line(page, "#timeline").await;
     page.click("#player-play").await;
     until("playback to come on", || async { drawn(page).await >= 10 }).await;
     press(page, " ").await;
-    // The button has the focus still, and takes the space as its own.
+    // The button still has the focus, so it takes the space key.
     page.sees("#player-play", "Play").await;
     assert!(playhead(page).await > from);
     assert!(line(page, "#timeline").await > before);
     assert!((line(page, "#timeline").await - line(page, "#metric").await).abs() < 0.2);
 
-    // From three seconds before a comment.
+    // Playing starts three seconds before a comment.
     let comments = comment_seconds(page).await;
-    // At once, because a recording that has ended begins anew.
+    // Both clicks in one script, because a recording that has ended starts again.
     let play_and_pause = "document.querySelector('#comment-list li:last-child button').click();
         const button = document.querySelector('#player-play');
         const offered = button.textContent;
@@ -160,7 +160,7 @@ async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
     page.to_top().await;
     shoot(page, "researcher-6-playback").await;
 
-    // A place on the drawing, near its left end, and finer pictures.
+    // Taps near the left end of the drawing, then asks for finer pictures.
     let there = page.area("#timeline").await;
     tap(page, there.left + 200.0, there.top + 230.0).await;
     until("the playhead to be there", || async { playhead(page).await < expected }).await;
@@ -170,7 +170,7 @@ async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
 
     assert_eq!(page.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
 
-    // A recording that was moved away.
+    // The recording is moved away.
     let recordings = theatre.server.data.path().join("recordings");
     std::fs::rename(&recordings, theatre.server.data.path().join("moved")).unwrap();
     page.reload().await;
@@ -184,7 +184,7 @@ async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
     shoot(page, "researcher-7-recording-gone").await;
 }
 
-/// When the comments were said, by the server's word, in seconds of the timeline.
+/// When the comments were said according to the server, in seconds of the timeline.
 async fn comment_seconds(page: &Browser) -> Vec<f64> {
     let session = page.attribute("#session", "data-session").await.unwrap();
     let ask = "return fetch(arguments[0]).then((answer) => answer.json())";

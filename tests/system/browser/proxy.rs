@@ -1,4 +1,4 @@
-//! A TCP proxy that keeps every byte that the server sends to the browser, and what it was asked for.
+//! A TCP proxy that records every byte in both directions between the browser and the server.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
@@ -10,9 +10,9 @@ use tokio::sync::watch;
 /// One connection's bytes.
 #[derive(Debug, Clone, Default)]
 pub struct Connection {
-    /// From the browser.
+    /// Bytes from the browser.
     pub asked: Vec<u8>,
-    /// From the server.
+    /// Bytes from the server.
     pub answered: Vec<u8>,
 }
 
@@ -20,17 +20,17 @@ type Recording = Arc<Mutex<Connection>>;
 
 /// A proxy to one server.
 pub struct Proxy {
-    /// Where the browser finds it.
+    /// Address for the browser.
     pub address: SocketAddr,
     recordings: Arc<Mutex<Vec<Recording>>>,
-    /// Connections from before the number was raised pass nothing on.
+    /// Number of silent breaks. Connections older than the last one pass nothing on.
     broken: watch::Sender<u64>,
     /// Whether the network swallows everything.
     dark: watch::Sender<bool>,
 }
 
 impl Proxy {
-    /// A proxy to `server`, which may come and go.
+    /// A proxy to `server`, which need not run all the time.
     pub async fn to(server: SocketAddr) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
@@ -54,11 +54,11 @@ impl Proxy {
                     let mut link = std::pin::pin!(pass(browser, server, recording));
                     tokio::select! {
                         () = &mut link => return,
-                        // Neither end is told, and neither hears anything more.
+                        // Neither end is notified, and neither receives anything more.
                         _ = breaks.changed() => std::future::pending().await,
                         () = until_dark_is(true, &mut darkness) => {}
                     }
-                    // Nor does either hear anything here, until there is light again: then the connection is lost.
+                    // Here too neither end receives anything until the network is back. Then the connection is lost.
                     until_dark_is(false, &mut darkness).await;
                 });
             }
@@ -67,22 +67,22 @@ impl Proxy {
         Self { address, recordings, broken, dark }
     }
 
-    /// Breaks every connection there is, as walking out of the network's reach does: without a word.
+    /// Breaks all existing connections silently, as when the tablet leaves the network's range.
     pub fn break_silently(&self) {
         self.broken.send_modify(|count| *count += 1);
     }
 
-    /// From now on swallows everything, on connections there are and on new ones: the tablet is out of reach.
+    /// From now on swallows everything, on existing and new connections: the tablet is out of reach.
     pub fn go_dark(&self) {
         self.dark.send_replace(true);
     }
 
-    /// The tablet is in reach again. Connections from the time out of reach are lost.
+    /// The tablet is in reach again. Connections from before are lost.
     pub fn come_back(&self) {
         self.dark.send_replace(false);
     }
 
-    /// Everything so far, a connection each.
+    /// All connections so far.
     pub fn recorded(&self) -> Vec<Connection> {
         self.recordings.lock().unwrap().iter().map(|recording| recording.lock().unwrap().clone()).collect()
     }
@@ -95,7 +95,7 @@ async fn until_dark_is(dark: bool, darkness: &mut watch::Receiver<bool>) {
 }
 
 async fn pass(browser: TcpStream, server: SocketAddr, recording: Recording) {
-    // While the server is down its port refuses: the browser's connection just closes.
+    // While the server is down its port refuses, and the browser's connection just closes.
     let Ok(server) = TcpStream::connect(server).await else { return };
     let (from_browser, to_browser) = browser.into_split();
     let (from_server, to_server) = server.into_split();

@@ -1,4 +1,4 @@
-//! The operator records: reads how long the disk lasts, starts, stops, and reads what became of it.
+//! The operator records: reads how long the disk lasts, starts, stops, and reads the result.
 
 use parfocal::recording::Recording;
 

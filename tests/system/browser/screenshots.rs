@@ -1,5 +1,5 @@
-//! Screenshots of every page and state, at tablet and laptop size, for people to look at. Whatever is worth looking at
-//! must also be usable by everyone.
+//! Screenshots of every page and state, at tablet and laptop size, for people to look at. Each state is also checked
+//! for accessibility.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use super::driver::Browser;
 
 const SIZES: [(u32, u32); 3] = [(1180, 820), (820, 1180), (1440, 900)];
 
-/// Where this variable is set, the pictures are taken: they are for people, and take a minute of a whole run.
+/// Pictures are taken only if this variable is set: they are for people, and add a minute to a whole run.
 const WANTED: &str = "PARFOCAL_SCREENSHOTS";
 
-/// Checks at each size whether everyone can use what the page shows, and takes `name` into `target/screenshots/` where
+/// Checks at each size whether everyone can use what the page shows. Saves it as `name` in `target/screenshots/` if
 /// pictures are wanted.
 pub async fn shoot(browser: &Browser, name: &str) {
     for (width, height) in SIZES {
@@ -36,7 +36,7 @@ async fn take(browser: &Browser, file: &str) {
     std::fs::write(folder.join(file), png).unwrap();
 }
 
-/// Gives the page this size, as a turned tablet or its keyboard does, and waits until it is drawn.
+/// Gives the page this size, as turning the tablet or opening its keyboard does, and waits until it is drawn.
 pub async fn resize(browser: &Browser, width: u32, height: u32) {
     set_screen(browser, width, height, 1).await;
 }
@@ -45,7 +45,7 @@ pub async fn resize(browser: &Browser, width: u32, height: u32) {
 pub async fn set_screen(browser: &Browser, width: u32, height: u32, density: u32) {
     let size = json!({ "width": width, "height": height, "deviceScaleFactor": density, "mobile": false });
     browser.tools("Emulation.setDeviceMetricsOverride", size).await;
-    // Two frames: one in which the page lays itself out anew, one in which what watches its size has drawn.
+    // Two frames: in the first the page gets its new layout, in the second the observers of its size have drawn.
     let drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
     browser.tools("Runtime.evaluate", json!({ "expression": drawn, "awaitPromise": true })).await;
 }

@@ -1,10 +1,10 @@
-//! What a test can do or see only from within the page: its network, its storage, its clocks, its pixels.
+//! Actions and queries that are possible only within the page: its network, storage, clocks and pixels.
 
 use serde_json::{Value, json};
 
 use super::driver::Browser;
 
-/// From now on holds each request whose path ends in `arguments[0]`, until `window.release()`; keeps their bodies.
+/// From now on holds each request whose path ends in `arguments[0]`, until `window.release()`; collects their bodies.
 const HOLD: &str = "const send = window.fetch;
     window.heldBodies = [];
     const held = new Promise((done) => (window.release = done));
@@ -44,7 +44,7 @@ impl Browser {
         self.run("window.fetch = () => Promise.reject(new TypeError('Failed to fetch'))", &[]).await;
     }
 
-    /// Lets go what was held or cut.
+    /// Releases the held or cut requests.
     pub async fn release(&self) {
         self.run("window.release()", &[]).await;
     }
@@ -54,7 +54,7 @@ impl Browser {
         self.run("return window.heldBodies", &[]).await.as_array().unwrap().clone()
     }
 
-    /// Every page from the next load on hears nothing from anybody.
+    /// From the next load on, no page receives anything from the server.
     pub async fn silence(&self) {
         let silence = "window.fetch = () => new Promise(() => {});
             window.WebSocket = class extends EventTarget { close() {} };";
@@ -74,7 +74,7 @@ impl Browser {
 
 /// Storage.
 impl Browser {
-    /// Every page from the next load on finds the device's storage full.
+    /// From the next load on, every page finds the device's storage full.
     pub async fn fill_storage(&self) {
         let full = "Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); };";
         self.before_each_page(full).await;
@@ -86,15 +86,15 @@ impl Browser {
         strings(&self.run(names, &[]).await)
     }
 
-    /// Runs `script` before those of each page from the next load on.
+    /// From the next load on, runs `script` before each page's own scripts.
     pub async fn before_each_page(&self, script: &str) {
         self.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script })).await;
     }
 }
 
-/// What happens within one turn of the page, which no driver is fast enough for.
+/// Actions within one turn of the page's event loop, for which no driver is fast enough.
 impl Browser {
-    /// Drags a slider over `values` and lets it go; gives the value at which it stands.
+    /// Drags a slider over `values` and releases it. Returns the slider's value.
     pub async fn drag_slider(&self, css: &str, values: &[f64]) -> String {
         let drag = "const slider = document.querySelector(arguments[0]);
             for (const value of arguments[1]) {
@@ -115,7 +115,7 @@ impl Browser {
         self.run(write, &[json!(css), json!(words)]).await;
     }
 
-    /// Gives the element the focus, which a click would use.
+    /// Gives the element the focus, without a click.
     pub async fn focus(&self, css: &str) {
         self.run("document.querySelector(arguments[0]).focus()", &[json!(css)]).await;
     }
@@ -125,14 +125,14 @@ impl Browser {
         self.run("scrollTo(0, 0)", &[]).await;
     }
 
-    /// Brings the element into the middle of what is seen.
+    /// Scrolls the element to the middle of the window.
     pub async fn show(&self, css: &str) {
         let scroll = "document.querySelector(arguments[0]).scrollIntoView({ block: 'center', behavior: 'instant' })";
         self.run(scroll, &[json!(css)]).await;
     }
 }
 
-/// What no driver tells.
+/// Queries that no driver offers.
 impl Browser {
     /// Whether a field's text fails the check `flag`, such as patternMismatch.
     pub async fn fails(&self, css: &str, flag: &str) -> bool {
@@ -140,7 +140,7 @@ impl Browser {
         self.run(check, &[json!(css), json!(flag)]).await == true
     }
 
-    /// Everything that stands on the page, seen or not, but for what the stream is doing at the moment.
+    /// All text on the page, visible or not, except what depends on the stream at the moment.
     pub async fn everything(&self) -> String {
         let page = "const page = document.body.cloneNode(true);
             for (const told of page.querySelectorAll('.viewer-stale, .viewer-heard')) told.remove();

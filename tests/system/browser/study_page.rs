@@ -17,20 +17,20 @@ async fn researcher(driver: &Driver, server: &Server) -> Browser {
     browser
 }
 
-/// Gives a reason in the dialog and goes on.
+/// Enters a reason in the dialog and confirms.
 async fn sign(page: &Browser, reason: &str) {
     page.type_into("#reason", reason).await;
     page.click("#reason-go").await;
 }
 
-/// The same with the passphrase once more.
+/// The same, with the passphrase.
 async fn confirm(page: &Browser, reason: &str, passphrase: &str) {
     page.type_into("#reason", reason).await;
     page.type_into("#passphrase", passphrase).await;
     page.click("#reason-go").await;
 }
 
-/// Signs in on the page for that.
+/// Fills in and sends the page's sign-in form.
 async fn sign_in(page: &Browser, name: &str, passphrase: &str) {
     page.type_into("#name", name).await;
     page.type_into("#passphrase", passphrase).await;
@@ -51,7 +51,7 @@ async fn a_session(operator: &Browser) {
     operator.click("#participant-dialog [type=submit]").await;
     operator.sees_no("#participant-dialog").await;
 
-    // With a study open nothing is chosen beforehand.
+    // While a study is open, nothing is selected in advance.
     operator.sees("#study-choice", "Study").await;
     assert_eq!(operator.value("#study").await, "");
     operator.select("#study", "scope-2026/leeds").await;
@@ -59,9 +59,9 @@ async fn a_session(operator: &Browser) {
     assert_eq!(operator.count("#protocol option").await, 1, "the study's protocols alone");
     shoot(operator, "operator-11-study").await;
 
-    // The operator's link is not enough: the page asks to sign in over itself, and keeps what was chosen.
+    // The operator's link is not enough: the page asks to sign in, in a dialog, and keeps the selection.
     operator.click("#new-session [type=submit]").await;
-    operator.sees("#sign-in-dialog", "Sign in to go on").await;
+    operator.sees("#sign-in-dialog", "Sign in to continue").await;
     shoot(operator, "operator-12-sign-in").await;
     operator.type_into("#sign-in-name", "operator").await;
     operator.type_into("#sign-in-passphrase", PASSPHRASE).await;
@@ -83,7 +83,7 @@ async fn a_session(operator: &Browser) {
     operator.sees("#new-session", "Prepare session").await;
 }
 
-/// Another session in the study, of S-02, that is aborted.
+/// Makes and aborts another session in the study, for S-02.
 async fn another_session(server: &mut Server) {
     let token = server.sign_in("operator").await;
     server.use_key("operator", &token);
@@ -111,7 +111,7 @@ async fn export_with_policies(page: &Browser, server: &mut Server) {
     assert!(package.file_names().any(|name| name.unwrap().ends_with("allocation.csv")), "which policy ran is in it");
 }
 
-/// Exports the study, whose page is open. The package is there when the page is opened again.
+/// Exports the study, whose page is open. The package is still there when the page is opened again.
 async fn export(page: &Browser) {
     page.sees_no("#export-ready").await;
     page.click("#export-blinded").await;
@@ -133,7 +133,7 @@ async fn a_study_is_led_from_the_pages() {
     let operator = operator(&driver, &server).await;
     operator.sees("#new-session", "Prepare session").await;
     operator.sees_no("#study-choice").await;
-    // Whoever wants a single session never reads the word.
+    // Someone who wants only a single session never reads the word.
     assert!(!operator.text("body").await.to_lowercase().contains("study"));
 
     let page = researcher(&driver, &server).await;
@@ -143,7 +143,7 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("main", "Sign in to plan a study").await;
     page.click("#sign-in").await;
     sign_in(&page, "lead", "not the passphrase").await;
-    page.sees("#sign-in-trouble", "do not belong together").await;
+    page.sees("#sign-in-trouble", "do not match").await;
     shoot(&page, "sign-in-1-refused").await;
     page.clear("#passphrase").await;
     page.type_into("#passphrase", PASSPHRASE).await;
@@ -179,7 +179,7 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("td .badge.warn", "withdrawn").await;
     assert_eq!(page.count("#export").await, 0, "no session is left to export");
 
-    // The package that was ready still has that session: it is handed out no more.
+    // The prepared package still contains that session, so it can no longer be downloaded.
     another_session(&mut server).await;
     page.reload().await;
     page.sees("#export-trouble", "a surgeon has withdrawn").await;
@@ -189,7 +189,7 @@ async fn a_study_is_led_from_the_pages() {
     sign(&page, "The last surgeon was here").await;
     page.sees("#stage", "closed").await;
     page.click("#lock").await;
-    // The tablet may still hold something: the page wants to be told that it is known.
+    // The tablet may still hold something, so the page requires a confirmation.
     page.sees("#reason-confirm", "Lock anyway").await;
     page.click("#reason-confirmed").await;
     confirm(&page, "The data are complete", "not the passphrase").await;
@@ -205,7 +205,7 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("#reason-trouble", "'Dr Lead' is not among those who may unblind this study").await;
     shoot(&page, "study-4-refused").await;
 
-    // Somebody else signs in: the definition names them.
+    // Another person, whom the definition names, signs in.
     server.add_account("statistician", "lead", "Trial statistician");
     page.click("#reason-dialog [data-close]").await;
     page.click("#sign-out").await;

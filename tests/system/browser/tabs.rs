@@ -1,11 +1,11 @@
-//! Two tabs and two tablets of one surgeon: a draft is in one of them, and of two answers the one given last counts.
+//! Two tabs and two tablets of one surgeon: a draft belongs to one of them, and the latest of two answers counts.
 
 use super::driver::{Browser, Driver};
 use super::theatre::Theatre;
 
 const COMMENTS: &str = "SELECT text FROM comments ORDER BY number";
 
-/// The point that is chosen on the scale called `name`, if one is.
+/// The selected point of the scale called `name`, if any.
 async fn chosen(page: &Browser, name: &str) -> Option<String> {
     page.property(&format!("input[name={name}]:checked"), "value").await
 }
@@ -34,7 +34,7 @@ async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
     surgeon.sees_no("#elsewhere").await;
     theatre.keeps(COMMENTS, &["Half a thought, whole"]).await;
 
-    // Left half-written in a tab while another is open: when the session goes, it is sent once.
+    // A comment is left half-written in a tab while another is open. When the session ends, it is sent once.
     theatre.write("Left in a tab").await;
     surgeon.to_tab(&first).await;
     surgeon.sees("#elsewhere", "Continue “Left in a tab”").await;
@@ -73,7 +73,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     .await;
     assert_eq!(chosen(&other, "sharpness").await.as_deref(), Some("5"));
 
-    // Both say that they hold nothing once the session is over, and the researcher sees that they disagreed.
+    // Both report that they hold nothing after the session, and the researcher sees that they disagreed.
     theatre.operator.click("#session-actions .danger").await;
     theatre.give_reason("Enough").await;
     theatre.operator.sees("#phase", "Aborted").await;

@@ -1,5 +1,5 @@
-//! The stage of a trial: the server, the surgeon's browser behind the recording proxy, and the operator's browser; and
-//! what each of them does there.
+//! The setup of a trial: the server, the surgeon's browser behind the recording proxy, and the operator's browser; and
+//! their actions.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,11 +13,11 @@ use super::proxy::Proxy;
 use super::wait::until;
 use crate::support::Server;
 
-/// Server and browsers.
+/// A server with the surgeon's and operator's browsers.
 pub struct Theatre {
     /// The server.
     pub server: Server,
-    /// What the surgeon's browser receives goes through here.
+    /// The proxy through which the surgeon's browser connects.
     pub proxy: Proxy,
     /// The surgeon's browser.
     pub surgeon: Browser,
@@ -45,7 +45,7 @@ pub async fn operator(driver: &Driver, server: &Server) -> Browser {
 
 fn start(data: Arc<TempDir>, address: &str) -> Server {
     let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/system/browser");
-    // Few frames: the camera and two browsers share the machine.
+    // Few frames, because the camera and two browsers share the machine.
     Server::on(data, &["--bind", address, "--fps", "5", "--protocols", protocols.to_str().unwrap()])
 }
 
@@ -60,7 +60,7 @@ pub fn start_again(server: &mut Server) {
 }
 
 impl Theatre {
-    /// Opens the theatre: both are let in by their links.
+    /// Starts a server and both browsers, which enter by their links.
     pub async fn open(driver: &Driver) -> Self {
         Self::on(driver, Arc::new(tempfile::tempdir().unwrap())).await
     }
@@ -70,7 +70,7 @@ impl Theatre {
         Self::heard(driver, data, &[]).await
     }
 
-    /// The same with `arguments` for the surgeon's browser, such as what its microphone hears.
+    /// The same, with `arguments` for the surgeon's browser, for example the sound in its microphone.
     pub async fn heard(driver: &Driver, data: Arc<TempDir>, arguments: &[String]) -> Self {
         let server = start(data, "127.0.0.1:0");
         let proxy = Proxy::to(server.address).await;
@@ -80,13 +80,13 @@ impl Theatre {
         Self { server, proxy, surgeon, operator }
     }
 
-    /// The operator prepares a session of `participant`, who is new, by `protocol`, and starts it.
+    /// The operator prepares and starts a session of a new participant `participant` by `protocol`.
     pub async fn begin(&self, participant: &str, protocol: &str) {
         self.prepare(participant, protocol).await;
         self.operator.click("#session-actions .primary").await;
     }
 
-    /// The operator prepares a session of `participant`, who is new, by `protocol`.
+    /// The operator prepares a session of a new participant `participant` by `protocol`.
     pub async fn prepare(&self, participant: &str, protocol: &str) {
         let operator = &self.operator;
         // The page may still be growing above the button, so that a click meets something else.
@@ -105,13 +105,14 @@ impl Theatre {
         operator.sees("#phase", "Ready to start").await;
     }
 
-    /// The operator gives `reason` in the dialog that asks for one, and goes on.
+    /// The operator enters `reason` in the dialog that asks for one, and confirms.
     pub async fn give_reason(&self, reason: &str) {
         self.operator.type_into("#reason", reason).await;
         self.operator.click("#reason-go").await;
     }
 
-    /// The surgeon taps the notice of setting `number`: once it is there, and as often as it takes to be meant.
+    /// The surgeon taps the notice of setting `number` when it is shown, again and again until the page accepts the
+    /// tap.
     pub async fn tap_notice(&self, number: usize) {
         self.surgeon.sees("#change-title", &format!("Setting {number} of ")).await;
         let title = self.surgeon.text("#change-title").await;
@@ -125,7 +126,7 @@ impl Theatre {
         self.surgeon.sees("#remaining", "left").await;
     }
 
-    /// The surgeon writes `text` into the comment box, at its end.
+    /// The surgeon writes `text` at the end of the comment box.
     pub async fn write(&self, text: &str) {
         self.surgeon.click("#comment").await;
         self.surgeon.insert(text).await;
@@ -144,17 +145,17 @@ impl Theatre {
         self.surgeon.sees("#comment-state", &told).await;
     }
 
-    /// The live picture's place on the surgeon's page.
+    /// Position and size of the live picture on the surgeon's page.
     pub async fn picture(&self) -> Area {
         self.surgeon.area("#view").await
     }
 
-    /// What stands in the comment box.
+    /// The text in the comment box.
     pub async fn comment_box(&self) -> String {
         self.surgeon.property("#comment", "value").await.unwrap()
     }
 
-    /// The surgeon is done with the setting: by two taps, the second as late as it takes to be meant.
+    /// The surgeon finishes the setting by two taps. The second is repeated until the page accepts it.
     pub async fn finish(&self) {
         self.surgeon.click("#finish").await;
         until("the setting to be finished", || async {
@@ -164,13 +165,13 @@ impl Theatre {
         .await;
     }
 
-    /// The surgeon is done with the setting, answers `point` to its question, and goes on.
+    /// The surgeon finishes the setting, answers `point` to its question, and continues.
     pub async fn finish_setting(&self, point: u8) {
         self.finish().await;
         self.answer_questions(point).await;
     }
 
-    /// The surgeon answers the questions after a setting and goes on.
+    /// The surgeon answers the questions after a setting and continues.
     pub async fn answer_questions(&self, point: u8) {
         self.surgeon.sees("#panel h2", "a few questions").await;
         self.choose("sharpness", point).await;
@@ -179,7 +180,7 @@ impl Theatre {
         self.surgeon.sees_no("[data-question=sharpness]").await;
     }
 
-    /// The surgeon chooses point `point` of the scale called `name`.
+    /// The surgeon selects point `point` of the scale called `name`.
     pub async fn choose(&self, name: &str, point: u8) {
         self.surgeon.click(&format!("input[name='{name}'][value='{point}']")).await;
     }

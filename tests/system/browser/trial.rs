@@ -1,5 +1,5 @@
 //! The whole trial: six settings with everything that happens in a theatre, then the researcher, the database, the
-//! export, and what reached the surgeon's browser.
+//! export, and a check of what reached the surgeon's browser.
 
 use super::aftermath::{database, export, researcher};
 use super::blinding;
@@ -81,7 +81,7 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
     assert!(width > 700.0, "beside an upright tablet's keyboard there is as much room to write: {width}");
     resize(surgeon, 1180, 820).await;
 
-    // The operator reads along, and is told nothing of policy or timing.
+    // The operator reads along, and sees nothing of policy or timing.
     theatre.operator.sees("#comments", "Follows me well 🧠").await;
     theatre.operator.sees("#phase", "Setting 1 of 6: inspecting").await;
     theatre.operator.sees("#traces-hidden", "hidden while a session runs").await;
@@ -139,7 +139,7 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre) {
     surgeon.sees("#panel h2", "Setting 3: a few questions").await;
 
     surgeon.close_tab(&first).await;
-    // The stale tab follows by itself, and its draft is still about setting 3.
+    // The stale tab catches up by itself, and its draft is still about setting 3.
     surgeon.sees("#panel h2", "Setting 3: a few questions").await;
     assert_eq!(theatre.comment_box().await, "Half a thought");
 
@@ -247,7 +247,7 @@ async fn closing_questions(theatre: &Theatre) {
     surgeon.sees("#panel h2", "Final questions").await;
     shoot(surgeon, "surgeon-9-closing").await;
 
-    // A ranking counts once it is confirmed; until then a reload keeps it on the device.
+    // A ranking counts when it is confirmed; until then it is kept on the device, also over a reload.
     surgeon.click("[aria-label='Move setting 5 up']").await;
     surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;
     surgeon.reload().await;
@@ -267,7 +267,7 @@ async fn closing_questions(theatre: &Theatre) {
     shoot(&theatre.operator, "operator-5-completed").await;
 }
 
-/// Each item is kept when it is given: over a reload, and beside what another tablet gives.
+/// Each item is stored when it is given: also over a reload, and together with those from another tab.
 async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     let give = async |items: std::ops::Range<usize>| {
@@ -283,7 +283,7 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
     surgeon.reload().await;
     surgeon.sees(state, "4 of 10 answered · Saved").await;
 
-    // The page leads to the first item without an answer.
+    // The page scrolls to the first item without an answer.
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "2 questions are still open").await;
     surgeon.sees(".sus fieldset:nth-child(5) .gap", "Not answered yet").await;

@@ -1,5 +1,5 @@
-//! The picture on the page: fitted to the bright circle, at the size that the screen can show, zoomed by
-//! people alone.
+//! The picture on the page: fitted to the bright circle, at the size that the screen can show, and zoomed only by
+//! people.
 
 use serde_json::{Value, json};
 
@@ -9,10 +9,10 @@ use super::theatre::{Theatre, operator};
 use super::wait::until;
 use crate::support::Server;
 
-/// The canvas that holds the picture.
+/// Selector of the canvas with the picture.
 const PICTURE: &str = ".viewer-picture";
 
-/// Upright tablet.
+/// Page size of an upright tablet.
 const UPRIGHT: (u32, u32) = (820, 1180);
 
 /// A surgeon's page with a picture on it.
@@ -32,8 +32,8 @@ fn server() -> Server {
     Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
 }
 
-/// Waits until the page shows pictures of the size of the cells, or of a larger one. How large depends on how fast the
-/// machine draws them.
+/// Waits until the page shows pictures of one pixel per cell, or larger ones. How large they get depends on how fast
+/// the machine draws them.
 async fn gets(browser: &Browser, larger: bool) {
     until(if larger { "larger pictures" } else { "small pictures" }, || async {
         let width = browser.run("return document.querySelector(arguments[0]).width", &[json!(PICTURE)]).await;
@@ -42,7 +42,7 @@ async fn gets(browser: &Browser, larger: bool) {
     .await;
 }
 
-/// Waits until the picture is `factor` times as large as `before`, to a part in a hundred.
+/// Waits until the picture is `factor` times as large as `before`, within 1 %.
 async fn is_enlarged(browser: &Browser, before: Area, factor: f64) {
     until(&format!("a picture {factor} times as large"), || async {
         let ratio = browser.area(PICTURE).await.width / before.width;
@@ -51,12 +51,12 @@ async fn is_enlarged(browser: &Browser, before: Area, factor: f64) {
     .await;
 }
 
-/// The first and last column and row of the box, in parts of its sides, where the picture has light.
+/// The lit part of the view, as fractions of its sides.
 async fn lit(browser: &Browser) -> Area {
     let view = browser.area("#view").await;
     let screen = image::load_from_memory(&browser.screenshot().await).unwrap().to_luma8();
 
-    // What stands over the picture, at its corners and edges, is not on the two lines through its middle.
+    // The overlays at corners and edges are not on the two lines through the middle.
     let at = |x: f64, y: f64| screen.get_pixel(x as u32, y as u32).0[0] > 24;
     let ends = |length: f64, is_lit: &dyn Fn(f64) -> bool| {
         let steps: Vec<f64> = (0..length as u32).map(f64::from).filter(|step| is_lit(*step)).collect();
@@ -84,8 +84,8 @@ async fn the_bright_circle_fills_the_view() {
     shoot(&surgeon, "view-1-fitted").await;
 }
 
-/// Notes, several times a picture: the picture's width in pixels, its place, and its light in the middle. At each frame
-/// of the screen it would keep a busy machine from drawing larger pictures.
+/// Notes the picture's width in pixels, its place and the light in its middle, several times per picture. Doing it at
+/// each frame of the screen would keep a busy machine from drawing larger pictures.
 const NOTE: &str = "const canvas = document.querySelector('.viewer-picture');
     const small = Object.assign(document.createElement('canvas'), { width: 8, height: 8 });
     const pen = small.getContext('2d', { willReadFrequently: true });
@@ -124,7 +124,7 @@ async fn a_finer_screen_gets_larger_pictures_at_the_same_place_without_a_flash()
     assert_eq!(places.len(), 1, "{places:?}");
 }
 
-/// Touches the screen at these points, or lifts the fingers where there are none.
+/// Touches the screen at these points; without points, lifts the fingers.
 async fn touch(browser: &Browser, kind: &str, points: &[(f64, f64)]) {
     let points: Vec<Value> =
         points.iter().enumerate().map(|(id, (x, y))| json!({ "x": x, "y": y, "id": id })).collect();

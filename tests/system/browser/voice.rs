@@ -1,5 +1,5 @@
-//! Comments aloud: held, spoken and let go in a real browser, whose microphone hears a tone; kept while the server is
-//! away and over a reload; refused microphones; and what the researcher hears of it.
+//! Spoken comments in a real browser, whose microphone receives a tone: hold the button, speak, release; recordings
+//! kept while the server is away and over a reload; refused microphones; and what the researcher hears.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +13,7 @@ use super::screenshots::shoot;
 use super::theatre::{Theatre, database, kill, start_again};
 use super::wait::until;
 
-/// A browser that lets every page use a microphone, and hears `tone` in it.
+/// Options of a browser that lets every page use a microphone, which receives `tone`.
 fn hears(tone: &Path) -> Vec<String> {
     vec![
         "--use-fake-device-for-media-stream".to_owned(),
@@ -49,7 +49,7 @@ fn write_tone(path: &Path) {
     std::fs::write(path, wav).unwrap();
 }
 
-/// A theatre with a microphone, in a session that asks for voice, at its first setting.
+/// A theatre with a microphone, in the first setting of a session that accepts voice.
 async fn speaking(driver: &Driver, folder: &TempDir) -> Theatre {
     let tone = folder.path().join("tone.wav");
     write_tone(&tone);
@@ -60,7 +60,7 @@ async fn speaking(driver: &Driver, folder: &TempDir) -> Theatre {
     theatre
 }
 
-/// Puts a finger on the button, or lifts it.
+/// Puts a finger on the talk button, or lifts it.
 async fn finger(page: &Browser, kind: &str) {
     let there = page.area("#talk").await;
     let x = there.left + there.width / 2.0;
@@ -77,13 +77,14 @@ async fn let_go(page: &Browser) {
     finger(page, "mouseReleased").await;
 }
 
-/// A key goes down, goes down again because it is held, or comes up.
+/// Presses a key, repeats it as a held key does, or releases it.
 async fn key(page: &Browser, kind: &str, key: &str, repeat: bool) {
     let event = json!({"type": kind, "key": key, "code": key, "autoRepeat": repeat});
     page.tools("Input.dispatchKeyEvent", event).await;
 }
 
-/// Of each recording its pieces, whether it has its end, and its length in milliseconds, as the database has them.
+/// The recordings in the database: the numbers of their pieces, the number of pieces, whether the end is there, and the
+/// length in milliseconds.
 async fn recorded(theatre: &Theatre) -> Vec<(String, i64, bool, i64)> {
     let pool = database(theatre.server.data.path()).await;
     let rows = sqlx::query_as(
@@ -110,7 +111,7 @@ async fn all_pieces(theatre: &Theatre) {
     }
 }
 
-/// The operator ends the session, and the researcher opens it.
+/// The operator ends the session, and the researcher opens it. Returns its id.
 async fn open_session(theatre: &Theatre) -> String {
     let page = &theatre.operator;
     page.click_labelled("#session-actions", "Abort").await;
@@ -122,7 +123,7 @@ async fn open_session(theatre: &Theatre) -> String {
     page.attribute("#session", "data-session").await.unwrap()
 }
 
-/// What the page's browser decodes of the first recording: its length in seconds, and the tone that it hears in it.
+/// Decodes the first recording in the page's browser: its length in seconds, and the frequency of its tone in hertz.
 async fn decoded(page: &Browser) -> (f64, f64) {
     let decode = "const { src } = document.querySelector('.voice audio');
         return (async () => {
@@ -164,7 +165,7 @@ async fn a_comment_is_held_spoken_let_go_played_and_typed_out() {
     theatre.sees_saved(1).await;
     until_recorded(&theatre, 1).await;
 
-    // A pedal: its key is held, so that the browser repeats it; wherever the focus is.
+    // A pedal: its key is held, so the browser repeats it. It works wherever the focus is.
     page.click("#comment").await;
     key(page, "keyDown", "F13", false).await;
     key(page, "keyDown", "F13", true).await;
@@ -174,7 +175,7 @@ async fn a_comment_is_held_spoken_let_go_played_and_typed_out() {
     theatre.sees_saved(2).await;
     until_recorded(&theatre, 2).await;
 
-    // In the box a space is a space.
+    // In the comment box a space is only a space.
     page.insert("it").await;
     key(page, "keyDown", " ", false).await;
     key(page, "keyUp", " ", false).await;
@@ -219,7 +220,7 @@ async fn a_comment_is_held_spoken_let_go_played_and_typed_out() {
     }
 }
 
-/// Another program than the browser says what the recording is.
+/// Another program than the browser identifies the recording.
 async fn is_opus(page: &Browser, session: &str, folder: &TempDir, seconds: f64) {
     let fetch = "const { src } = document.querySelector('.voice audio');
         return fetch(src).then((answer) => answer.arrayBuffer()).then((bytes) => Array.from(new Uint8Array(bytes)))";
@@ -272,7 +273,7 @@ async fn a_page_loaded_again_while_the_server_is_dead_still_holds_what_was_said(
     kill(&mut theatre.server);
     theatre.surgeon.sees("#talk-label", "Recording 0:04").await;
     let_go(&theatre.surgeon).await;
-    // The browser ends a recording a moment after the finger has left; a page that goes before then takes the end along.
+    // The browser ends a recording a moment after the finger has left. A page that closes before then loses the end.
     theatre.surgeon.sees("#talk-label", "Hold to talk").await;
     theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
 
@@ -294,7 +295,7 @@ async fn a_reload_while_speaking_keeps_all_but_the_last_moment() {
     let theatre = speaking(&driver, &folder).await;
     let page = &theatre.surgeon;
 
-    // Nothing reaches the server before the reload: it is on the device alone.
+    // Nothing reaches the server before the reload; everything is only on the device.
     page.cut_all().await;
     hold(page).await;
     page.sees("#talk-label", "Recording 0:04").await;
@@ -324,7 +325,7 @@ async fn a_tablet_that_loses_its_power_in_the_middle_of_a_word_has_all_but_the_l
     let mut theatre = speaking(&driver, &folder).await;
     let page = &theatre.surgeon;
 
-    // It has no network either, so that all of it is on the tablet alone.
+    // There is no network either, so that everything is only on the tablet.
     page.cut_all().await;
     key(page, "keyDown", "F13", false).await;
     page.sees("#talk-label", "Recording 0:04").await;
@@ -367,7 +368,7 @@ async fn a_microphone_that_is_refused_or_missing_is_said_in_a_sentence_and_typin
     shoot(page, "surgeon-voice-4-refused").await;
     theatre.say("typed instead", 1).await;
 
-    // A page without encryption has no microphone to ask for.
+    // A page without encryption cannot ask for a microphone.
     page.before_each_page("Object.defineProperty(window, 'isSecureContext', { value: false });").await;
     page.reload().await;
     page.sees("#voice-why", "Voice needs an encrypted connection (https)").await;

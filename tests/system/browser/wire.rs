@@ -1,5 +1,4 @@
-//! Takes a recorded connection apart: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade,
-//! WebSocket messages (RFC 6455).
+//! Parses a recorded connection: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade, WebSocket messages (RFC 6455).
 
 use super::proxy::Connection;
 
@@ -8,7 +7,7 @@ use super::proxy::Connection;
 pub enum Received {
     /// An answer to a request.
     Answer {
-        /// What was asked for.
+        /// Path of the request.
         path: String,
         /// Status line and headers.
         head: String,
@@ -21,7 +20,7 @@ pub enum Received {
     Binary(Vec<u8>),
 }
 
-/// Everything that the browser received on `connection`; what was cut off in the middle is given as far as it came.
+/// Everything that the browser received on `connection`. A part that was cut off is returned as far as it came.
 pub fn take_apart(connection: &Connection) -> Vec<Received> {
     let paths = paths(&connection.asked);
     let mut rest = connection.answered.as_slice();
@@ -45,7 +44,7 @@ pub fn take_apart(connection: &Connection) -> Vec<Received> {
     received
 }
 
-/// Paths of the requests. A body cannot be taken for one: it holds JSON, which has no line that ends in `HTTP/1.1`.
+/// Paths of the requests. A body is never mistaken for a request: it is JSON, without lines that end in `HTTP/1.1`.
 fn paths(asked: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(asked);
     let targets = text.split("\r\n").filter_map(|line| line.strip_suffix(" HTTP/1.1"));
@@ -87,7 +86,7 @@ fn chunks(rest: &[u8]) -> (Vec<u8>, usize) {
     (body, at)
 }
 
-/// The server's messages are neither masked nor, here, split into fragments.
+/// Parses WebSocket messages. The server's are not masked and, here, not split into fragments.
 fn messages(mut rest: &[u8], received: &mut Vec<Received>) {
     while rest.len() >= 2 {
         let opcode = rest[0] & 0x0f;

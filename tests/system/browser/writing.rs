@@ -1,5 +1,4 @@
-//! What a surgeon is writing while the page changes underneath: nothing of it is lost, and no key
-//! of it does something else.
+//! The page changes while a surgeon is writing: nothing of the text is lost, and no key does something else.
 
 use std::time::Duration;
 
@@ -13,7 +12,7 @@ use super::wait::until;
 const REMARKS: &str = "[data-question=remarks] textarea";
 
 impl Theatre {
-    /// The operator ends the session and takes it off the screens.
+    /// The operator ends the session and removes it from the screens.
     pub async fn put_away(&self) {
         self.operator.click("#session-actions .danger").await;
         self.give_reason("Enough").await;
@@ -22,7 +21,7 @@ impl Theatre {
         self.operator.sees("#new-session", "Participant").await;
     }
 
-    /// The questions after a setting are answered on another device.
+    /// Answers the questions after a setting on another device.
     async fn answer_elsewhere(&self, driver: &Driver) {
         let other = driver.browser().await;
         other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
@@ -31,7 +30,7 @@ impl Theatre {
         other.click(".questions .done button").await;
     }
 
-    /// Waits until what `sql` gives, in the database, is `expected`.
+    /// Waits until the result of `sql` in the database is `expected`.
     pub async fn keeps(&self, sql: &'static str, expected: &[&str]) {
         let pool = super::theatre::database(self.server.data.path()).await;
         until(&format!("{sql} to give {expected:?}"), || async {
@@ -42,7 +41,7 @@ impl Theatre {
     }
 }
 
-/// A key as a keyboard sends it; `text` where it writes something.
+/// Presses a key as a keyboard does; `text` is what it writes, if anything.
 async fn press(page: &Browser, key: &str, text: &str, repeat: bool) {
     let code = if key == "Enter" { 13 } else { 0 };
     let down =
@@ -104,7 +103,7 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
     for letter in first.chars() {
         press(surgeon, &letter.to_string(), &letter.to_string(), false).await;
     }
-    // That brings the notice of the next setting.
+    // This brings the notice of the next setting.
     theatre.answer_elsewhere(&driver).await;
     surgeon.sees("#change-title", "Setting 2 of ").await;
     for letter in rest.chars() {
@@ -159,7 +158,7 @@ async fn a_comment_that_comes_back_refused_is_still_about_its_setting() {
     let surgeon = &theatre.surgeon;
     theatre.begin("S-12", "short").await;
     theatre.tap_notice(1).await;
-    // Longer than the server takes, and its refusal on the way until the next setting has begun.
+    // The comment is longer than the server accepts, and its refusal is on the way until the next setting has begun.
     surgeon.hold("/comments").await;
     surgeon.paste("#comment", &"long ".repeat(4000)).await;
     surgeon.click("#send").await;

@@ -1,4 +1,4 @@
-//! Sessions, as their operator and their surgeon conduct them over HTTP.
+//! Conducts sessions over HTTP as operator and surgeon.
 
 use std::time::Duration;
 
@@ -7,35 +7,35 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, client};
 
-/// Whoever conducts sessions on a server, one after another.
+/// Conducts sessions on a server, one after another.
 pub struct Conductor<'a> {
     server: &'a Server,
     client: Client,
-    /// Sessions conducted so far.
+    /// Number of sessions conducted so far.
     pub sessions: usize,
-    /// Comments that the server acknowledged.
+    /// Number of comments that the server acknowledged.
     pub comments: usize,
     keys: u32,
 }
 
-/// How long the surgeon looks at a setting, and how often they say something meanwhile.
+/// How long the surgeon looks at a setting, and how often they comment on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Pace {
     /// Time in each setting.
     pub setting: Duration,
-    /// Comments in each setting, evenly spread.
+    /// Number of comments in each setting, evenly spread.
     pub comments: u32,
 }
 
 impl<'a> Conductor<'a> {
-    /// Conducts sessions on `server`, whose participant it adds.
+    /// Prepares to conduct sessions on `server`; adds their participant.
     pub async fn new(server: &'a Server) -> Self {
         let conductor = Self { server, client: client(), sessions: 0, comments: 0, keys: 0 };
         conductor.post("operator", "participants", json!({"code": "S-07"})).await;
         conductor
     }
 
-    /// Conducts one session from its preparation until it is closed. Every fourth is aborted in its first setting.
+    /// Conducts one session from preparing to closing it. Every fourth is aborted in its first setting.
     pub async fn conduct(&mut self, pace: Pace) {
         let made = json!({"participant": "S-07", "protocol": "long-day"});
         let view = self.post("operator", "sessions", made).await;
@@ -59,7 +59,7 @@ impl<'a> Conductor<'a> {
         self.sessions += 1;
     }
 
-    /// One setting: seen, commented on, paused for a moment, and its questions answered.
+    /// One setting: accept the notice, comment, pause for a moment, and answer the questions.
     async fn inspect(&mut self, session: &Value, pace: Pace) {
         let segment = self.view().await["segment"].clone();
         let act = |action: &str| json!({"session": session, "action": action, "segment": segment});
@@ -82,7 +82,7 @@ impl<'a> Conductor<'a> {
         }
     }
 
-    /// Answers what is asked now.
+    /// Answers the present questions.
     async fn answer(&mut self, session: &Value) {
         let view = self.view().await;
         let segment = if view["phase"] == "questions" { view["segment"].clone() } else { Value::Null };

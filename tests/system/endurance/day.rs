@@ -1,4 +1,4 @@
-//! One long day: sessions, viewers that come and go, and devices that are unplugged, at 50 frames a second.
+//! One long day at 50 frames per second: sessions, viewers that come and go, and devices that are unplugged.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,17 +17,17 @@ use super::sample::{Observer, Sample};
 use super::viewers::come_and_go;
 use crate::support::{Server, command};
 
-/// How long the day is where nobody says otherwise, seconds.
+/// Default length of the day, in seconds.
 const HOUR: u64 = 3600;
-/// Samples in a day: one a minute of an hour.
+/// Number of samples in a day: one per minute for an hour.
 const SAMPLES: u32 = 60;
-/// Pause between two samples where the day is longer.
+/// Longest pause between two samples, for days longer than an hour.
 const MINUTE: Duration = Duration::from_mins(1);
 
-/// What the database may grow by in an hour at 50 frames a second, bytes: docs/operations.md states it.
+/// Limit on the growth of the database in an hour at 50 frames per second, in bytes, as stated in docs/operations.md.
 const DATABASE_PER_HOUR: f64 = 25e6;
 
-/// How long a device may take to be noticed or found again.
+/// Longest time until the loss or return of a device is noticed.
 const PATIENCE: Duration = Duration::from_mins(1);
 
 fn length() -> Duration {
@@ -44,7 +44,7 @@ async fn a_long_day_leaves_memory_descriptors_and_timing_as_they_were() {
     let begun = SystemClock.now();
     let at = || SystemClock.now().since(begun).as_secs_f64();
 
-    // Everybody once, so that what is made at first use is made.
+    // Run everything once, so that everything made at first use exists.
     let (warm, warming) = watch::channel(false);
     let mut conductor = Conductor::new(server).await;
     let pace = Pace { setting: Duration::from_secs(2), comments: 2 };
@@ -109,7 +109,7 @@ async fn a_long_day_leaves_memory_descriptors_and_timing_as_they_were() {
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
 
-/// Looks at the server once a minute, or so often that there are enough samples. Prints each.
+/// Samples the server once a minute, or more often to get enough samples. Prints each sample.
 async fn sample(observer: &mut Observer, at: &impl Fn() -> f64) -> Vec<Sample> {
     let length = length();
     let every = (length / SAMPLES).min(MINUTE);
@@ -136,7 +136,7 @@ async fn sample(observer: &mut Observer, at: &impl Fn() -> f64) -> Vec<Sample> {
     samples
 }
 
-/// Asks how the server is, as monitoring does: how often.
+/// Asks for the server's health, as monitoring does. Returns how often.
 async fn probe(server: &Server, ending: watch::Receiver<bool>) -> usize {
     let mut asked = 0;
     while !*ending.borrow() {
@@ -152,8 +152,8 @@ async fn probe(server: &Server, ending: watch::Receiver<bool>) -> usize {
     asked
 }
 
-/// Until connections that were left are closed and threads that came for a moment have ended: tokio keeps one of these
-/// for 10 seconds, and the server drops a silent connection after as long.
+/// Waits until abandoned connections are closed and short-lived threads have ended: tokio keeps such a thread for 10
+/// seconds, and the server drops a silent connection after as long.
 async fn settle() {
     sleep(Duration::from_secs(15)).await;
 }
@@ -172,7 +172,7 @@ struct Devices {
 }
 
 impl Bench {
-    /// An emulated lens driver, and a camera on the wire where there is one (else the phantom).
+    /// Uses an emulated lens driver, and the fake camera if it is available (else the phantom).
     fn set_up() -> Self {
         let lens = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
         #[cfg(feature = "aravis")]
@@ -199,7 +199,7 @@ impl Bench {
 }
 
 impl Devices {
-    /// Unplugs one device after the other and plugs it in again: how often.
+    /// Unplugs one device after the other and plugs it in again. Returns how often.
     async fn come_and_go(&mut self, server: &Server, ending: watch::Receiver<bool>) -> usize {
         let mut unplugged = 0;
         while !*ending.borrow() {
@@ -225,7 +225,7 @@ impl Devices {
     }
 }
 
-/// Waits until `/healthz` says that `device` works, or does not.
+/// Waits until `/healthz` says that `device` works, or that it does not.
 async fn until(server: &Server, device: &str, works: bool) {
     let told = async {
         loop {

@@ -1,24 +1,24 @@
-//! What counts as growing: the rules that a long run is held to.
+//! Limits on growth for a long run.
 
 use super::sample::Sample;
 
-/// Memory may grow by less than this share after the warm-up.
+/// Limit on the growth of memory after the warm-up, as a fraction.
 const MEMORY: f64 = 0.05;
-/// The loop's 99th percentile may grow up to so many times.
+/// Limit on the growth of the loop's 99th percentile, as a factor.
 const LATENCY: f64 = 2.0;
-/// Below this the 99th percentile is as good as none, microseconds: doubling it matters to nobody.
+/// A 99th percentile below this counts as this, in microseconds: doubling it does not matter to anybody.
 const LATENCY_FLOOR: f64 = 1000.0;
 
-/// The database is read over up to three connections, made as they are needed and closed when they are idle for long.
-/// So many of them may be there after a run that were not there before; each has three files open and a thread.
+/// The database is read over up to three connections, made when needed and closed after a long idle time. So this many
+/// may exist after a run that did not exist before; each has three open files and a thread.
 const READERS: u64 = 2;
 const FILES_OF_A_READER: u64 = 3;
 
-/// The share of the samples that is warm-up: caches fill, every viewer has come once, every policy has run.
+/// Fraction of the samples that is warm-up: caches fill, every viewer has come once, every policy has run.
 const WARM_UP: f64 = 0.25;
 
-/// What has grown that must not, in words; nothing where all is well. `quiet` are samples without any viewer or
-/// session: one before and one after.
+/// Describes everything that has grown and must not; empty if nothing has. `quiet` are samples without any viewer or
+/// session: one from before and one from after.
 pub fn judge(samples: &[Sample], quiet: [Sample; 2]) -> Vec<String> {
     let warm = &samples[(samples.len() as f64 * WARM_UP).ceil() as usize..];
     assert!(warm.len() >= 6, "too few samples to judge by: {}", samples.len());
@@ -78,7 +78,8 @@ mod tests {
         let leak = course(|minute| 400_000 + minute * 1000, |_| 900);
         assert_eq!(judge(&leak, [sample(0, 0); 2]), ["memory grew by 7.1 % after the warm-up"]);
 
-        // After a warm-up of 15 minutes the first third's median is that of minute 22, the last third's of minute 52.
+        // After a warm-up of 15 minutes the median of the first third is at minute 22, that of the last third at minute
+        // 52.
         let slower = course(|_| 400_000, |minute| 1000 + 100 * minute as u32);
         assert_eq!(judge(&slower, [sample(0, 0); 2]), Vec::<String>::new(), "1.94 times");
         let slower = course(|_| 400_000, |minute| 900 + 4 * (minute * minute) as u32);

@@ -1,6 +1,6 @@
-//! A long day and a working week: whether the server stays as it was while sessions, viewers and devices come and go.
+//! A long day and a working week: whether the server stays the same while sessions, viewers and devices come and go.
 //!
-//! These tests take long, so they run only when somebody asks for them: `make endurance`. docs/operations.md says how.
+//! These tests take long, so they run only on request: `make endurance`. See docs/operations.md.
 
 mod course;
 mod day;

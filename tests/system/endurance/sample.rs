@@ -1,4 +1,4 @@
-//! What is measured of a running server, from outside: its memory, descriptors and database, and the loop's latency.
+//! Measures a running server from outside: its memory, descriptors and database, and the loop's latency.
 
 use std::fs;
 
@@ -8,35 +8,35 @@ use sqlx::{ConnectOptions, Connection};
 
 use crate::support::Server;
 
-/// One look at the server.
+/// One measurement of the server.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Seconds since the measurement began.
     pub at: f64,
     /// Memory in use (resident set), KiB.
     pub memory: u64,
-    /// Open file descriptors.
+    /// Number of open file descriptors.
     pub descriptors: u64,
-    /// Threads.
+    /// Number of threads.
     pub threads: u64,
     /// Bytes of the database.
     pub database: u64,
-    /// Steps of the loop since the sample before.
+    /// Number of the loop's steps since the previous sample.
     pub steps: usize,
-    /// 99th percentile of the time from exposure to lens command in those, microseconds.
+    /// 99th percentile of the time from exposure to lens command in those steps, in microseconds.
     pub p99: u32,
 }
 
-/// Looks at a server now and then.
+/// Samples a server.
 pub struct Observer {
     process: u32,
     database: SqliteConnection,
-    /// The last step seen.
+    /// Number of the last step seen.
     last: i64,
 }
 
 impl Observer {
-    /// Looks at `server`, whose steps count from now on.
+    /// Observes `server`; its steps count from now on.
     pub async fn of(server: &Server) -> Self {
         let file = server.data.path().join("parfocal.db");
         let mut database = SqliteConnectOptions::new().filename(file).read_only(true).connect().await.unwrap();
@@ -45,7 +45,7 @@ impl Observer {
         Self { process: server.id(), database, last }
     }
 
-    /// A look at the server, `at` seconds after the beginning.
+    /// Samples the server, `at` seconds after the beginning.
     pub async fn look(&mut self, at: f64) -> Sample {
         let steps: Vec<(i64, u32)> =
             sqlx::query_as("SELECT number, latency_micros FROM telemetry WHERE number > ? ORDER BY number")
@@ -68,26 +68,26 @@ impl Observer {
         }
     }
 
-    /// How many comments are on the disk.
+    /// Number of comments on disk.
     pub async fn comments(&mut self) -> usize {
         let count: i64 =
             sqlx::query_scalar("SELECT count(*) FROM comments").fetch_one(&mut self.database).await.unwrap();
         usize::try_from(count).unwrap()
     }
 
-    /// Ends the look at the database.
+    /// Closes the connection to the database.
     pub async fn close(self) {
         self.database.close().await.unwrap();
     }
 
-    /// The database's size, also as far as it is still in its log.
+    /// Size of the database in bytes, including what is still in its log.
     async fn database_bytes(&mut self) -> u64 {
         let sql = "SELECT page_count * page_size FROM pragma_page_count(), pragma_page_size()";
         let bytes: i64 = sqlx::query_scalar(sql).fetch_one(&mut self.database).await.unwrap();
         bytes.cast_unsigned()
     }
 
-    /// A number of the process's status.
+    /// A number in the process's status file.
     fn status(&self, name: &str) -> u64 {
         let text = fs::read_to_string(format!("/proc/{}/status", self.process)).unwrap();
         let line = text.lines().find_map(|line| line.strip_prefix(name)).unwrap();

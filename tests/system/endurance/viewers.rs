@@ -1,4 +1,4 @@
-//! Viewers that come and go, each in its own way.
+//! Viewers that come and go, of five kinds.
 
 use std::time::Duration;
 
@@ -10,10 +10,11 @@ use tokio::time::{sleep, timeout};
 use crate::http::live::Page;
 use crate::support::Server;
 
-/// Longest that a picture is waited for: while the camera is unplugged none comes.
+/// Longest wait for a picture; none comes while the camera is unplugged.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// One viewer after another, until `end` turns true; each third of them is of another `kind`.
+/// Runs one viewer after another, of alternating kinds, until `end` turns true. `kind` is where the alternation starts.
+/// Returns how many came.
 pub async fn come_and_go(server: &Server, kind: usize, end: watch::Receiver<bool>) -> usize {
     let mut viewers = 0;
     while !*end.borrow() {
@@ -29,7 +30,7 @@ pub async fn come_and_go(server: &Server, kind: usize, end: watch::Receiver<bool
     viewers
 }
 
-/// A page that looks at `frames` pictures on a screen of this width, hides for a moment, looks again and closes.
+/// A page that watches `frames` pictures on a screen of this width, hides for a moment, watches again and closes.
 async fn look(server: &Server, role: &str, width: u32, frames: usize) {
     let mut page = Page::open(server, role).await;
     page.say(json!({"type": "screen", "width": width})).await;
@@ -59,7 +60,7 @@ async fn watch_motion_jpeg(server: &Server) {
     }
 }
 
-/// Connections without a word, and requests without a key.
+/// A connection that stays silent, and requests without a valid key.
 async fn knock_and_leave(server: &Server) {
     let silent = TcpStream::connect(server.address).await.unwrap();
     for path in ["/healthz", "/operator", "/static/none", "/enter?key=wrong"] {

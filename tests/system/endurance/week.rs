@@ -1,5 +1,5 @@
-//! A working week, faster than time: as many sessions as a week has, one after another, while frames come as fast as
-//! the camera makes them.
+//! A working week in fast motion: as many sessions as in a week, one after another, while frames come as fast as the
+//! camera makes them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,12 +13,12 @@ use super::judgement::judge;
 use super::sample::Observer;
 use crate::support::{Server, command};
 
-/// Sessions of a week: eight on each of five days.
+/// Sessions in a week: eight on each of five days.
 const SESSIONS: usize = 40;
-/// Frames a second: ten times those of a theatre.
+/// Frames per second: ten times as many as in a theatre.
 const FPS: &str = "500";
 
-/// A picture with something to focus on, small enough for many frames a second.
+/// A picture with detail to focus on, small enough for many frames per second.
 fn picture(folder: &Path) -> std::path::PathBuf {
     let file = folder.join("footage.png");
     let checked =
@@ -60,7 +60,7 @@ async fn a_working_week_of_sessions_leaves_memory_and_descriptors_as_they_were()
     }
 
     assert_eq!(observer.comments().await, conductor.comments, "every comment that was acknowledged is on the disk");
-    // Between two sessions nobody is there: the first and the last look are at rest.
+    // Between two sessions nobody is there, so these two samples are taken at rest.
     let complaints = judge(&samples, [samples[SESSIONS / 4], samples[SESSIONS - 1]]);
     observer.close().await;
     assert!(complaints.is_empty(), "{complaints:#?}");

@@ -1,4 +1,5 @@
-//! People on a real server: signing in and out, what a study asks of whom, and the surgeon's link to one session.
+//! Accounts on a real server: signing in and out, what a study requires of each role, and the surgeon's link to one
+//! session.
 
 use std::io::{Read, Write};
 use std::process::{Command, Stdio};
@@ -37,7 +38,7 @@ async fn whoever_signs_in_has_the_pages_of_the_role_until_it_is_ended() {
     assert_eq!(wrong.status(), StatusCode::FORBIDDEN);
     assert!(wrong.headers().get(SET_COOKIE).is_none());
     let said: Value = wrong.json().await.unwrap();
-    assert!(said["error"].as_str().unwrap().contains("do not belong together"), "{said}");
+    assert!(said["error"].as_str().unwrap().contains("do not match"), "{said}");
 
     let response = sign_in(&server, "operator", PASSPHRASE).await;
     let header = response.headers()[SET_COOKIE].to_str().unwrap().to_owned();
@@ -50,7 +51,7 @@ async fn whoever_signs_in_has_the_pages_of_the_role_until_it_is_ended() {
                "home": "/operator", "token": null})
     );
 
-    // No link is needed, and no other role comes with it.
+    // No link is needed, and the sign-in gives access to no other role.
     assert_eq!(status(&server, "/operator", &cookie).await, 200);
     assert_eq!(status(&server, "/researcher", &cookie).await, 403);
     assert_eq!(status(&server, "/surgeon", &cookie).await, 403);
@@ -61,7 +62,7 @@ async fn whoever_signs_in_has_the_pages_of_the_role_until_it_is_ended() {
     assert_eq!(out.status(), StatusCode::NO_CONTENT);
     assert_eq!(status(&server, "/operator", &cookie).await, 403);
 
-    // A command ends what a browser is doing, at once.
+    // A command ends a browser's sign-in at once.
     let token = server.sign_in("operator").await;
     let bearer = async || server.get("/operator").bearer_auth(&token).send().await.unwrap().status().as_u16();
     assert_eq!(bearer().await, 200);
@@ -85,8 +86,8 @@ async fn the_command_line_keeps_accounts_and_refuses_what_does_not_fit() {
         (&["add", "lead", "--role", "lead"][..], "there is an account 'lead' already"),
         (&["add", "A b", "--role", "lead"], "lower-case letters"),
         (&["add", "b", "--role", "boss"], "there are: lead, operator, researcher, monitor"),
-        (&["disable", "lead"], "the last account that leads"),
-        (&["role", "lead", "monitor"], "the last account that leads"),
+        (&["disable", "lead"], "the last lead who can sign in"),
+        (&["role", "lead", "monitor"], "the last lead who can sign in"),
         (&["passphrase", "nobody"], "there is no account 'nobody'; there are: lead"),
     ] {
         let (done, said) = on(arguments);
@@ -102,7 +103,7 @@ async fn the_command_line_keeps_accounts_and_refuses_what_does_not_fit() {
     assert!(!said.contains("hash") && !said.contains("salt"), "{said}");
 }
 
-/// What touches a session of a study: path and body, if it changes something.
+/// All requests that concern a session of a study: role, path, and a body if it changes something.
 fn doors(session: &str) -> Vec<(&'static str, String, Option<Value>)> {
     let of = |rest: &str| format!("/api/researcher/sessions/{session}{rest}");
     let reason = json!({"reason": "because"});
@@ -163,7 +164,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
         refusals
     };
 
-    // The links alone: nothing, and each refusal says where to sign in.
+    // The links alone give access to nothing, and each refusal says where to sign in.
     for (role, key) in &links {
         server.use_key(role, key);
     }
@@ -174,7 +175,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
     let page = page.send().await.unwrap().text().await.unwrap();
     assert!(page.contains("href=\"/sign-in?next=/researcher/studies/scope-2026\""), "{page}");
 
-    // A monitor reads what a researcher reads, and changes nothing.
+    // A monitor may read what a researcher may read, and change nothing.
     server.add_account("monitor", "monitor", "Monitor");
     let token = server.sign_in("monitor").await;
     for role in ["operator", "researcher"] {
@@ -185,7 +186,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
         assert_eq!(refused, !reads, "{path}");
     }
 
-    // A researcher does not operate, and neither locks nor unblinds.
+    // A researcher may not operate, lock or unblind.
     server.add_account("researcher", "researcher", "Dr Search");
     let token = server.sign_in("researcher").await;
     server.use_key("researcher", &token);
@@ -197,7 +198,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
         "{said}"
     );
 
-    // An operator acts, and is named.
+    // An operator may act, and the log names their account.
     server.add_account("operator", "operator", "Nurse Op");
     let token = server.sign_in("operator").await;
     server.use_key("operator", &token);
@@ -243,7 +244,7 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
     let session = made["session"].clone();
 
-    // The shared link opens nothing of a study, and a page that was open is closed.
+    // The shared link gives no access to a study, and a page that was open is closed.
     assert_eq!(closed(&mut shared_page).await, CloseCode::from(4403));
     let (status, said) = ask(&server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
     assert!(status == 403 && said.contains("has a link of its own"), "{said}");
@@ -259,7 +260,7 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     let (_, said) = ask(&server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
     assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["session"], session);
 
-    // The session ends: the link lets nobody in any more. The tablet may still say that it has ended.
+    // After the session the link gives no access any more. The tablet may still learn that the session has ended.
     act(&server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
     let stolen = server.get(&format!("/enter?key={link}")).send().await.unwrap();
     assert_eq!(stolen.status(), StatusCode::FORBIDDEN);
@@ -268,7 +269,7 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     assert!(said["error"].as_str().unwrap().contains("for one session, which has ended"), "{said}");
     assert_eq!(self::status(&server, "/api/surgeon/session", &cookie).await, 200);
 
-    // The operator closes it: nothing is open to the tablet any more, but what it still holds is taken.
+    // After the operator has closed the session, the tablet has no access, but the server accepts what it still holds.
     post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
     assert_eq!(closed(&mut page).await, CloseCode::from(4403));
     for path in ["/api/surgeon/session", "/stream.mjpeg", "/api/openapi.json"] {
@@ -295,7 +296,7 @@ async fn closed(page: &mut Page) -> CloseCode {
     }
 }
 
-/// A change of account `name` by the lead, whose passphrase is `passphrase`.
+/// The lead changes account `name`, with the passphrase `passphrase`.
 async fn change(server: &Server, name: &str, mut change: Value, passphrase: &str) -> (u16, Value) {
     change["passphrase"] = json!(passphrase);
     let path = format!("/api/researcher/accounts/{name}/changes");
@@ -311,7 +312,7 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
     let new = json!({"account": "n.op", "display": "Nurse Op", "role": "operator",
                      "first_passphrase": "given by the lead", "passphrase": PASSPHRASE});
 
-    // Every field wrong in turn: a sentence, and no account.
+    // Each field is wrong in turn: the answer is a sentence, and no account is made.
     for (field, wrong, code, expected) in [
         ("account", "Nurse Op", 422, "lower-case letters"),
         ("account", "lead", 409, "there is an account 'lead' already"),
@@ -330,7 +331,7 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
     }
     post(&server, "researcher", accounts, new).await;
 
-    // What the lead set opens nothing until the person has chosen another.
+    // The passphrase that the lead set gives no access until the person has chosen another.
     let given = json!({"name": "n.op", "passphrase": "given by the lead", "as_bearer": true});
     let sign_in_with = async |chosen: Value| {
         let mut body = given.clone();
@@ -353,7 +354,7 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
     assert_eq!((lines[1]["account"].as_str(), lines[1]["set_by_another"].as_bool()), (Some("n.op"), Some(false)));
     assert!(lines[1]["last_signed_in"].is_string(), "{said}");
 
-    // The chain names who made the account, and who chose the passphrase.
+    // The chain records who made the account, and who chose the passphrase.
     let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
     let pool = SqlitePool::connect_with(file).await.unwrap();
     let sql = "SELECT kind, done_by FROM account_events WHERE account = 'n.op' ORDER BY number LIMIT 2";
@@ -390,7 +391,7 @@ async fn a_lead_changes_accounts_and_nobody_else_does() {
     assert_eq!(change(&server, "m", json!({"change": "enable"}), PASSPHRASE).await.1[1]["disabled"], false);
 
     for (name, wanted, passphrase, code, expected) in [
-        ("lead", json!({"change": "disable"}), PASSPHRASE, 409, "the last account that leads"),
+        ("lead", json!({"change": "disable"}), PASSPHRASE, 409, "the last lead who can sign in"),
         ("nobody", json!({"change": "disable"}), PASSPHRASE, 404, "there is no account 'nobody'"),
         ("No Body", json!({"change": "disable"}), PASSPHRASE, 404, "there is no account 'No Body'"),
         ("m", json!({"change": "remove"}), PASSPHRASE, 422, "remove"),
@@ -400,7 +401,7 @@ async fn a_lead_changes_accounts_and_nobody_else_does() {
         assert!(status == code && said["error"].as_str().unwrap().contains(expected), "{name}: {status} {said}");
     }
 
-    // Neither the link nor a researcher's account opens the page or changes anything.
+    // Neither the link nor a researcher's account may open the page or change anything.
     server.add_account("researcher", "researcher", "Dr Search");
     let researcher = server.sign_in("researcher").await;
     for (key, expected) in [(link, "acts under a personal account"), (researcher, "Only a lead may do this")] {
@@ -428,8 +429,8 @@ async fn a_live_view_ends_when_its_account_is_disabled() {
     assert_eq!(closed(&mut page).await, CloseCode::Policy);
 }
 
-/// Runs `parfocal account` with these arguments in a terminal of its own, typing `lines`, each once it is asked for.
-/// What the terminal showed.
+/// Runs `parfocal account` with these arguments in a terminal of its own. Types each of `lines` after its prompt, and
+/// returns what the terminal showed.
 fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> String {
     let program = env!("CARGO_BIN_EXE_parfocal");
     let command = format!("{program} account {arguments} --data-dir {}", server.data.path().display());
@@ -461,7 +462,7 @@ fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> St
 #[test]
 fn a_terminal_shows_nothing_of_a_passphrase() {
     let server = Server::start();
-    let typed = [("passphrase (10", "battery staple"), ("the same again", "battery staple")];
+    let typed = [("passphrase (10", "battery staple"), ("repeat the passphrase", "battery staple")];
     let shown = at_a_terminal(&server, "add lead --role lead", &typed);
     assert!(shown.contains("account lead (lead): lead"), "{shown}");
     assert!(!shown.contains("battery") && !shown.contains("staple"), "{shown}");

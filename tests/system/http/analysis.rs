@@ -1,5 +1,5 @@
-//! A study of three surgeons with known answers, run over HTTP to its unblinding: its analysis on the page, as JSON, on
-//! the command line and as files has the figures that SciPy has (`tests/vectors/analysis.py`).
+//! A study of three surgeons with known answers, run over HTTP up to its unblinding. Its analysis on the page, as JSON,
+//! on the command line and as files has the same figures as SciPy (`tests/vectors/analysis.py`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,7 +19,7 @@ use super::studies::take_session_link;
 use crate::support::{PASSPHRASE, Server, client};
 
 const PROTOCOL: &str = include_str!("analysed.toml");
-/// The study's name.
+/// Name of the study.
 pub const STUDY: &str = "focus-2026";
 const API: &str = "/api/researcher/studies/focus-2026/analysis";
 const PAGE: &str = "/researcher/studies/focus-2026/analysis";
@@ -36,7 +36,7 @@ fn definition() -> String {
     )
 }
 
-/// What the surgeons answer, and what SciPy says of it.
+/// The surgeons' answers, and SciPy's figures for them.
 fn vectors() -> Value {
     let vectors: Value = serde_json::from_str(include_str!("../../vectors/analysis.json")).unwrap();
     vectors["small"].clone()
@@ -45,14 +45,14 @@ fn vectors() -> Value {
 /// A study on a server of its own.
 pub struct Study {
     _protocols: TempDir,
-    /// Keys given so far.
+    /// Number of keys used so far.
     keys: AtomicU64,
-    /// The server.
+    /// The server that runs the study.
     pub server: Server,
 }
 
 impl Study {
-    /// The study, open.
+    /// Plans and opens the study.
     pub async fn open() -> Self {
         let protocols = tempfile::tempdir().unwrap();
         std::fs::write(protocols.path().join("analysed.toml"), PROTOCOL).unwrap();
@@ -108,7 +108,7 @@ impl Study {
         serde_json::from_str(&said).unwrap()
     }
 
-    /// A key that nothing else has.
+    /// A key that no other record has.
     fn key(&self) -> Uuid {
         Uuid::from_u64_pair(0x4000, self.keys.fetch_add(1, Ordering::Relaxed) + 1)
     }
@@ -120,7 +120,7 @@ impl Study {
         self.post("surgeon", "/api/surgeon/answers", body).await;
     }
 
-    /// The policies of a session, in order: nobody is told them, so they are taken from the database.
+    /// The policies of a session, in order. No page shows them, so they are read from the database.
     async fn order(&self, session: &str) -> Vec<String> {
         let file = SqliteConnectOptions::new().filename(self.server.data.path().join("parfocal.db")).read_only(true);
         let pool = SqlitePool::connect_with(file).await.unwrap();
@@ -138,14 +138,14 @@ impl Study {
         made["session"].as_str().unwrap().to_owned()
     }
 
-    /// A session of `surgeon` that is aborted before it starts.
+    /// Makes a session of `surgeon` and aborts it before it starts.
     pub async fn aborted(&self, surgeon: &str) {
         let session = self.prepare(surgeon).await;
         self.act("operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
         self.post("operator", "/api/operator/dismissals", json!({"session": session})).await;
     }
 
-    /// A session of `surgeon`, who answers to each policy as `answers` say.
+    /// Runs a session of `surgeon`, who answers for each policy as in `answers`.
     pub async fn session(&mut self, surgeon: &str, answers: &Value) {
         let session = self.prepare(surgeon).await;
         take_session_link(&mut self.server).await;
@@ -167,7 +167,7 @@ impl Study {
 
             let view = self.view().await;
             self.answer(&view, "sharp", answers[policy][*repeat].clone()).await;
-            // One surgeon leaves out one question.
+            // One surgeon skips one question.
             if !(surgeon == "S-02" && policy == "fixed" && *repeat == 0) {
                 self.answer(&view, "comfort", json!(40 + *repeat)).await;
             }
@@ -176,7 +176,7 @@ impl Study {
             *repeat += 1;
         }
 
-        // The settings of the last policy are the best, those of the first the worst.
+        // The settings of the last policy are ranked best, those of the first worst.
         let policies = ["mlr-hill-climber", "mgm-hill-climber", "fixed"];
         let settings = |policy: &&str| {
             let own = order.iter().zip(1..).filter(|(ran, _)| ran == policy);
@@ -191,7 +191,7 @@ impl Study {
         self.post("operator", "/api/operator/dismissals", json!({"session": session})).await;
     }
 
-    /// The whole study: three sessions that count, and one that was aborted.
+    /// Runs the whole study: three sessions that count, and an aborted one.
     pub async fn run() -> Self {
         let mut study = Self::open().await;
         for (surgeon, answers) in vectors()["answers"].as_object().unwrap() {
@@ -218,7 +218,7 @@ fn assert_near(found: &Value, expected: &Value, what: &str) {
     assert!((found - expected).abs() < 1e-9, "{what}: {found} instead of {expected}");
 }
 
-/// Each number of `expected` against the field of its name in `found`.
+/// Compares each number in `expected` with the field of the same name in `found`.
 fn assert_all(found: &Value, expected: &Value, what: &str) {
     for (name, value) in expected.as_object().unwrap() {
         match value {
@@ -234,7 +234,7 @@ fn rows(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
     reader.deserialize().map(Result::unwrap).collect()
 }
 
-/// Before unblinding: a sentence, and nothing of any policy.
+/// Before unblinding, the answer is a sentence that reveals no policy.
 async fn assert_refused_while_blinded(study: &Study) {
     for path in [API.to_owned(), PAGE.to_owned(), format!("{API}.zip")] {
         let (status, said) = study.get("researcher", &path).await;
@@ -255,7 +255,7 @@ fn outcome<'a>(protocol: &'a Value, name: &str) -> &'a Value {
     outcomes.iter().find(|compared| compared["outcome"] == name).unwrap()
 }
 
-/// The rating that the vectors have figures of.
+/// Compares the rating for which the vectors have figures.
 fn assert_ratings_are_scipys(protocol: &Value) {
     let expected = vectors();
     let sharp = outcome(protocol, "sharp/point");
@@ -273,14 +273,14 @@ fn assert_ratings_are_scipys(protocol: &Value) {
     assert_all(&sharp["repeats"]["agreement"], &expected["agreement"], "agreement");
 }
 
-/// What can be worked out by hand.
+/// Checks the figures that can be computed by hand.
 fn assert_the_rest_is_as_by_hand(protocol: &Value) {
     assert_eq!(protocol["surgeons"], 3);
     let counted = |session: &&Value| session["counts"] == true;
     assert_eq!(protocol["sessions"].as_array().unwrap().iter().filter(counted).count(), 3);
     assert_eq!(protocol["sessions"][3]["remark"], "aborted");
 
-    // One surgeon left out one question; the means of the two others are the same for all policies.
+    // One surgeon skipped one question. The means of the other two are the same for all policies.
     let comfort = outcome(protocol, "comfort/position");
     assert_eq!((&comfort["complete"], &comfort["left_out"]), (&json!(2), &json!(1)));
     let fixed = &comfort["policies"][0];
@@ -294,7 +294,7 @@ fn assert_the_rest_is_as_by_hand(protocol: &Value) {
     // 3+3+2+4+3+2+1+3+3+3 = 27; 27 * 2.5 (Brooke 1996).
     assert_eq!(protocol["whole_sessions"][0]["mean"], 67.5);
 
-    // The phantom knows its optimum; a policy that never moves has no turns.
+    // The phantom knows its optimum. A policy that never moves has no turns.
     let turns = &outcome(protocol, "turns")["policies"];
     assert_eq!((&turns[0]["policy"], &turns[0]["mean"], &turns[0]["n"]), (&json!("fixed"), &json!(0.0), &json!(6)));
     assert!(turns[1]["mean"].as_f64().unwrap() > 0.0);
@@ -311,7 +311,7 @@ fn assert_page_tells(html: &str, protocol: &Value) {
     assert_eq!(html.matches("<svg").count(), protocol["outcomes"].as_array().unwrap().len());
 }
 
-/// The folder that the command writes.
+/// Checks the folder that the command writes.
 fn assert_folder_tells(folder: &Path, analysis: &Value) {
     let sharp = outcome(&analysis["protocols"][0], "sharp/point");
     let row = rows(folder, "analysis_tests.csv").into_iter().find(|row| row["outcome"] == "sharp/point").unwrap();
@@ -332,7 +332,7 @@ fn assert_folder_tells(folder: &Path, analysis: &Value) {
     assert!(sums.unwrap().status.success());
 }
 
-/// How often somebody looked at the analysis.
+/// Number of recorded looks at the analysis.
 async fn looks(data: &Path) -> i64 {
     let file = SqliteConnectOptions::new().filename(data.join("parfocal.db")).read_only(true);
     let pool = SqlitePool::connect_with(file).await.unwrap();
@@ -388,6 +388,6 @@ async fn a_studys_analysis_has_scipys_figures_on_the_page_on_the_command_line_an
     std::io::Read::read_to_string(&mut zip.by_name(name).unwrap(), &mut packed).unwrap();
     assert_eq!(packed, std::fs::read_to_string(folder.join("analysis_tests.csv")).unwrap());
 
-    // JSON, page and ZIP file were a look each; what was refused was none, and the command only reads.
+    // JSON, page and ZIP file count as a look each. Refused requests do not, and the command only reads.
     assert_eq!(looks(data).await, 3);
 }

@@ -1,4 +1,4 @@
-//! Blinding: a whole session as the surgeon's browser gets it, every byte of it read.
+//! Blinding: reads every byte that the surgeon's browser gets in a whole session.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 use super::live::{Heard, Page};
 use crate::support::{Server, client};
 
-/// What would tell a policy, or how one works.
+/// Words that would reveal a policy, or how one works.
 const TELLING: [&str; 10] =
     ["polic", "fixed", "climber", "learned", "mgm", "mlr", "cnn", "metric", "asked", "measured"];
 
-/// A session in the hands of its operator and its surgeon.
+/// A session, driven by its operator and its surgeon.
 struct Session<'a> {
     server: &'a Server,
-    /// All that was sent to the surgeon's browser, but pictures.
+    /// Everything that was sent to the surgeon's browser, except pictures.
     heard: Vec<String>,
     segments: Vec<String>,
     keys: u32,
@@ -46,7 +46,7 @@ impl Session<'_> {
         view
     }
 
-    /// A key no other request has.
+    /// A key that no other request has.
     fn key(&mut self) -> String {
         self.keys += 1;
         format!("00000000-0000-4000-8000-{:012}", self.keys)
@@ -65,7 +65,7 @@ impl Session<'_> {
         self.segments.push(segment);
     }
 
-    /// Answers what is asked, if anything is.
+    /// Answers the present questions, if any.
     async fn answer(&mut self) {
         let view = self.view().await;
         let segment = if view["phase"] == "questions" { view["segment"].clone() } else { Value::Null };
@@ -126,14 +126,14 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
         }
     }
 
-    // With and without a content area: nothing else varies.
+    // With and without a content area; nothing else may vary.
     assert!(forms.len() <= 2, "{forms:?}");
     assert!(session.heard.len() > 60);
 
     for heard in &session.heard {
         let heard = heard.to_lowercase();
         for telling in TELLING {
-            // The name of a header that every response has.
+            // Every response has headers with these names.
             let heard = heard.replace("content-security-policy", "").replace("referrer-policy", "");
             let heard = heard.replace("cross-origin-resource-policy", "").replace("permissions-policy", "");
             assert!(!heard.contains(telling), "'{telling}' in {heard}");
@@ -147,7 +147,7 @@ async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart
     let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "operator").await;
 
-    // Before a session the operator is told all of it.
+    // Before a session the operator sees everything.
     session.operator("/api/operator/focus", json!({"policy": "parfocal"})).await;
     page.until_belief().await;
     session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;

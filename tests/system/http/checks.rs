@@ -1,4 +1,4 @@
-//! What the operator is told of whether everything is ready for a trial.
+//! The operator's report on whether everything is ready for a trial.
 
 use serde_json::{Value, json};
 

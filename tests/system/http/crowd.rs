@@ -1,4 +1,4 @@
-//! Connections that somebody opens and leaves idle: whoever has a key still gets in, and stays in.
+//! Connections that somebody opens and leaves idle: anyone with a key still gets in, and stays in.
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use tokio::net::{TcpSocket, TcpStream};
 use super::live::Page;
 use crate::support::{Server, command};
 
-/// More than the server has files for, and so than it could ever keep open.
+/// More connections than the server may have open files.
 const FLOOD: usize = 600;
 
-/// A server that may have fewer files open than there are connections in the flood.
+/// A server whose limit on open files is below the number of connections in the flood.
 fn server() -> Server {
     let data = Arc::new(tempfile::tempdir().unwrap());
     let serve = command(data.path(), &["--bind", "0.0.0.0:0", "--insecure", "--fps", "5"]);
@@ -25,7 +25,7 @@ fn server() -> Server {
     Server::run(data, limited)
 }
 
-/// The test holds the other end of each connection.
+/// Raises this process's limit on open files, because it holds the other end of each connection.
 fn allow_as_many_files_as_possible() {
     let limit = getrlimit(Resource::Nofile);
     setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, maximum: limit.maximum }).unwrap();
@@ -44,7 +44,7 @@ fn client_at(host: IpAddr) -> Client {
     client.timeout(Duration::from_secs(20)).build().unwrap()
 }
 
-/// Whether the server has closed `connection`; it sends nothing to who says nothing.
+/// Whether the server has closed `connection`. It sends nothing to a silent client.
 async fn is_closed(connection: &mut TcpStream) -> bool {
     tokio::time::timeout(Duration::from_millis(1), connection.read(&mut [0])).await.is_ok()
 }
@@ -61,7 +61,7 @@ async fn an_idle_flood_from_one_host_shuts_nobody_with_a_key_out() {
     for _ in 0..FLOOD {
         flood.push(connect(server.address, flooder).await);
     }
-    // From another host, and from the flooder's own.
+    // From another host, and from the host of the flood.
     for host in ["127.0.0.2", "127.0.0.1"] {
         let tablet = client_at(host.parse().unwrap());
         let request = tablet.get(server.url("/surgeon")).bearer_auth(server.key("surgeon"));

@@ -1,5 +1,5 @@
-//! The chain of records of a real server: whole after it is killed while it writes, shown on the pages, and longer by
-//! everyone who looks.
+//! The chain of records of a real server: complete after the server is killed while it writes, shown on the pages, and
+//! extended by everyone who looks.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +13,7 @@ use sqlx::{ConnectOptions, Connection};
 
 use crate::support::{Server, client};
 
-/// What `parfocal` says to `arguments`, and whether it succeeded.
+/// Runs `parfocal` with `arguments` and `path`. Returns whether it succeeded, and its output.
 fn parfocal(arguments: &[&str], path: &Path) -> (bool, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).arg(path).output().unwrap();
     let said = [output.stdout, output.stderr].concat();
@@ -29,7 +29,7 @@ async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
     serde_json::from_str(&said).unwrap_or_default()
 }
 
-/// A session under way; its id.
+/// Makes a session. Returns its id.
 async fn a_session(server: &Server) -> String {
     post(server, "operator", "/api/operator/participants", json!({"code": "S-05"})).await;
     let new = json!({"participant": "S-05", "protocol": "paper"});
@@ -132,7 +132,7 @@ async fn the_head_stands_on_the_pages_and_grows_with_everyone_who_looks() {
     assert_eq!(server.get("/enter?key=wrong").send().await.unwrap().status(), 403);
     assert_eq!(number().await, entered + 1);
 
-    // A backup beside the running server proves the head that stood on the page.
+    // A backup made beside the running server proves the head that the page showed.
     let folder = tempfile::tempdir().unwrap();
     let backup = folder.path().join("backup.db");
     let out = backup.to_str().unwrap();

@@ -1,5 +1,5 @@
-//! Disks that fail for real: full and read-only, at the start and in mid-session. Nothing is
-//! acknowledged that is not kept.
+//! Disks that really fail: full or read-only, at the start or during a session. Nothing is acknowledged that is not
+//! stored.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -19,7 +19,7 @@ async fn ask(server: &Server, role: &str, path: &str, body: Value) -> (StatusCod
     (response.status(), response.text().await.unwrap())
 }
 
-/// A session under way: its id.
+/// Makes a session. Returns its id.
 async fn begin(server: &Server) -> String {
     ask(server, "operator", "/api/operator/participants", json!({"code": "S-05"})).await;
     let session = json!({"participant": "S-05", "protocol": "practice"});
@@ -45,7 +45,7 @@ async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
     let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "there is room")).await;
     assert_eq!(status, StatusCode::NO_CONTENT);
     disk.fill();
-    // Some room may be left within the files: say things until none is.
+    // There may be space left within the files: send comments until it is used up.
     let mut number = 1;
     let told = loop {
         number += 1;
@@ -74,7 +74,7 @@ fn a_disk_without_room_is_named_at_the_start() {
     let (code, said) = refused(&disk.folder.path().join("data"), &LISTEN);
     assert_eq!(code, Some(1));
     assert!(said.contains("disk is full; make room") && said.lines().count() == 1, "{said}");
-    // Room for the folder and its lock, and for hardly more.
+    // Space for the folder and its lock, and hardly more.
     disk.empty();
     let room = std::fs::File::create(disk.folder.path().join("room")).unwrap();
     rustix::fs::fallocate(&room, rustix::fs::FallocateFlags::empty(), 0, 48 * 1024).unwrap();
@@ -115,7 +115,7 @@ async fn a_user_who_may_not_write_is_told_so_at_the_start_and_loses_nothing_in_m
         allow(&data.path().join(file), 0o444);
     }
     allow(data.path(), 0o555);
-    // The files are open: what the server acknowledges from here on is in them.
+    // The files are already open, so what the server acknowledges from here on is in them.
     let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "still kept")).await;
     assert_eq!(status, StatusCode::NO_CONTENT);
     drop(server);

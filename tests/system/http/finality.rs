@@ -1,4 +1,4 @@
-//! What was answered becomes final: by programs that talk to the real server, as the pages do.
+//! Answers become final: tested with plain requests to the real server, as the pages send them.
 
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ async fn unblinding_asks_first_and_nothing_that_comes_after_it_counts() {
 
     post(&server, "surgeon", "answers", &answer(1, 6)).await;
     post(&server, "operator", "actions", &json!({"session": session, "action": "abort", "reason": "over"})).await;
-    // The tablet still held this one: it counts.
+    // The tablet still held this answer, so it counts.
     post(&server, "surgeon", "answers", &answer(2, 5)).await;
 
     let unblind = format!("sessions/{}/unblind", session.as_str().unwrap());
@@ -57,7 +57,7 @@ async fn unblinding_asks_first_and_nothing_that_comes_after_it_counts() {
     let known = json!({"reason": "analysis", "despite_outstanding": true});
     post(&server, "researcher", &unblind, &known).await;
 
-    // Kept, and acknowledged as kept; but now nothing counts any more.
+    // It is stored and acknowledged, but nothing counts any more.
     post(&server, "surgeon", "answers", &answer(3, 1)).await;
     let session = format!("sessions/{}", session.as_str().unwrap());
     let (_, detail) = ask(&server, "researcher", Method::GET, &session, &Value::Null).await;

@@ -1,4 +1,4 @@
-//! How the server says that it is: well, or what is wrong, in words for people and codes for programs.
+//! How the server reports its health: that it is well, or what is wrong, in words for people and codes for programs.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::browser::wait::until;
 use crate::support::Server;
 use crate::support::disk::SmallDisk;
 
-/// Status code, `status`, and the codes of what is wrong.
+/// Status code, `status`, and the codes of the problems.
 async fn health(server: &Server) -> (StatusCode, Value, Vec<String>) {
     let response = server.get("/healthz").send().await.unwrap();
     let code = response.status();
@@ -56,7 +56,7 @@ async fn a_locked_database_is_told_while_it_is_locked() {
     let mut other = file.connect().await.unwrap();
     sqlx::query("BEGIN IMMEDIATE").execute(&mut other).await.unwrap();
 
-    // SQLite gives up after 5 seconds. Until then nothing is known, and yet the question is answered.
+    // SQLite gives up after 5 seconds. Until then the state is unknown, and the server answers anyway.
     assert_eq!(health(&server).await.0, StatusCode::OK);
     becomes(&server, StatusCode::OK, "degraded", &["database-troubled"]).await;
     sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();

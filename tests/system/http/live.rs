@@ -1,5 +1,4 @@
-//! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace
-//! of the policy.
+//! The live stream: paced by its viewers, silent for hidden pages, and without a trace of the policy for surgeons.
 
 use std::net::SocketAddr;
 
@@ -15,32 +14,32 @@ use tungstenite::Message;
 
 use crate::support::Server;
 
-/// A page's end of the stream.
+/// The client end of a page's stream.
 pub struct Page {
     socket: WebSocketStream<MaybeTlsStream<TcpStream>>,
-    /// All that came so far, without the pictures themselves.
+    /// Everything received so far, without the pictures themselves.
     pub heard: Vec<Heard>,
 }
 
-/// What a page hears.
+/// Something that a page received.
 #[derive(Debug)]
 pub enum Heard {
-    /// State, as it came.
+    /// A state message, as it was sent.
     Text(String),
-    /// What came with a picture.
+    /// The header of a picture.
     Frame(Value),
 }
 
-/// A frame as a page gets it.
+/// A frame as a page receives it.
 pub struct Frame {
-    /// What came with the picture.
+    /// The header of the picture.
     pub header: Value,
-    /// The picture.
+    /// The picture as JPEG.
     pub jpeg: Vec<u8>,
 }
 
 impl Frame {
-    /// Its number.
+    /// Number of the frame.
     pub fn number(&self) -> u64 {
         self.header["frame"].as_u64().unwrap()
     }
@@ -57,7 +56,7 @@ impl Page {
         Self::through(server.address, server, role).await
     }
 
-    /// The same, through whatever listens on `address`.
+    /// The same, through the program that listens on `address`.
     pub async fn through(address: SocketAddr, server: &Server, role: &str) -> Self {
         let mut request = upgrade(server, &format!("/live?role={role}"), role);
         *request.uri_mut() = format!("ws://{address}/live?role={role}").parse().unwrap();
@@ -69,7 +68,7 @@ impl Page {
         self.socket.send(Message::text(message.to_string())).await.unwrap();
     }
 
-    /// The next message other than a ping, waiting for it.
+    /// Waits for the next message other than a ping.
     pub async fn message(&mut self) -> Message {
         let message = self.socket.next().await.unwrap().unwrap();
         match &message {
@@ -80,7 +79,7 @@ impl Page {
         message
     }
 
-    /// The next frame, waiting for it.
+    /// Waits for the next frame.
     pub async fn frame(&mut self) -> Frame {
         loop {
             if let Message::Binary(frame) = self.message().await {
@@ -89,7 +88,7 @@ impl Page {
         }
     }
 
-    /// State messages so far.
+    /// The state messages so far.
     fn told(&self) -> Vec<Value> {
         let texts = self.heard.iter().filter_map(|heard| match heard {
             Heard::Text(text) => Some(serde_json::from_str(text).unwrap()),
@@ -98,7 +97,7 @@ impl Page {
         texts.collect()
     }
 
-    /// Waits for a state message that is `wanted`, drawing the frames that come meanwhile.
+    /// Waits for a state message that is `wanted`, acknowledging the frames that come in between.
     pub async fn until(&mut self, wanted: impl Fn(&Value) -> bool) {
         loop {
             match self.message().await {
@@ -109,7 +108,7 @@ impl Page {
         }
     }
 
-    /// Waits for a frame that comes with a belief, and gives it.
+    /// Waits for a frame with a belief, and returns the belief.
     pub async fn until_belief(&mut self) -> Vec<Value> {
         loop {
             let frame = self.frame().await;
@@ -120,12 +119,12 @@ impl Page {
         }
     }
 
-    /// Tells that `frame` is drawn.
+    /// Acknowledges that `frame` is drawn.
     pub async fn drawn(&mut self, frame: &Frame) {
         self.say(json!({"type": "drawn", "frame": frame.number()})).await;
     }
 
-    /// Frames that the server has sent by the time that it answers this.
+    /// Number of frames that the server sends before it answers this ping.
     pub async fn sent_so_far(&mut self) -> usize {
         self.socket.send(Message::Ping("so far".into())).await.unwrap();
         let mut frames = 0;
@@ -138,7 +137,7 @@ impl Page {
         }
     }
 
-    /// Draws frames until one fits, and gives that one.
+    /// Acknowledges frames until one fits, and returns that one.
     pub async fn watch_until(&mut self, fits: impl Fn(&Value) -> bool) -> Frame {
         loop {
             let frame = self.frame().await;
@@ -149,7 +148,7 @@ impl Page {
         }
     }
 
-    /// Draws `count` frames.
+    /// Waits for and acknowledges `count` frames.
     pub async fn watch(&mut self, count: usize) {
         for _ in 0..count {
             let frame = self.frame().await;
@@ -166,7 +165,7 @@ pub fn upgrade(server: &Server, path: &str, role: &str) -> Request {
     request
 }
 
-/// Header length (u16, little-endian), header, JPEG.
+/// Parses a frame message: header length (u16, little-endian), header, JPEG.
 fn unpack(message: &[u8]) -> Frame {
     let length = usize::from(u16::from_le_bytes([message[0], message[1]]));
     let header = serde_json::from_slice(&message[2..2 + length]).unwrap();
@@ -248,7 +247,7 @@ async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
     let mut surgeon = Page::open(&server, "surgeon").await;
     let mut operator = Page::open(&server, "operator").await;
     let belief = operator.until_belief().await;
-    // The belief tracker's slices of focal power, as a probability.
+    // The belief tracker's probability of each slice of focal power.
     assert_eq!(belief.len(), 41);
     assert!((belief.iter().map(|slice| slice.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-3, "{belief:?}");
     surgeon.watch(5).await;
@@ -308,7 +307,7 @@ async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
     let mut complete = 0;
     while complete < 3 {
         stream.extend_from_slice(&response.chunk().await.unwrap().expect("no end"));
-        // The headers of a part not yet begun are here: the part before is complete without a byte of the next.
+        // The headers of the next part are here, so the previous part is complete without a byte of the next picture.
         complete += usize::from(stream.ends_with(PART) && stream.len() > PART.len());
     }
 

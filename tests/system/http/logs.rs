@@ -1,4 +1,4 @@
-//! The server's log: what was said, who said it and how they got in never stand in it.
+//! The server's log never contains what was said, who said it, or how they got in.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ async fn nothing_personal_and_no_key_stands_in_the_log() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("log");
     let mut serve = command(data.path(), &["--bind", "127.0.0.1:0", "--fps", "10"]);
-    // Our own lines at their most talkative, and every request.
+    // The most detailed level for our own lines, and every request.
     serve.env("RUST_LOG", "info,parfocal=debug,tower_http=debug").stderr(File::create(&log).unwrap());
     let mut server = Server::run(data, serve);
 
@@ -51,7 +51,7 @@ async fn nothing_personal_and_no_key_stands_in_the_log() {
     post(&server, "surgeon", "comments", comment).await;
     let reason = "the patient Zacharias coughed";
     post(&server, "operator", "actions", json!({"session": session, "action": "abort", "reason": reason})).await;
-    // Refused, with the words in the body.
+    // A refused request with the words in its body.
     let unknown = json!({"session": key, "action": "abort", "reason": reason});
     let request = client().post(server.url("/api/operator/actions")).bearer_auth(server.key("operator"));
     assert_eq!(request.json(&unknown).send().await.unwrap().status(), StatusCode::NOT_FOUND);

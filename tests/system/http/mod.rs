@@ -1,4 +1,4 @@
-//! The server over HTTP: who may do what, what every response carries, and how it starts and ends.
+//! The server over HTTP: who may do what, the contents of every response, and how the server starts and ends.
 
 mod accounts;
 pub mod analysis;

@@ -1,4 +1,4 @@
-//! Recordings played to the researcher: when, to whom, at which times, and what is said where one is broken.
+//! Playing recordings to the researcher: when, to whom, with which times, and the message if a recording is broken.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ use sqlx::{AssertSqlSafe, ConnectOptions, Connection};
 use super::recordings::{abort, begin, recordings, start, until};
 use crate::support::Server;
 
-/// A session by `protocol` that was recorded and has ended: its id.
+/// A recorded session by `protocol` that has ended. Returns its id.
 async fn recorded(server: &Server, protocol: &str) -> String {
     let session = begin(server, protocol).await;
     until(server, |status| status["frames"].as_u64() >= Some(30)).await;
@@ -49,7 +49,7 @@ async fn unblind(server: &Server, session: &str) {
     assert_eq!(answer.status(), StatusCode::NO_CONTENT, "{}", answer.text().await.unwrap());
 }
 
-/// What the one row of `sql` holds, in the server's database.
+/// The number in the only row that `sql` selects from the server's database.
 async fn number(server: &Server, sql: &str) -> i64 {
     let file = server.data.path().join("parfocal.db");
     let mut database = SqliteConnectOptions::new().filename(file).read_only(true).connect().await.unwrap();
@@ -62,7 +62,7 @@ fn frame(name: &str, number: usize, size: &str) -> String {
     format!("recordings/{name}/frames/{number}?size={size}")
 }
 
-/// Mean absolute difference of a JPEG picture from what the developer makes of frame `number` of `recording`.
+/// Mean absolute difference between a JPEG picture and the developed frame `number` of `recording`.
 fn difference(jpeg: &[u8], recording: &Recording, number: usize, size: Size) -> f64 {
     let calibration = calibration::read(&recording.calibration()).unwrap();
     let mut picture = RgbImage::default();
@@ -98,7 +98,7 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
     assert_eq!((&played["name"], &played["kind"]), (&session.clone().into(), &"mosaic".into()));
     assert_eq!(played.as_object().unwrap().len(), 4, "pictures and times, and nothing else: {played}");
 
-    // Against the telemetry of the same frame, which was written by another part of the server.
+    // Compare with the telemetry of the same frame, which another part of the server wrote.
     let recording = Recording::open(&recordings(&server).join(&session)).unwrap();
     let rows = recording.rows();
     let times: Vec<i64> = rows.iter().map(|row| (row.time - rows[0].time) / 1_000_000).collect();
@@ -117,7 +117,7 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
     let viewed = "SELECT count(*) FROM accesses WHERE kind = 'recording-viewed' AND role = 'researcher'";
     assert_eq!(number(&server, viewed).await, 1, "the look at it is recorded");
 
-    // A withdrawal ends it, also for whoever is playing it.
+    // A withdrawal ends access, even if the recording is being played.
     let withdraw = format!("/api/researcher/sessions/{session}/withdraw");
     let withdraw = server.post_as("researcher", &withdraw).json(&json!({"reason": "wants no part in it"}));
     assert_eq!(withdraw.send().await.unwrap().status(), StatusCode::NO_CONTENT);
@@ -149,7 +149,7 @@ async fn a_recording_that_is_broken_or_gone_is_told_and_costs_the_timeline_nothi
     let folder = recordings(&server).join(&session);
     let frames = Recording::open(&folder).unwrap().rows().len();
 
-    // No way out of the session's own recordings.
+    // No request can leave the session's own recordings.
     std::fs::create_dir(recordings(&server).join("other")).unwrap();
     for name in ["other", "..", "%2e%2e", "..%2Frecordings%2Fother", ""] {
         assert_eq!(refusal(&server, &session, &frame(name, 0, "cell")).await.0, StatusCode::NOT_FOUND, "{name}");
@@ -186,7 +186,7 @@ async fn a_session_that_asks_for_no_recording_has_nothing_to_play() {
     assert_eq!(found, json!({"recordings": [], "problems": []}));
 }
 
-/// The rows of `recordings.csv` of an export of `session`, which must pass `parfocal verify`.
+/// Exports `session`, checks the export with `parfocal verify`, and returns the rows of its `recordings.csv`.
 fn exported(server: &Server, session: &str, out: &Path) -> Vec<BTreeMap<String, String>> {
     let parfocal = || Command::new(env!("CARGO_BIN_EXE_parfocal"));
     let data = server.data.path();
@@ -221,7 +221,7 @@ async fn an_export_names_the_recordings_and_a_broken_one_keeps_nobody_from_expor
     let rows = exported(&server, &session, &out.path().join("broken"));
     assert!(rows[0]["problem"].contains("does not describe a recording") && rows[0]["frames"].is_empty(), "{rows:?}");
 
-    // A change of what was exported is noticed.
+    // A change to the export is noticed.
     let table = out.path().join("blinded/recordings.csv");
     let text = std::fs::read_to_string(&table).unwrap();
     std::fs::write(&table, text.replace(",stopped,", ",lost,")).unwrap();

@@ -1,4 +1,4 @@
-//! The data folder: no other account of the machine can read what is in it.
+//! The data folder: no other account of the machine can read its contents.
 
 use std::fs::{Permissions, metadata, read_dir, set_permissions};
 use std::os::unix::fs::PermissionsExt;
@@ -39,7 +39,7 @@ fn the_data_folder_is_its_owners_alone_and_an_older_one_becomes_so() {
 
     let mut server = start();
     assert_private(&folder);
-    // Killed: the files that it shares with others stay behind, too.
+    // After a kill the files that processes share stay behind, too.
     assert!(!server.end(Signal::KILL));
 
     for path in all_of(&folder) {

@@ -1,5 +1,4 @@
-//! Real-time priority: had where the system allows it, never beyond its bounds, and asked for in
-//! words where it is not had.
+//! Real-time priority: used if the system allows it, never beyond its limits; otherwise the page says how to allow it.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -15,12 +14,12 @@ use crate::support::{Server, client, command};
 const OTHER: u32 = 0;
 const FIFO: u32 = 1;
 
-/// Whether this user may have real-time priority here, as `chrt` finds.
+/// Whether this user may use real-time priority here, according to `chrt`.
 fn allowed() -> bool {
     Command::new("chrt").args(["--fifo", "30", "true"]).stderr(Stdio::null()).status().unwrap().success()
 }
 
-/// A server with a policy in charge of an emulated lens; `refused`, where the system grants it nothing.
+/// A server with a policy that drives an emulated lens. With `refused`, the system gives it no rights.
 async fn server(refused: bool) -> Server {
     let data = Arc::new(tempfile::tempdir().unwrap());
     let usual = command(data.path(), &["--bind", "127.0.0.1:0", "--lens", "emulated"]);
@@ -32,7 +31,7 @@ async fn server(refused: bool) -> Server {
     server
 }
 
-/// The command `usual` without the rights that real-time priority takes, whoever runs the test.
+/// The command `usual` without the rights that real-time priority needs, also if root runs the test.
 fn without_rights(usual: &Command) -> Command {
     let mut command = Command::new("prlimit");
     command.args(["--rtprio=0:0", "--memlock=65536:65536"]);
@@ -43,7 +42,7 @@ fn without_rights(usual: &Command) -> Command {
     command
 }
 
-/// Scheduling policy and real-time priority of each thread of that name.
+/// Scheduling policy and real-time priority of each thread called `name`.
 fn threads(server: &Server, name: &str) -> Vec<(u32, u32)> {
     let tasks = fs::read_dir(format!("/proc/{}/task", server.id())).unwrap().flatten();
     tasks
@@ -58,7 +57,7 @@ fn threads(server: &Server, name: &str) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Looks again and again until `condition` holds. Fails after ten seconds.
+/// Checks repeatedly until `condition` holds. Fails after ten seconds.
 async fn until(what: &str, condition: impl Fn() -> bool) {
     let waited = tokio::time::timeout(Duration::from_secs(10), async {
         while !condition() {
@@ -75,14 +74,14 @@ async fn metric(server: &Server, name: &str) -> f64 {
     line.trim().parse().unwrap()
 }
 
-/// Waits until the operator's page is told of the loop's priority in these `words`.
+/// Waits until the operator's page gets a message with these `words` about the loop's priority.
 async fn page_tells(server: &Server, words: &str) {
     let mut page = Page::open(server, "operator").await;
     let told = page.until(|told| told["priority"]["message"].as_str().is_some_and(|message| message.contains(words)));
     tokio::time::timeout(Duration::from_secs(10), told).await.expect("the words");
 }
 
-/// A line of a file in the server's folder of `/proc`.
+/// The line that starts with `line`, of a file in the server's folder of `/proc`.
 fn told(server: &Server, file: &str, line: &str) -> String {
     let text = fs::read_to_string(format!("/proc/{}/{file}", server.id())).unwrap();
     text.lines().find(|told| told.starts_with(line)).unwrap().to_owned()
@@ -94,7 +93,7 @@ async fn where_it_is_allowed_the_way_from_camera_to_lens_is_at_real_time_priorit
         return println!("skipped: real-time priority is not allowed here");
     }
     let server = server(false).await;
-    // A thread that has just been started goes by the name of the one that started it.
+    // A thread that has just started has the name of the thread that started it.
     until("the loop has its priority", || threads(&server, "control") == [(FIFO, 20)]).await;
     until("the lens has its priority", || threads(&server, "lens") == [(FIFO, 30)]).await;
     until("the loop waits for the policy first of all", || threads(&server, "policy") == [(FIFO, 10)]).await;
@@ -113,7 +112,7 @@ async fn a_thread_that_keeps_a_processor_costs_the_priority_and_not_the_machine(
         return println!("skipped: real-time priority is not allowed here");
     }
     let server = server(false).await;
-    // What the kernel sends then.
+    // The kernel sends this signal in that case.
     rustix::process::kill_process(server.pid(), Signal::XCPU).unwrap();
     let ordinary =
         || ["control", "lens", "policy"].iter().all(|name| threads(&server, name).iter().all(|t| t.0 == OTHER));

@@ -1,4 +1,4 @@
-//! Recordings made by the server: by the operator's button, and because a protocol asks for them.
+//! Recordings by the server: started with the operator's button, or because a protocol requests them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
     post(server, PATH, json!({ "record": record })).await
 }
 
-/// Asks how recording stands until it stands as `wanted`.
+/// Polls the state of recording until it is `wanted`. Fails after a minute.
 pub async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
     let limit = SystemClock.now() + Duration::from_mins(1);
     loop {
@@ -45,7 +45,7 @@ pub async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
     }
 }
 
-/// A session under way by `protocol`: its id.
+/// Makes and starts a session by `protocol`. Returns its id.
 pub async fn begin(server: &Server, protocol: &str) -> String {
     post(server, "/api/operator/participants", json!({"code": "S-05"})).await;
     let (_, made) = post(server, "/api/operator/sessions", json!({"participant": "S-05", "protocol": protocol})).await;
@@ -72,7 +72,7 @@ async fn the_operator_records_and_reads_before_how_long_the_disk_lasts() {
     let rate = before["bytes_per_second"].as_f64().unwrap();
     let room = before["free_bytes"].as_f64().unwrap() - before["reserve_bytes"].as_f64().unwrap();
     assert!((before["seconds_left"].as_f64().unwrap() / (room / rate) - 1.0).abs() < 0.01, "{before}");
-    // Ten frames a second of 2048 x 1088 samples, between a tenth and all of packed 10 bit.
+    // Ten frames per second of 2048 x 1088 samples, at more than a twentieth and less than all of packed 10 bit.
     let packed = 10.0 * 2048.0 * 1088.0 * 1.25;
     assert!((0.05 * packed..packed).contains(&rate), "{rate}");
 
@@ -111,7 +111,7 @@ async fn a_protocol_records_mosaics_from_a_sessions_start_to_its_end() {
     assert_eq!((&running["recording"], &running["by_protocol"]), (&"mosaic".into(), &true.into()));
     assert_eq!(running["folder"], session.as_str());
 
-    // What surgeons get says nothing of it.
+    // The surgeon's view does not mention it.
     let view = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().text().await.unwrap();
     assert!(!view.contains("record\"") && !view.contains("mosaic"), "{view}");
 
@@ -143,7 +143,7 @@ async fn a_protocol_keeps_the_view_as_it_was_sent() {
         let (number, time, offset, length, width, height): (u64, u64, usize, usize, u32, u32) = line.unwrap();
         assert!((number, time) > last && offset == end, "{number} {time} {offset}");
         let picture = image::load_from_memory(&pictures[offset..offset + length]).unwrap();
-        // Nobody looks: the size that every frame is made at.
+        // Nobody watches, so it has the size at which every frame is made.
         assert_eq!((picture.width(), picture.height()), (512, 272));
         assert_eq!((width, height), (512, 272));
         last = (number, time);
@@ -155,7 +155,7 @@ async fn a_protocol_keeps_the_view_as_it_was_sent() {
     assert_eq!((&header["session"], &header["ended"]["why"]), (&session.into(), &"stopped".into()));
 }
 
-/// Draws frames on `page` until the recording of the view in `folder` holds pictures that are `wanted`.
+/// Acknowledges frames on `page` until the recording of the view in `folder` has a picture that is `wanted`.
 async fn until_viewed(page: &mut Page, folder: &Path, wanted: impl Fn(&ViewRow) -> bool) -> ViewRow {
     let limit = SystemClock.now() + Duration::from_mins(1);
     loop {
@@ -179,7 +179,7 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     let kept = until_viewed(&mut surgeon, &folder, |row| row.width == Some(1024)).await;
     assert_eq!(kept.height, Some(544));
 
-    // Nobody else changes the size: the operator's screen is larger.
+    // Nobody else changes the recorded size, although the operator's screen is larger.
     let mut operator = Page::open(&server, "operator").await;
     operator.say(json!({"type": "screen", "width": 4000})).await;
     let full = operator.watch_until(|header| header["per_cell"] == 4).await;
@@ -200,8 +200,8 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     assert!(view.rows().windows(2).all(|pair| pair[0].number < pair[1].number), "every frame once");
     assert!(view.rows().iter().all(|row| row.width < Some(2048)), "never the operator's size");
 
-    // What the surgeon's page got of a frame is what is kept of it. While the size changes, which on a busy machine it
-    // does by itself too, two frames may have been kept at the size before or after.
+    // The recording keeps what the surgeon's page got of a frame. While the size changes, which can also happen by
+    // itself on a busy machine, two frames may be kept at the size before or after.
     let width = |value: &Value| value.as_u64().and_then(|width| u32::try_from(width).ok());
     let sent = surgeon.heard.iter().filter_map(|heard| match heard {
         Heard::Frame(header) => Some((header["frame"].as_u64()?, width(&header["width"]))),
@@ -247,7 +247,7 @@ async fn the_operator_may_stop_what_a_protocol_records_and_the_session_goes_on_w
     assert_eq!((status, &said["recording"]), (StatusCode::OK, &Value::Null));
     assert_eq!(said["notice_warns"], false, "it ended as it was meant to: {said}");
 
-    // Looked at every second: by then a recording that were to begin anew would have.
+    // Recording is checked every second: by now a recording that starts again would have started.
     let view: Value = server.get_as("operator", "/api/operator/session").send().await.unwrap().json().await.unwrap();
     assert_eq!((&view["phase"], &view["session"]), (&"notice".into(), &session.clone().into()));
     let acknowledge = json!({"session": session, "action": "acknowledge", "segment": view["segment"]});
@@ -265,7 +265,7 @@ async fn the_operator_may_stop_what_a_protocol_records_and_the_session_goes_on_w
 
 #[tokio::test]
 async fn near_the_disks_end_recording_stops_by_itself_and_the_trial_goes_on() {
-    // Large enough that what recording leaves, a twentieth, holds all that the database writes meanwhile.
+    // Large enough that the twentieth that recording leaves free holds everything that the database writes until then.
     let Some(disk) = SmallDisk::of_megabytes(100) else { return };
     let server = start(Arc::clone(&disk.folder));
     let session = begin(&server, "recorded").await;

@@ -1,10 +1,11 @@
-//! Corrections, consents, withdrawals and erasures over HTTP: who may, what is refused, and in which words.
+//! Corrections, consents, withdrawals and erasures over HTTP: who may make them, and what is refused with which
+//! message.
 
 use serde_json::{Value, json};
 
 use crate::support::Server;
 
-/// Posts `body` as `role`; the status, and what is said where it is refused.
+/// Posts `body` as `role`. Returns the status, and the error message if it is refused.
 async fn post(server: &Server, role: &str, path: &str, body: &Value) -> (u16, String) {
     let answer = server.post_as(role, path).json(body).send().await.unwrap();
     let status = answer.status().as_u16();
@@ -13,10 +14,10 @@ async fn post(server: &Server, role: &str, path: &str, body: &Value) -> (u16, St
     (status, said["error"].as_str().unwrap_or_default().to_owned())
 }
 
-/// What the second comment of the session says.
+/// Text of the session's second comment.
 const OTHER: &str = "the edge of the liver is sharp";
 
-/// A session that was aborted after two comments; its id and the first one's key.
+/// A session that was aborted after two comments. Returns its id and the first comment's key.
 async fn a_session(server: &Server) -> (String, &'static str) {
     const KEY: &str = "00000000-0000-4000-8000-000000000001";
     post(server, "operator", "/api/operator/participants", &json!({"code": "S-05"})).await;
@@ -77,7 +78,7 @@ async fn records_are_put_right_by_the_researcher_alone() {
         assert!(!said.text().await.unwrap().contains(OTHER), "{rest}");
     }
 
-    // Its words can be erased all at once, by the researcher alone.
+    // Only the researcher can erase all its words at once.
     let all = format!("{base}/erasures/all");
     let reason = json!({"reason": "the participant asks for it"});
     assert_eq!(post(&server, "operator", &all, &reason).await.0, 403);

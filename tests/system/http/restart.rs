@@ -1,4 +1,4 @@
-//! What a server that is killed in mid-setting takes up again.
+//! What a server resumes after it was killed during a setting.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use sqlx::{ConnectOptions, Connection};
 use super::live::Page;
 use crate::support::{Server, client};
 
-/// A step of the loop in the telemetry: run, policy, focal power asked of the lens.
+/// A step of the loop in the telemetry: run, policy, requested focal power.
 type Step = (i64, Option<String>, f64);
 
 struct Stage {
@@ -55,7 +55,7 @@ impl Stage {
         steps
     }
 
-    /// Waits until `count` steps of run `run` in `setting` are on the disk that are `wanted`.
+    /// Waits until `count` steps of run `run` in `setting` that are `wanted` are on disk.
     async fn until(&self, setting: i64, run: i64, count: usize, wanted: impl Fn(&Step) -> bool) -> Vec<Step> {
         let mut page = Page::open(&self.server, "surgeon").await;
         loop {
@@ -82,7 +82,7 @@ async fn a_setting_goes_on_at_the_focal_power_that_was_last_commanded_in_it() {
         stage.act("surgeon", "acknowledge").await;
         stage.until(setting, run, 10, |(_, policy, _)| policy.is_some()).await;
         stage.server.end(Signal::KILL);
-        // Once more, before anyone lets it go on: the lens must not be taken to have been sent where it happens to be.
+        // Kill it again before anyone resumes: the lens's position at restart must not count as commanded.
         for _ in 0..2 {
             run += 1;
             stage.server = Stage::start(Arc::clone(&stage.server.data));

@@ -1,4 +1,4 @@
-//! Roles: each opens its own and no other, links turn into cookies, other sites get nothing.
+//! Roles: each gives access to its own pages and no others, links become cookies, other sites get nothing.
 
 use reqwest::header::{COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
@@ -10,7 +10,7 @@ use crate::support::{Server, client};
 
 const ROLES: [&str; 3] = ["surgeon", "operator", "researcher"];
 
-/// What anyone may ask for.
+/// Paths that are open to everyone.
 const OPEN: [&str; 10] = [
     "/healthz",
     "/enter",
@@ -33,7 +33,7 @@ async fn enter(server: &Server, key: &str) -> Response {
     server.get(&format!("/enter?key={key}")).send().await.unwrap()
 }
 
-/// The cookie of `role`.
+/// The cookie of `role`, obtained by its link.
 async fn cookie(server: &Server, role: &str) -> String {
     let response = enter(server, server.key(role)).await;
     sent_back(&response)
@@ -61,7 +61,7 @@ async fn endpoints(server: &Server) -> Vec<(String, Method, String)> {
 }
 
 async fn ask(server: &Server, path: &str, method: Method, cookie: &str) -> StatusCode {
-    // Any name will do: who may not ask is told so before it is looked for.
+    // Any name will do, because access is checked before the name is looked up.
     let path = path.split('/').map(|part| if part.starts_with('{') { "nothing" } else { part }).collect::<Vec<_>>();
     let request = client().request(method, server.url(&path.join("/"))).header(COOKIE, cookie);
     request.send().await.unwrap().status()
@@ -69,8 +69,8 @@ async fn ask(server: &Server, path: &str, method: Method, cookie: &str) -> Statu
 
 #[tokio::test]
 async fn nothing_but_the_door_is_open_without_a_key() {
-    // On a loopback address too: what comes from there may have been handed on by a proxy, in whose default settings it
-    // is sent to 127.0.0.1 by that name, and without a word of where it comes from.
+    // On a loopback address too: a request from there may come through a proxy, which by default sends it to 127.0.0.1
+    // under that name, without saying where it comes from.
     for server in [open_server(), Server::start()] {
         let endpoints = endpoints(&server).await;
         assert!(endpoints.len() > 8, "{endpoints:?}");
@@ -94,7 +94,7 @@ async fn who_comes_without_a_key_is_told_where_to_find_one() {
         ("/surgeon", "the surgeon's link: the operator has it"),
     ] {
         let page = server.get(path).header("accept", "text/html").send().await.unwrap().text().await.unwrap();
-        // The page's text has entities in the place of apostrophes.
+        // The page's text has entities instead of apostrophes.
         let page = page.replace("&#39;", "'");
         assert!(page.contains(page_words) && !page.contains("Bearer"), "{path}: {page}");
         let answer: Value = server.get(path).send().await.unwrap().json().await.unwrap();
@@ -111,7 +111,7 @@ async fn each_role_opens_its_own_endpoints_and_no_others() {
         let cookie = cookie(&server, role).await;
         for (path, method, tag) in endpoints.iter().filter(|(.., tag)| ROLES.contains(&tag.as_str())) {
             let status = ask(&server, path, method.clone(), &cookie).await;
-            // One study and its analysis are shown only to somebody who is signed in.
+            // A single study and its analysis are shown only to a person who is signed in.
             let opens = tag == role && !(method == Method::GET && path.contains("/studies/{study}"));
             assert_eq!(status != StatusCode::FORBIDDEN, opens, "{role}: {method} {path} gave {status}");
         }
@@ -190,7 +190,7 @@ async fn other_sites_change_nothing_and_hear_nothing() {
     assert_eq!(post("origin", "http://evil.example".into()).await, StatusCode::FORBIDDEN);
     assert_eq!(post("origin", "null".into()).await, StatusCode::FORBIDDEN);
     assert_eq!(post("sec-fetch-site", "cross-site".into()).await, StatusCode::FORBIDDEN);
-    // Let through to the route, which takes no POST.
+    // These reach the route, which does not accept POST.
     assert_eq!(post("origin", ours.clone()).await, StatusCode::METHOD_NOT_ALLOWED);
     assert_eq!(post("sec-fetch-site", "same-origin".into()).await, StatusCode::METHOD_NOT_ALLOWED);
 

@@ -1,4 +1,4 @@
-//! `--seed`: what can be foreseen by whoever knows it, and what cannot.
+//! `--seed`: what can be predicted by someone who knows it, and what cannot.
 
 use serde_json::{Value, json};
 use sqlx::sqlite::SqliteConnectOptions;
@@ -6,7 +6,7 @@ use sqlx::{ConnectOptions, Connection};
 
 use crate::support::{Server, client};
 
-/// What can be known of a session beforehand, if anything: its id, what its order is drawn from, and its settings.
+/// The values of a session that might be predictable: its id, the seed of its order, and its settings.
 #[derive(Debug, PartialEq)]
 struct Drawn {
     session: String,
@@ -20,7 +20,7 @@ async fn post(server: &Server, what: &str, body: Value) -> Value {
     answer.json().await.unwrap()
 }
 
-/// What a fresh server with seed 1 draws for its first session, by `protocol`.
+/// The values that a fresh server with seed 1 draws for its first session, by `protocol`.
 async fn first_of(protocol: &str) -> Drawn {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--seed", "1"]);
     post(&server, "participants", json!({"code": "S-05"})).await;

@@ -1,5 +1,5 @@
-//! The service: how it starts and ends, what every response carries, files, errors, the description
-//! of the interface.
+//! The service: how it starts and ends, the contents of every response, files, errors, and the description of the
+//! interface.
 
 use std::net::TcpListener;
 
@@ -45,7 +45,7 @@ fn what_cannot_be_served_is_refused_in_a_sentence() {
     assert_eq!(code, Some(1));
     assert!(said.contains("this machine does not have the address"), "{said}");
 
-    // Nothing listens, and nothing is made, before this is decided.
+    // This is decided before the server listens or makes anything.
     let (code, said) = refused(data.path(), &["--bind", "0.0.0.0:0"]);
     assert_eq!(code, Some(1));
     assert!(said.contains("not be encrypted") && said.contains("--tls") && said.contains("--insecure"), "{said}");
@@ -186,7 +186,7 @@ async fn what_the_layers_answer_and_what_the_server_refuses_is_described() {
     assert_eq!(document["components"]["securitySchemes"]["operator"]["name"], "parfocal-operator");
     assert!(document["paths"]["/healthz"]["get"]["responses"]["403"].is_null());
 
-    // Each limit stands where the schema that it limits is.
+    // Each limit is in the schema that it limits.
     let schemas = &document["components"]["schemas"];
     assert_eq!(schemas["Focus"]["oneOf"][0]["properties"]["focal_power"]["type"], "number");
     assert_eq!(schemas["Focus"]["oneOf"][0]["properties"]["focal_power"]["maximum"], 1);
@@ -210,7 +210,7 @@ async fn a_whole_number_may_be_written_with_a_point() {
         request.body(comment).send().await.unwrap().status()
     };
 
-    // There is no such session: that far it is read.
+    // There is no such session, but the request was parsed that far.
     assert_eq!(send("7.0").await, StatusCode::NOT_FOUND);
     assert_eq!(send("7.5").await, StatusCode::UNPROCESSABLE_ENTITY);
 }
@@ -249,7 +249,7 @@ async fn a_camera_without_settings_offers_none() {
     assert!(answer.text().await.unwrap().contains("does not offer this setting"));
 }
 
-/// The pages' types are made from this file by `make web-types`, which sets `PARFOCAL_WRITE_DESCRIPTION`.
+/// The pages' types are generated from this file by `make web-types`, which sets `PARFOCAL_WRITE_DESCRIPTION`.
 #[tokio::test]
 async fn the_pages_are_checked_against_the_present_description() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/web/types/openapi.json");

@@ -1,5 +1,5 @@
-//! Each viewer gets pictures of the size that its screen and link can use; a size is made only while someone
-//! looks at it.
+//! Each viewer gets pictures of the size that its screen and link can use. A size is made only while someone watches
+//! it.
 
 #[path = "../../../benches/stream/link.rs"]
 mod link;
@@ -11,12 +11,12 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use super::live::Page;
 use crate::support::Server;
 
-/// Few frames: the camera shares the machine with other tests.
+/// Few frames, because the camera shares the machine with other tests.
 fn server() -> Server {
     Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
 }
 
-/// The counter or gauge `name` of pictures of `size`.
+/// The value of the counter or gauge `name` for pictures of size `size`.
 async fn count(server: &Server, name: &str, size: &str) -> u64 {
     let text = server.get_as("operator", "/metrics").send().await.unwrap().text().await.unwrap();
     let start = format!("parfocal_{name}{{size=\"{size}\"}} ");
@@ -40,7 +40,7 @@ async fn a_size_is_made_only_while_someone_looks_at_it() {
     page.watch_until(|header| header["per_cell"] == 1).await;
     assert_eq!(count(&server, "viewers", "full").await, 0);
 
-    // One is in the making, for as long as the machine takes; then no more are made.
+    // One picture is being made, however long the machine takes. Then no more are made.
     let mut made = u64::MAX;
     let mut looks = 0;
     while count(&server, "frames_encoded_total", "full").await != made {

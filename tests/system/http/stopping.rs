@@ -1,6 +1,5 @@
-//! Stopping waits for no disk: with a full disk, or while another program holds the database's
-//! lock, whoever stops the session stops the lens. What happened is recorded, in order, once the
-//! disk takes it.
+//! Stopping waits for no disk: even with a full disk, or while another program holds the database's lock, stopping the
+//! session stops the lens. The events are recorded, in order, when the disk accepts them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,7 +16,7 @@ use super::live::Page;
 use crate::support::disk::SmallDisk;
 use crate::support::{Server, client};
 
-/// What keeps the server from writing.
+/// Something that keeps the server from writing.
 enum Trouble {
     /// Another program holds the database's lock.
     Lock(SqliteConnection),
@@ -38,7 +37,7 @@ impl Trouble {
             }
             Self::Full(disk) => {
                 disk.fill();
-                // Some room may be left within the files: say things until none is.
+                // There may be space left within the files: send comments until it is used up.
                 while stage.comment(&"no room ".repeat(1000)).await != StatusCode::INSUFFICIENT_STORAGE {}
             }
         }
@@ -53,7 +52,7 @@ impl Trouble {
         }
     }
 
-    /// What the operator reads of it.
+    /// The operator's message about it.
     const fn words(&self) -> &'static str {
         match self {
             Self::Lock(_) => "another program has locked the database",
@@ -62,7 +61,7 @@ impl Trouble {
     }
 }
 
-/// A session under way on a server whose lens can be watched.
+/// A session under way on a server whose lens is observed.
 struct Stage {
     server: Server,
     emulator: Emulator,
@@ -115,7 +114,7 @@ impl Stage {
         self.ask("surgeon", "comments", &comment).await.0
     }
 
-    /// The surgeon taps the notice, and the policy drives the lens.
+    /// The surgeon taps the notice; waits until the policy drives the lens.
     async fn inspect(&mut self) {
         self.act("surgeon", json!({"action": "acknowledge"})).await;
         let before = self.commanded().len();
@@ -124,14 +123,14 @@ impl Stage {
         }
     }
 
-    /// Where the lens was sent so far, without what only repeats.
+    /// The positions commanded so far, without repetitions.
     fn commanded(&self) -> Vec<i16> {
         let mut commanded: Vec<i16> = self.emulator.commands().into_iter().map(|(_, command)| command).collect();
         commanded.dedup();
         commanded
     }
 
-    /// The policy, which never stands still, drives no more.
+    /// Checks that the policy, which never stands still, no longer drives the lens.
     async fn rests(&mut self) {
         self.page.until(|told| told["type"] == "status" && told["held"] == "paused").await;
         self.page.watch(3).await;
@@ -140,7 +139,7 @@ impl Stage {
         assert_eq!(self.commanded(), before, "the lens is driven on");
     }
 
-    /// The operator is told why it is not recorded, and then that it is.
+    /// Waits until the operator sees why it is not recorded; then ends the trouble and waits until it is recorded.
     async fn recorded_after(&mut self, trouble: &mut Trouble) {
         let words = trouble.words();
         let told = |view: &Value| view["unrecorded_because"].as_str().is_some_and(|why| why.contains(words));
@@ -176,7 +175,7 @@ fn start(data: Arc<tempfile::TempDir>, emulator: &Emulator) -> Server {
     Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "20", "--lens", &lens, "--protocols", protocols])
 }
 
-/// Every way to stop, each while nothing can be written.
+/// Stops in every possible way, each while nothing can be written.
 async fn every_way_to_stop(mut stage: Stage, mut trouble: Trouble) {
     let stopped = |view: &Value| assert_eq!(view["unrecorded"], true, "{view}");
 
@@ -214,7 +213,7 @@ async fn every_way_to_stop(mut stage: Stage, mut trouble: Trouble) {
     stopped(&view);
     assert_eq!(view["phase"], "aborted");
     stage.rests().await;
-    // The operator closes the session and takes the lens in hand.
+    // The operator closes the session and moves the lens by hand.
     stage.post("operator", "dismissals", json!({"session": stage.session})).await;
     let before = stage.commanded();
     stage.post("operator", "focus", json!({"focal_power": 0.9})).await;

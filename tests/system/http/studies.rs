@@ -1,4 +1,4 @@
-//! Studies on a real server: over HTTP, by the command line, and what operator and surgeon are sent meanwhile.
+//! Studies on a real server: over HTTP, by the command line, and what operator and surgeon receive during a session.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,7 +16,7 @@ use crate::support::{PASSPHRASE, Server, client};
 
 const PROTOCOL: &str = include_str!("pair.toml");
 
-/// A definition of a study of that protocol at one site, for two surgeons.
+/// A definition of a study with that protocol at one site, for two surgeons.
 pub fn definition() -> String {
     let sha256 = hex::encode(Sha256::digest(PROTOCOL));
     format!(
@@ -29,26 +29,26 @@ pub fn definition() -> String {
     )
 }
 
-/// A folder with the protocol.
+/// A folder that contains the protocol.
 pub fn protocols() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
     folder
 }
 
-/// That folder, and a server on another that reads it.
+/// That folder, and a server that reads it and has a data folder of its own.
 pub fn server() -> (TempDir, Server) {
     let protocols = protocols();
     let server = on(Arc::new(tempfile::tempdir().unwrap()), protocols.path());
     (protocols, server)
 }
 
-/// A server on a data folder that another may have used before.
+/// A server on a data folder that another server may have used before.
 pub fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
     Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", protocols.to_str().unwrap()])
 }
 
-/// All that came back, headers included, and the status.
+/// Sends a request. Returns the status and the body.
 pub async fn ask(server: &Server, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
     let request = client().request(method, server.url(path)).bearer_auth(server.key(role)).json(body);
     let response = request.send().await.unwrap();
@@ -67,7 +67,7 @@ pub async fn refused(server: &Server, role: &str, path: &str, body: Value) -> (u
     (status.as_u16(), said)
 }
 
-/// Makes the account of a lead, who then acts as operator and researcher.
+/// Makes a lead's account; requests as operator and researcher use its token from then on.
 pub async fn sign_in_as_lead(server: &mut Server) {
     server.add_account("lead", "lead", "Dr Lead");
     let token = server.sign_in("lead").await;
@@ -75,7 +75,7 @@ pub async fn sign_in_as_lead(server: &mut Server) {
     server.use_key("researcher", &token);
 }
 
-/// The tablet opens the link to the session of a study under way.
+/// The tablet opens the link to the session under way, which belongs to a study.
 pub async fn take_session_link(server: &mut Server) {
     let (_, said) = ask(server, "operator", Method::GET, "/api/operator/surgeon-link", &Value::Null).await;
     let link: Value = serde_json::from_str(&said).unwrap();
@@ -83,7 +83,7 @@ pub async fn take_session_link(server: &mut Server) {
     server.use_key("surgeon", key);
 }
 
-/// Plans the study and opens it.
+/// Plans and opens the study.
 pub async fn open(server: &Server) -> Value {
     let plan = json!({"definition": definition(), "reason": "ethics approved it"});
     post(server, "researcher", "/api/researcher/studies", plan).await;
@@ -100,7 +100,7 @@ pub async fn act(server: &Server, role: &str, action: Value) {
     post(server, role, &format!("/api/{role}/actions"), action).await;
 }
 
-/// The session under way as the surgeon sees it.
+/// The session under way as the surgeon sees it; also adds the answer to `heard`.
 async fn view(server: &Server, heard: &mut Vec<String>) -> Value {
     let (_, said) = ask(server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
     let view = serde_json::from_str(&said).unwrap();
@@ -108,7 +108,7 @@ async fn view(server: &Server, heard: &mut Vec<String>) -> Value {
     view
 }
 
-/// What of the orders stands in the database: seeds and policies in the order in which they run.
+/// The secrets of the orders in the database: seeds, and policies in the order in which they run.
 async fn secrets(server: &Server) -> Vec<String> {
     let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
     let pool = SqlitePool::connect_with(file).await.unwrap();
@@ -217,7 +217,7 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     let (_, page) = ask(&server, "researcher", Method::GET, "/researcher/studies/scope-2026", &Value::Null).await;
     assert!(page.contains(&line), "the line stands on the page");
 
-    // The operator is offered it while it is open, and a session of it is one more row in its page.
+    // The operator can choose the study while it is open.
     let choices = async || {
         let (_, said) = ask(&server, "operator", Method::GET, "/api/operator/choices", &Value::Null).await;
         serde_json::from_str::<Value>(&said).unwrap()["studies"].clone()
@@ -253,7 +253,7 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     assert_eq!(detail["unblinding"]["policies"].as_array().unwrap().len(), 2);
 }
 
-/// What `parfocal study` says to `arguments` on `data`, and whether it succeeded.
+/// Runs `parfocal study` with `arguments` on `data`. Returns whether it succeeded, and its output.
 fn study(arguments: &[&str], data: &Path) -> (bool, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     let output = command.arg("study").args(arguments).arg("--data-dir").arg(data).output().unwrap();
@@ -298,7 +298,7 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     let (done, said) = study(&["open", "another", "--by", "x", "--reason", "y"], data.path());
     assert!(!done && said.contains("there is no study 'another'; there are: scope-2026"), "{said}");
 
-    // A session of it on a server that no longer has the protocol: the study kept its own.
+    // A session of the study on a server that no longer has the protocol: the study kept its own copy.
     let none = tempfile::tempdir().unwrap();
     let mut server = on(Arc::clone(&data), none.path());
     let token = server.sign_in("lead").await;

@@ -1,4 +1,4 @@
-//! A whole study exported by the server: started, followed, downloaded, verified; and what is left of it.
+//! The server exports a whole study: start, progress, download, verification; and what files remain.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -24,7 +24,7 @@ async fn state(server: &Server) -> Value {
     serde_json::from_str(&said).unwrap()
 }
 
-/// How the export stands once it is no longer being made.
+/// Waits until the export is no longer being made. Returns its state.
 async fn ended(server: &Server) -> Value {
     loop {
         let state = state(server).await;
@@ -36,7 +36,7 @@ async fn ended(server: &Server) -> Value {
     }
 }
 
-/// A session of `participant` in the study, aborted and off the screens.
+/// Makes, aborts and closes a session of `participant` in the study.
 async fn a_session(server: &Server, participant: &str) {
     post(server, "operator", "/api/operator/participants", json!({"code": participant})).await;
     let made = post(server, "operator", "/api/operator/sessions", new_session(participant)).await;
@@ -45,7 +45,7 @@ async fn a_session(server: &Server, participant: &str) {
     post(server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
 }
 
-/// The exports of sessions that the chain has, each with the account that asked for it.
+/// The session exports in the chain, each with the account that requested it.
 async fn recorded(data: &Path) -> Vec<(String, String)> {
     let file = SqliteConnectOptions::new().filename(data.join("parfocal.db")).read_only(true);
     let pool = SqlitePool::connect_with(file).await.unwrap();
@@ -83,14 +83,14 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     assert!(status == StatusCode::NOT_FOUND && said.contains("Start one on the study's page"), "{said}");
     assert_eq!(state(&server).await, json!({"state": "none"}));
 
-    // What cannot be written fails with a reason, is not recorded, and leaves the way free for another try.
+    // If it cannot be written, it fails with a reason, is not recorded, and can be tried again.
     std::fs::write(&exports, "").unwrap();
     assert_eq!(post(&server, "researcher", EXPORT, json!({})).await["state"], "running");
     let failed = ended(&server).await;
     assert!(failed["state"] == "failed" && failed["reason"].as_str().unwrap().contains("study-exports"), "{failed}");
     std::fs::remove_file(&exports).unwrap();
 
-    // A monitor reads everything, exports included.
+    // A monitor may read everything, including exports.
     server.add_account("monitor", "monitor", "Ms Monitor");
     let token = server.sign_in("monitor").await;
     server.use_key("researcher", &token);
@@ -110,7 +110,7 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(&package).output().unwrap();
     assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
 
-    // Only the finished package is kept, and not beyond the server.
+    // Only the finished package is kept, and only as long as the server runs.
     assert_eq!(in_folder(&exports), 1);
     let room = std::fs::read_dir(&exports).unwrap().next().unwrap().unwrap().path();
     assert_eq!(in_folder(&room), 1);

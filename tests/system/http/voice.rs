@@ -1,5 +1,5 @@
-//! Voice over HTTP: pieces are taken from a surgeon's tablet alone and played to the researcher alone, in parts as a
-//! browser asks for them; only pages that need the microphone or play sound may.
+//! Voice over HTTP: pieces are accepted only from a surgeon's tablet and played only to the researcher, in the byte
+//! ranges that a browser requests. Only pages that need it may use the microphone or play sound.
 
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ async fn post(server: &Server, role: &str, path: &str, body: &Value) -> Value {
     serde_json::from_str(&said).unwrap_or_default()
 }
 
-/// A session by `protocol`, which was made and has not started; its id.
+/// Makes a session by `protocol`, which is not started. Returns its id.
 async fn a_session(server: &Server, participant: &str, protocol: &str) -> String {
     post(server, "operator", "/api/operator/participants", &json!({"code": participant})).await;
     let new = json!({"participant": participant, "protocol": protocol});
@@ -29,7 +29,7 @@ async fn a_session(server: &Server, participant: &str, protocol: &str) -> String
     made["session"].as_str().unwrap().to_owned()
 }
 
-/// Sends a piece; the status, and what is said where it is refused.
+/// Sends a piece. Returns the status, and the error message if it is refused.
 async fn send(server: &Server, role: &str, query: &str, media_type: &str, audio: Vec<u8>) -> (u16, String) {
     let path = format!("/api/surgeon/voice/{COMMENT}/{query}");
     let answer = server.post_as(role, &path).header("content-type", media_type).body(audio).send().await.unwrap();
@@ -58,7 +58,7 @@ async fn a_recording_comes_in_pieces_from_a_tablet_and_is_played_in_parts_to_the
         assert_eq!(send(&server, role, &first, OPUS, Vec::new()).await.0, 403, "{role}");
     }
     let other = send(&server, "surgeon", &first, OPUS, b"other".to_vec()).await;
-    assert!(other.0 == 409 && other.1.contains("key already stands for something else"), "{other:?}");
+    assert!(other.0 == 409 && other.1.contains("key is already used for something else"), "{other:?}");
     let wrong = send(&server, "surgeon", &format!("3?session={session}&through_ms=1500"), "image/png", vec![1]).await;
     assert!(wrong.0 == 422 && wrong.1.contains("not 'image/png'"), "{wrong:?}");
     let large = format!("3?session={session}&through_ms=1500");

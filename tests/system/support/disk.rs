@@ -1,5 +1,4 @@
-//! Disks that can be filled, and users who may not write: for tests that run as root, which others
-//! skip.
+//! Disks that can be filled, and users who may not write. They need root; without it the tests are skipped.
 
 use std::io::Write;
 use std::path::Path;
@@ -8,19 +7,19 @@ use std::sync::Arc;
 
 use tempfile::TempDir;
 
-/// A small disk in memory; gone when dropped.
+/// A small disk in memory; unmounted when dropped.
 pub struct SmallDisk {
-    /// Where it is mounted.
+    /// Folder where it is mounted.
     pub folder: Arc<TempDir>,
 }
 
 impl SmallDisk {
-    /// A disk of 4 megabytes, or (said on standard error) none where this user may not mount one.
+    /// A disk of 4 megabytes. `None`, with a message on standard error, if this user may not mount one.
     pub fn mount() -> Option<Self> {
         Self::of_megabytes(4)
     }
 
-    /// The same of `size` megabytes.
+    /// The same with `size` megabytes.
     pub fn of_megabytes(size: u32) -> Option<Self> {
         let folder = Arc::new(tempfile::tempdir().unwrap());
         let options = format!("size={size}m,mode=777");
@@ -34,25 +33,25 @@ impl SmallDisk {
         }
     }
 
-    /// Leaves no byte of room.
+    /// Uses up all space.
     pub fn fill(&self) {
         let mut filler = std::fs::File::create(self.filler()).unwrap();
         while filler.write_all(&[0; 4096]).is_ok() {}
     }
 
-    /// Leaves this many bytes of room, or a few thousand less.
+    /// Leaves this many bytes of space, or a few thousand less.
     pub fn fill_but(&self, bytes: u64) {
         let disk = rustix::fs::statvfs(self.folder.path()).unwrap();
         let filling = (disk.f_bavail * disk.f_frsize).checked_sub(bytes).expect("there is as much room");
         std::fs::write(self.filler(), vec![0; filling as usize]).unwrap();
     }
 
-    /// Makes room again.
+    /// Frees the space again.
     pub fn empty(&self) {
         std::fs::remove_file(self.filler()).unwrap();
     }
 
-    /// Lets nobody, root included, write to it.
+    /// Makes it read-only for everyone, including root.
     pub fn make_read_only(&self) {
         let done = Command::new("mount").args(["-o", "remount,ro"]).arg(self.folder.path()).status();
         assert!(done.unwrap().success());
@@ -65,12 +64,12 @@ impl SmallDisk {
 
 impl Drop for SmallDisk {
     fn drop(&mut self) {
-        // Even while a server that is about to be killed has it open.
+        // Lazily, because a server that is about to be killed may still use it.
         let _ = Command::new("umount").arg("--lazy").arg(self.folder.path()).status();
     }
 }
 
-/// `command` as a user who owns nothing, or (said on standard error) `None` where that takes more rights.
+/// `command` as a user who owns nothing. `None`, with a message on standard error, if this user may not do that.
 pub fn as_nobody(command: &Command) -> Option<Command> {
     let nobody = |program: &Path| {
         let mut nobody = Command::new("setpriv");

@@ -1,4 +1,4 @@
-//! Aravis's fake GigE Vision camera, a real peer on the loopback (Debian's package `aravis-tools`).
+//! Aravis's fake GigE Vision camera, a separate program on the loopback (Debian's package `aravis-tools`).
 
 use std::fs::File;
 use std::process::{Child, Command, Stdio};
@@ -8,10 +8,10 @@ use parfocal::camera::gige::list;
 use parfocal::clock::{Clock, SystemClock};
 
 const PROGRAM: &str = "arv-fake-gv-camera-0.8";
-/// It answers to `Aravis-Fake-TEST`.
+/// Serial number; the camera answers to `Aravis-Fake-TEST`.
 const SERIAL: &str = "TEST";
 
-/// A fake camera. It has the machine's one GigE Vision port to itself: whoever wants one waits for their turn.
+/// A fake camera. It uses the machine's only GigE Vision port, so other tests wait for their turn.
 pub struct Fake {
     process: Child,
     options: Vec<String>,
@@ -19,7 +19,7 @@ pub struct Fake {
 }
 
 impl Fake {
-    /// Starts it; nothing where the program is not installed.
+    /// Starts it; `None` if the program is not installed.
     pub fn start(options: &[&str]) -> Option<Self> {
         let turn = File::create(std::env::temp_dir().join("parfocal-fake-camera.lock")).unwrap();
         turn.lock().unwrap();
@@ -47,13 +47,13 @@ impl Fake {
         }
     }
 
-    /// Takes its power away.
+    /// Switches it off.
     pub fn kill(&mut self) {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
     }
 
-    /// Gives it power again.
+    /// Switches it on again.
     pub fn restart(&mut self) {
         self.process = Self::spawn(&self.options).unwrap();
     }

@@ -1,4 +1,4 @@
-//! Starts the real server as its users do, on a port of its own and in a folder of its own.
+//! Starts the real server as its users do, with its own port and folder.
 
 pub mod disk;
 #[cfg(feature = "aravis")]
@@ -15,17 +15,17 @@ use tempfile::TempDir;
 /// A running server; killed when dropped.
 pub struct Server {
     process: Child,
-    /// Where it is reached.
+    /// Address at which it is reached.
     pub address: SocketAddr,
-    /// Everything that it said when it was ready.
+    /// Everything that it printed until it was ready.
     pub said: String,
     keys: Vec<(String, String)>,
-    /// Its data folder.
+    /// Data folder.
     pub data: Arc<TempDir>,
 }
 
 impl Server {
-    /// A server that listens on this machine alone.
+    /// A server that only this machine can reach.
     pub fn start() -> Self {
         Self::with(&["--bind", "127.0.0.1:0"])
     }
@@ -35,12 +35,12 @@ impl Server {
         Self::with(&["--bind", "127.0.0.1:0", "--tls"])
     }
 
-    /// A server with these arguments beside its data folder.
+    /// A server with these arguments and a new data folder.
     pub fn with(arguments: &[&str]) -> Self {
         Self::on(Arc::new(tempfile::tempdir().unwrap()), arguments)
     }
 
-    /// A server on a data folder that another may have used before.
+    /// A server on a data folder that another server may have used before.
     pub fn on(data: Arc<TempDir>, arguments: &[&str]) -> Self {
         let command = command(data.path(), arguments);
         Self::run(data, command)
@@ -71,20 +71,20 @@ impl Server {
         &self.keys.iter().find(|(name, _)| name == role).expect("a role").1
     }
 
-    /// From now on a request of `role` shows `key`: the token of somebody who signed in, or the key of another link.
+    /// From now on requests of `role` use `key`: the token of a signed-in person, or the key of another link.
     pub fn use_key(&mut self, role: &str, key: &str) {
         let known = self.keys.iter_mut().find(|(name, _)| name == role).expect("a role");
         key.clone_into(&mut known.1);
     }
 
-    /// Makes an account on the server's data folder while it runs, as `parfocal account add` does.
+    /// Makes an account in the server's data folder while it runs, as `parfocal account add` does.
     pub fn add_account(&self, name: &str, role: &str, display: &str) {
         let arguments = ["add", name, "--role", role, "--display", display];
         let (done, said) = account(self.data.path(), &arguments);
         assert!(done, "{said}");
     }
 
-    /// The token of whoever signs in to account `name`.
+    /// Signs in to account `name`. Returns the token.
     pub async fn sign_in(&self, name: &str) -> String {
         let body = serde_json::json!({"name": name, "passphrase": PASSPHRASE, "as_bearer": true});
         let response = client().post(self.url("/api/sign-in")).json(&body).send().await.unwrap();
@@ -92,7 +92,7 @@ impl Server {
         signed_in["token"].as_str().unwrap_or_else(|| panic!("{signed_in}")).to_owned()
     }
 
-    /// Address of `path`.
+    /// Full URL of `path`.
     pub fn url(&self, path: &str) -> String {
         let scheme = if self.said.contains("https://") { "https" } else { "http" };
         format!("{scheme}://{}{path}", self.address)
@@ -113,17 +113,17 @@ impl Server {
         client().post(self.url(path)).bearer_auth(self.key(role))
     }
 
-    /// Its process.
+    /// Process of the server, for signals.
     pub fn pid(&self) -> rustix::process::Pid {
         rustix::process::Pid::from_child(&self.process)
     }
 
-    /// The number of its process.
+    /// Process number of the server.
     pub fn id(&self) -> u32 {
         self.process.id()
     }
 
-    /// Ends the server as Ctrl-C or a service manager would, and waits: whether it ended well.
+    /// Ends the server with `signal`, as Ctrl-C or a service manager would, and waits. Returns whether it succeeded.
     pub fn end(&mut self, signal: rustix::process::Signal) -> bool {
         rustix::process::kill_process(self.pid(), signal).unwrap();
         self.process.wait().unwrap().success()
@@ -137,8 +137,8 @@ impl Drop for Server {
     }
 }
 
-/// `parfocal serve` with `arguments`; at fewer frames a second than usual where they ask for none, because the tests
-/// that run beside share the machine, and the phantom takes a core of it.
+/// `parfocal serve` with `arguments`. Unless they set it, the frame rate is lower than usual, because tests that run at
+/// the same time share the machine, and the phantom takes a core of it.
 pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.arg("serve").args(arguments).arg("--data-dir").arg(data).stdin(Stdio::null()).env("RUST_LOG", "warn");
@@ -148,12 +148,12 @@ pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs `parfocal serve` where it is expected to fail: exit code, standard error.
+/// Runs `parfocal serve`, which must fail. Returns exit code and standard error.
 pub fn refused(data: &std::path::Path, arguments: &[&str]) -> (Option<i32>, String) {
     refusal(command(data, arguments))
 }
 
-/// Runs `command`, a server that is expected to fail: exit code, standard error.
+/// Runs `command`, a server that must fail. Returns exit code and standard error.
 pub fn refusal(mut command: Command) -> (Option<i32>, String) {
     let mut process = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     let mut said = String::new();
@@ -164,20 +164,21 @@ pub fn refusal(mut command: Command) -> (Option<i32>, String) {
 /// The passphrase of every account.
 pub const PASSPHRASE: &str = "correct horse battery staple";
 
-/// What `parfocal account` says to `arguments` on `data`, given the passphrase on standard input; whether it succeeded.
+/// Runs `parfocal account` with `arguments` on `data`, with the passphrase on standard input. Returns whether it
+/// succeeded, and its output.
 pub fn account(data: &std::path::Path, arguments: &[&str]) -> (bool, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.arg("account").args(arguments).arg("--data-dir").arg(data);
     let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut process = piped.spawn().unwrap();
-    // A command that asks for no passphrase may have ended.
+    // A command that needs no passphrase may have ended already.
     let _ = writeln!(process.stdin.take().unwrap(), "{PASSPHRASE}");
     let output = process.wait_with_output().unwrap();
     let said = [output.stdout, output.stderr].concat();
     (output.status.success(), String::from_utf8(said).unwrap())
 }
 
-/// A client that follows no redirect and keeps no cookie by itself.
+/// A client that follows no redirects and keeps no cookies.
 pub fn client() -> Client {
     Client::builder().no_proxy().redirect(redirect::Policy::none()).build().unwrap()
 }

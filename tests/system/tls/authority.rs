@@ -1,4 +1,4 @@
-//! The local authority: what it signs, that it stays, and when the server's certificate is renewed.
+//! The local authority: what it signs, that it survives restarts, and when the server's certificate is renewed.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::os::unix::fs::PermissionsExt;
@@ -20,7 +20,7 @@ use crate::support::{Server, refused};
 const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const DAY: Duration = Duration::from_hours(24);
 
-/// What `openssl x509` says of a certificate, asked for with `what`.
+/// Output of `openssl x509` with the options `what` for a certificate.
 fn openssl(certificate: &[u8], what: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("certificate.der");
@@ -31,7 +31,7 @@ fn openssl(certificate: &[u8], what: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The server's certificate, as a client gets it that trusts nothing but the server's own authority.
+/// The server's certificate, as seen by a client that trusts only the server's own authority.
 async fn shown(server: &Server) -> Vec<u8> {
     certificate(&Trust::of(server, &["h2"]).connect(server.address, "127.0.0.1").await.unwrap())
 }
@@ -100,7 +100,7 @@ async fn the_fingerprint_printed_is_the_one_that_devices_show() {
     assert!(server.said.contains(&format!("http://{}/trust", server.address)), "{}", server.said);
 }
 
-/// Shows the certificate of `certificates` to one client, who trusts the authority in `data` and asks for `name`.
+/// Shows the certificate of `certificates` to one client, which trusts the authority in `data` and connects to `name`.
 async fn handshake(certificates: &Arc<Certificates>, data: &std::path::Path, name: &str) -> std::io::Result<Vec<u8>> {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
@@ -127,7 +127,7 @@ async fn a_certificate_near_its_end_is_replaced_and_one_that_is_not_stays() {
     let certificates = Arc::new(Certificates::local(data.path(), LOOPBACK, clock.wall()).unwrap());
     let first = handshake(&certificates, data.path(), "127.0.0.1").await.unwrap();
 
-    // It lives for 90 days and is replaced 30 days before that.
+    // The certificate lasts 90 days and is replaced 30 days before its end.
     clock.advance(59 * DAY);
     assert!(!certificates.refresh(clock.wall(), Names::of_machine).unwrap());
     assert_eq!(handshake(&certificates, data.path(), "127.0.0.1").await.unwrap(), first);
@@ -158,7 +158,7 @@ async fn the_authority_vouches_for_private_networks_and_this_machine_alone() {
     let now = SystemClock.wall();
     let certificates = Arc::new(Certificates::local(data.path(), LOOPBACK, now).unwrap());
 
-    // A public address that this machine has not, and somebody else's site: left out, and the rest stays valid.
+    // A public address that this machine does not have, and another site's name are left out. The rest stays valid.
     let wanted = names(&["localhost", "renamed.local", "bank.example"], &["192.168.7.7", "203.0.113.9", "fd00::7"]);
     assert!(certificates.refresh(now, |_| wanted).unwrap());
     for good in ["localhost", "renamed.local", "192.168.7.7", "fd00::7"] {
@@ -168,7 +168,7 @@ async fn the_authority_vouches_for_private_networks_and_this_machine_alone() {
         assert!(handshake(&certificates, data.path(), bad).await.is_err(), "{bad}");
     }
 
-    // The limits stand in the authority's certificate itself, where devices look.
+    // The limits are in the authority's certificate itself, where devices check them.
     let file = data.path().join("tls/authority.crt");
     let arguments = ["x509", "-noout", "-text", "-in", file.to_str().unwrap()];
     let said = String::from_utf8(Command::new("openssl").args(arguments).output().unwrap().stdout).unwrap();

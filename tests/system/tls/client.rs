@@ -1,4 +1,4 @@
-//! A client that looks into TLS: which certificate it was shown, and which HTTP was agreed on.
+//! A client that inspects TLS: the certificate it was shown, and the HTTP version agreed on.
 
 use bytes::Bytes;
 use http_body_util::{BodyExt, Full};
@@ -19,12 +19,12 @@ impl Trust {
     }
 }
 
-/// The certificate that `stream` was opened with.
+/// The certificate that the server showed on `stream`.
 pub fn certificate(stream: &TlsStream<TcpStream>) -> Vec<u8> {
     stream.get_ref().1.peer_certificates().unwrap()[0].to_vec()
 }
 
-/// What both ends of `stream` agreed on.
+/// The application protocol that both ends of `stream` agreed on.
 pub fn protocol(stream: &TlsStream<TcpStream>) -> String {
     String::from_utf8(stream.get_ref().1.alpn_protocol().unwrap_or_default().to_vec()).unwrap()
 }
@@ -34,7 +34,7 @@ pub fn get_as(server: &Server, role: &str, path: &str) -> Request<Full<Bytes>> {
     request(server, role, "GET", path, Bytes::new())
 }
 
-/// A request with the key of `role`, with a body of JSON if there is any.
+/// A request with the key of `role`, and `body` as JSON unless it is empty.
 pub fn request(server: &Server, role: &str, method: &str, path: &str, body: Bytes) -> Request<Full<Bytes>> {
     let mut request = Request::builder()
         .method(method)
@@ -51,7 +51,7 @@ pub async fn http2(server: &Server) -> http2::SendRequest<Full<Bytes>> {
     http2_trusting(&Trust::of(server, &["h2", "http/1.1"]), server).await
 }
 
-/// The same of a client that trusts somebody else than the server's own authority.
+/// The same, with a client that trusts `trust` instead of the server's own authority.
 pub async fn http2_trusting(trust: &Trust, server: &Server) -> http2::SendRequest<Full<Bytes>> {
     let stream = trust.connect(server.address, "127.0.0.1").await.unwrap();
     assert_eq!(protocol(&stream), "h2");
@@ -60,7 +60,7 @@ pub async fn http2_trusting(trust: &Trust, server: &Server) -> http2::SendReques
     sender
 }
 
-/// Asks for `path` in the clear, as a browser does for `http://`.
+/// Requests `path` without encryption, as a browser does for `http://`.
 pub async fn plain(server: &Server, method: &str, path: &str) -> Response<Incoming> {
     let stream = TcpStream::connect(server.address).await.unwrap();
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await.unwrap();

@@ -1,4 +1,4 @@
-//! A certificate that the site gives: used, renewed while the server runs, and refused in a sentence.
+//! A certificate that the site provides: used, renewed while the server runs, and refused with a sentence.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use crate::support::{Server, refused};
 
 const DAY: i64 = 24;
 
-/// A folder with a certificate and its key, signed by itself.
+/// A folder with a self-signed certificate and its key.
 struct Site {
     folder: tempfile::TempDir,
 }
@@ -28,7 +28,7 @@ impl Site {
         site
     }
 
-    /// Puts a new certificate and key there, for these names, valid from and until so many hours from now.
+    /// Writes a new certificate and key for these names. `from` and `until` are hours from now.
     fn renew(&self, names: &[&str], from: i64, until: i64) {
         let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
         let mut params = CertificateParams::new(names).unwrap();
@@ -56,7 +56,7 @@ impl Site {
         arguments
     }
 
-    /// What a server says that is refused this certificate.
+    /// The message of a server that refuses this certificate.
     fn refusal(&self) -> String {
         let data = tempfile::tempdir().unwrap();
         let arguments = self.arguments();

@@ -1,4 +1,4 @@
-//! The server encrypted: its certificates, what they are signed by, HTTP/2, and what it answers in the clear.
+//! The server with encryption: its certificates, who signs them, HTTP/2, and its answers without encryption.
 
 mod authority;
 mod client;

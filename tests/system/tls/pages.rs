@@ -1,4 +1,4 @@
-//! Pages, streams and comments over TLS, and clients that shake hands slowly.
+//! Pages, streams and comments over TLS, and clients with slow handshakes.
 
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ async fn a_page_comes_over_http2_and_its_cookie_never_goes_in_the_clear() {
     let entered = http2.send_request(get_as(&server, "operator", &enter)).await.unwrap();
     let cookie = entered.headers()["set-cookie"].to_str().unwrap().to_owned();
     assert!(cookie.ends_with("; HttpOnly; SameSite=Strict; Secure"), "{cookie}");
-    // Signing out sets the account's.
+    // Signing out also sets the account's cookie.
     let out = request(&server, "operator", "POST", "/api/sign-out", Bytes::new());
     let out = http2.send_request(out).await.unwrap();
     assert!(out.headers()["set-cookie"].to_str().unwrap().ends_with("; Secure"), "{out:?}");
@@ -66,7 +66,7 @@ async fn another_site_changes_nothing_over_http2_and_neither_does_a_page_that_ca
 async fn pictures_and_state_come_over_tls() {
     let server = Server::encrypted();
 
-    // Motion JPEG beside a page, on one HTTP/2 connection.
+    // Motion JPEG together with a page, on one HTTP/2 connection.
     let mut http2 = http2(&server).await;
     let mut stream = http2.send_request(get_as(&server, "surgeon", "/stream.mjpeg")).await.unwrap().into_body();
     let mut received = Vec::new();
@@ -93,7 +93,7 @@ async fn pictures_and_state_come_over_tls() {
         }
     }
 
-    // A page that is still open when the certificate has ended says so: it cannot be told any more then.
+    // A page that is still open when the certificate ends says so itself, because the server cannot reach it then.
     let until: Timestamp = status.unwrap()["certificate_until"].as_str().unwrap().parse().unwrap();
     let days = until.duration_since(SystemClock.wall()).as_hours() / 24;
     assert!((88..=90).contains(&days), "the authority's certificates live 90 days; this one has {days} left");
@@ -140,7 +140,7 @@ async fn who_says_nothing_holds_up_nobody_and_is_let_go() {
     let mut http2 = http2(&server).await;
     assert_eq!(http2.send_request(get_as(&server, "surgeon", "/surgeon")).await.unwrap().status(), 200);
 
-    // The server closes each by itself.
+    // The server closes each of them by itself.
     for mut line in silent {
         let mut rest = Vec::new();
         let closed = tokio::time::timeout(Duration::from_mins(1), line.read_to_end(&mut rest)).await;
@@ -155,7 +155,7 @@ async fn a_broken_handshake_leaves_the_server_as_it_was() {
     line.write_all(&[22; 512]).await.unwrap();
     let mut answer = Vec::new();
     line.read_to_end(&mut answer).await.unwrap();
-    // An alert (21) and the end.
+    // A TLS alert (21), and the end of the connection.
     assert_eq!(answer.first(), Some(&21), "{answer:?}");
     assert_eq!(plain(&server, "GET", "/trust").await.status(), 200);
 }

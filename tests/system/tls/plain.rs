@@ -1,4 +1,4 @@
-//! What an encrypted server answers in the clear: how to trust it, and where the encrypted page is.
+//! The answers of an encrypted server without encryption: how to trust it, and where the encrypted page is.
 
 use super::client::{plain, text};
 use crate::support::Server;
@@ -33,7 +33,7 @@ async fn how_to_trust_the_server_can_be_read_in_the_clear() {
     assert_eq!(page.status(), 200);
     let page = text(page).await;
     let fingerprint = server.said.lines().find_map(|line| line.split_once("(SHA-256) there: ")).unwrap().1;
-    // It may be broken between two lines.
+    // It may be broken into two lines.
     assert!(page.replace("<wbr>", "").contains(fingerprint), "{fingerprint}");
     for role in ["surgeon", "operator", "researcher"] {
         assert!(!page.contains(server.key(role)), "a key in the clear");

@@ -1,4 +1,4 @@
-//! What a client trusts and speaks when it shakes hands.
+//! The authority that a client trusts and the protocols that it speaks.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -12,13 +12,13 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
-/// What a client trusts and speaks.
+/// A client's trusted authority and protocols.
 pub struct Trust {
     connector: TlsConnector,
 }
 
 impl Trust {
-    /// Trusts the authority in the file `authority` and nobody else; speaks `protocols`, the best first.
+    /// Trusts only the authority in the file `authority`; speaks `protocols`, in order of preference.
     pub fn in_authority(authority: &Path, protocols: &[&str]) -> Self {
         let mut roots = RootCertStore::empty();
         roots.add(CertificateDer::from_pem_file(authority).unwrap()).unwrap();
@@ -31,7 +31,7 @@ impl Trust {
         Self { connector: TlsConnector::from(Arc::new(config)) }
     }
 
-    /// Shakes hands with what listens on `address`, which must prove to be `name`.
+    /// Connects to the server on `address`, which must prove to be `name`.
     pub async fn connect(&self, address: SocketAddr, name: &str) -> std::io::Result<TlsStream<TcpStream>> {
         let stream = TcpStream::connect(address).await.unwrap();
         self.connector.connect(ServerName::try_from(name.to_owned()).unwrap(), stream).await

@@ -1,4 +1,4 @@
-//! The page to trust the server, in browsers that do and do not.
+//! The page about trusting the server, in browsers that trust it and in those that do not.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,8 +11,8 @@ use crate::browser::driver::{Browser, Driver};
 use crate::browser::screenshots::shoot;
 use crate::support::Server;
 
-/// The option by which Chromium takes the server's key as one that it trusts. It stands for the steps on a device, which
-/// no test can go through.
+/// The Chromium option that makes it trust the server's key. It replaces the steps on a device, which a test cannot
+/// perform.
 async fn trusting(server: &Server) -> String {
     let stream = Trust::of(server, &["h2"]).connect(server.address, "127.0.0.1").await.unwrap();
     let shown = certificate(&stream);
@@ -42,7 +42,7 @@ async fn a_device_that_does_not_trust_the_server_is_told_so_and_one_that_does_go
     shoot(&trusting, "trust-done").await;
     assert_eq!(trusting.complaints().await, Vec::<String>::new());
 
-    // The way on leads to the encrypted pages, by the operator's cookie.
+    // The link leads to the encrypted pages, with the operator's cookie.
     trusting.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
     trusting.sees("#trust-link", &format!("http://{}/trust", server.address)).await;
     trusting.sees("#fingerprint", ":").await;

@@ -1,4 +1,4 @@
-//! Blinding within a study: emergency unblinding of one session, and what nobody is told ahead of time.
+//! Blinding within a study: emergency unblinding of one session, and what nobody may learn too early.
 
 use parfocal::conductor::ConductError;
 use parfocal::store::export::export;
@@ -89,7 +89,7 @@ async fn every_export_tells_an_emergency_and_none_tells_an_order_ahead_of_time()
         assert_eq!(rows(&out, "study_sessions")[0]["place"], "1");
     }
 
-    // Its set has another place, which nobody has taken yet: the seed would tell that one's order.
+    // Its set has another place, which nobody has taken yet. The seed would reveal the order of that place.
     let allocation = json(&folder.path().join("export-true"), "allocation.json");
     assert_eq!((&allocation["seed"], &allocation["study_statement"]), (&Value::Null, &Value::Null));
     assert!(allocation["study_statement_withheld"].as_str().unwrap().contains("unblind all of it"), "{allocation}");

@@ -1,4 +1,4 @@
-//! A study from its plan to its end, on a real database: what is possible when, and what is refused.
+//! A study from its plan to its end, on a real database: what is possible at each stage, and what is refused.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -77,7 +77,7 @@ async fn what_does_not_fit_where_the_study_stands_is_refused_and_changes_nothing
 
     plan(&trial, definition()).await.unwrap();
     let again = refusal(plan(&trial, definition()).await);
-    assert!(again.contains("there is a study 'scope-2026' already"), "{again}");
+    assert!(again.contains("there is already a study 'scope-2026'"), "{again}");
     assert!(refusal(change(&trial, Change::Close).await).contains("has not been opened yet"));
     assert!(refusal(change(&trial, LOCK).await).contains("the study is planned; close it first"));
     assert!(refusal(change(&trial, Change::Unblind).await).contains("only after it was locked"));
@@ -138,7 +138,7 @@ async fn sessions_take_the_places_of_their_site_in_turn_and_a_used_up_list_refus
     let twice = refusal(prepare(&trial, "S-02", "leeds").await);
     assert!(twice.contains("S-02 has a session by this protocol, and the study allows no second one"), "{twice}");
 
-    // The surgeon of the first session withdraws: a spare place opens, and that surgeon does not come back.
+    // The surgeon of the first session withdraws. A spare place opens, and that surgeon may not have another session.
     let study = detail(&trial).await;
     let first = study.study_sessions[0].session;
     change(&trial, Change::Withdraw { session: first }).await.unwrap();
@@ -212,14 +212,14 @@ async fn a_study_is_not_locked_over_a_session_or_over_words_that_may_still_come(
     late.segment = None;
     change(&trial, Change::Close).await.unwrap();
 
-    // It is completed, but the surgeon's page still shows it.
+    // The session is completed, but the surgeon's page still shows it.
     assert!(refusal(change(&trial, LOCK).await).contains("the session of S-01 has not ended, or is still on"));
     trial.conductor.dismiss(Role::Operator, session).unwrap();
     let open = refusal(change(&trial, LOCK).await);
     assert!(open.contains("for 1 of its sessions") && open.contains("despite_outstanding"), "{open}");
     change(&trial, Change::Lock { despite_outstanding: true }).await.unwrap();
 
-    // What arrives now is kept, and never counts.
+    // A comment that arrives now is kept, but never counts.
     trial.wait(Duration::from_secs(1)).await;
     trial.conductor.comment(late).await.unwrap();
     let comments = trial.store.reader().comments(session).await.unwrap();
@@ -308,7 +308,7 @@ async fn sessions_of_an_earlier_version_are_outside_any_study() {
     trial.store.close().await;
     drop(trial);
 
-    // As the version before studies left it.
+    // The database as the version before studies left it.
     let pool = crate::storage::raw(folder.path()).await;
     parfocal::store::MIGRATOR.undo(&pool, 8).await.unwrap();
     let commitment = "SELECT commitment FROM sessions";
@@ -333,7 +333,7 @@ async fn an_open_study_of_the_version_before_accounts_goes_on_with_its_orders_an
     std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
     let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 5).await;
     plan(&trial, definition()).await.unwrap();
-    // That version opened studies without accounts. This one goes with the tables of accounts again, below.
+    // That version opened studies without accounts. This account disappears below, with the tables of accounts.
     let pool = crate::storage::raw(folder.path()).await;
     let account = "INSERT INTO accounts VALUES ('nobody', 'Nobody', 'lead', 0, 64, 1, '', '')";
     sqlx::query(account).execute(&pool).await.unwrap();
@@ -356,7 +356,7 @@ async fn an_open_study_of_the_version_before_accounts_goes_on_with_its_orders_an
     let places: Vec<usize> = detail(&trial).await.study_sessions.iter().map(|session| session.place).collect();
     assert_eq!(places, [1, 2]);
 
-    // Every order is the one that was committed to before.
+    // Every order is still the committed one.
     to_the_end(&trial).await;
     let out = folder.path().join("export");
     export(&trial.recorder(), session, &out, true).await.unwrap();
@@ -382,7 +382,7 @@ async fn a_session_under_the_wrong_code_counts_for_the_right_surgeon_once_it_is_
     let told: Vec<_> = sessions.iter().map(|line| (line.corrected_participant.as_deref(), line.place)).collect();
     assert_eq!(told, [(Some("S-03"), 1), (None, 2)]);
 
-    // Who withdraws is the one who had the session.
+    // The withdrawal is that of the surgeon who really had the session.
     change(&trial, Change::Withdraw { session }).await.unwrap();
     assert_eq!(detail(&trial).await.log.last().unwrap().text, "S-03 withdrew");
     assert!(refusal(prepare(&trial, "S-03", "leeds").await).contains("withdrew"));

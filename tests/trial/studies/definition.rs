@@ -1,11 +1,11 @@
-//! A study's definition: every field wrong in turn is named with its line and key.
+//! A study's definition: an error in any field is reported with its line and key.
 
 use parfocal::trial::study::definition::{Definition, Site};
 use sha2::{Digest, Sha256};
 
 use super::{PROTOCOL, definition, protocol};
 
-/// What reading the definition says after `from` was replaced by `to`.
+/// The error from reading the definition with `from` replaced by `to`; empty if there is none.
 fn said(from: &str, to: &str) -> String {
     let text = definition();
     assert!(text.contains(from), "{from}");

@@ -1,4 +1,4 @@
-//! What proves a study: its commitment computed again by another program, and every change of what was drawn found.
+//! Evidence of a study: another program recomputes its commitment, and every change of the drawn orders is found.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +13,7 @@ use crate::chain::{after, said};
 use crate::exports::{failed, json, rows};
 use crate::fixture::PARTICIPANT;
 
-/// A study of three sessions at its end; one of them.
+/// Runs a study of three sessions to its end, and returns one of the sessions.
 async fn unblinded(folder: &Path) -> (Trial, SessionId) {
     let mut trial = opened(folder).await;
     let session = whole(&mut trial, PARTICIPANT, "leeds").await;
@@ -55,7 +55,7 @@ async fn a_list_holds_balanced_sets() {
         let stored = trial.store.reader().session(session.session).await.unwrap().unwrap();
         orders.push(stored.made.segments.into_iter().map(|(_, policy)| policy.to_string()).collect::<Vec<_>>());
     }
-    // A set of two policies: one order and its reverse.
+    // A set for two policies consists of one order and its reverse.
     assert_eq!(orders[0].iter().rev().collect::<Vec<_>>(), orders[1].iter().collect::<Vec<_>>());
 }
 
@@ -75,7 +75,7 @@ async fn two_databases_draw_different_orders_for_the_same_definition() {
     assert_ne!(lines[0].1, lines[1].1);
 }
 
-/// What is done to a database, the check that has to fail, and what it has to say.
+/// SQL that tampers with a database, the check that must fail, and the text that it must report.
 const TAMPERED: [(&str, &str, &str); 14] = [
     (
         "UPDATE studies SET definition = replace(definition, 'surgeons = 2', 'surgeons = 4')",
@@ -156,7 +156,8 @@ async fn a_place_that_was_given_by_no_rule_is_found() {
     assert!(found.contains(&format!("session {spare} should have been refused")), "{found}");
 }
 
-/// What is done to a file of an unblinded export, and what the check of the study has to say.
+/// File of an unblinded export, the text that is replaced in it, the replacement, and the text that the study's check
+/// must report.
 const TAMPERED_EXPORT: [(&str, &str, &str, &str); 6] = [
     ("study.toml", "surgeons = 3", "surgeons = 4", "study.toml is not the definition"),
     ("allocation.json", "place 2 ", "place 9 ", "the orders of the study are not those committed to"),

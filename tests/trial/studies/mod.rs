@@ -1,4 +1,4 @@
-//! Studies: their definition, their places, their life, and what of them is exported and verified.
+//! Studies: their definition, their places, their course, and their export and verification.
 
 mod blinding;
 mod course;
@@ -25,7 +25,7 @@ pub const STUDY: &str = "scope-2026";
 /// Who may unblind the study.
 pub const STATISTICIAN: &str = "Trial statistician, Leeds";
 
-/// A protocol in balanced order: two policies, so that two sessions are a set.
+/// A protocol with balanced order. It has two policies, so two sessions are a set.
 pub const PROTOCOL: &str = r#"
 name = "pair"
 title = "Comparison of two focus settings"
@@ -41,7 +41,7 @@ pub fn protocol() -> Protocol {
     Protocol::parse(PROTOCOL, "pair.toml", &crate::fixture::known()).unwrap()
 }
 
-/// A definition of a study of that protocol, at two sites.
+/// The definition of a study with that protocol at two sites.
 pub fn definition() -> String {
     format!(
         r#"name = "{STUDY}"
@@ -78,12 +78,12 @@ pub fn signed(reason: &str) -> Signature {
     Signature::new("Dr Lead", reason).unwrap()
 }
 
-/// A server with the protocol in its library.
+/// Starts a server with the protocol in its library.
 pub async fn a_trial(folder: &Path) -> Trial {
     a_trial_from(folder, 5).await
 }
 
-/// The same, whose random source begins with `seed`.
+/// The same, with a random source that begins with `seed`.
 pub async fn a_trial_from(folder: &Path, seed: u64) -> Trial {
     std::fs::write(folder.join("pair.toml"), PROTOCOL).unwrap();
     let trial = Trial::start_with(folder, Some(folder), seed).await;
@@ -102,12 +102,12 @@ pub async fn plan(trial: &Trial, definition: String) -> Result<String, ConductEr
     planned.await.map(|name| name.as_str().to_owned())
 }
 
-/// Changes the study, as the lead does.
+/// Changes the study, with the lead's signature.
 pub async fn change(trial: &Trial, change: Change) -> Result<(), ConductError> {
     trial.conductor.change_study(Role::Researcher, STUDY.to_owned(), change, signed("as planned")).await
 }
 
-/// A study that is open.
+/// Starts a server with an open study.
 pub async fn opened(folder: &Path) -> Trial {
     let trial = a_trial(folder).await;
     plan(&trial, definition()).await.unwrap();
@@ -125,7 +125,7 @@ pub async fn prepare(trial: &Trial, participant: &str, site: &str) -> Result<Ses
     trial.conductor.create_in_study(Role::Operator, participant, "pair", place).await
 }
 
-/// A session of `participant` in the study at `site`, from its start to its end, off the screens.
+/// Runs a session of `participant` in the study at `site` from its start to its end, and closes it.
 pub async fn whole(trial: &mut Trial, participant: &str, site: &str) -> SessionId {
     let session = prepare(trial, participant, site).await.unwrap();
     trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
@@ -136,7 +136,7 @@ pub async fn whole(trial: &mut Trial, participant: &str, site: &str) -> SessionI
     session
 }
 
-/// A session of `participant` in the study at `site` that is aborted.
+/// Makes a session of `participant` in the study at `site`, aborts it, and closes it.
 pub async fn aborted(trial: &Trial, participant: &str, site: &str) -> SessionId {
     let session = prepare(trial, participant, site).await.unwrap();
     let abort = Action::Abort { reason: "the light failed".to_owned() };
@@ -145,7 +145,7 @@ pub async fn aborted(trial: &Trial, participant: &str, site: &str) -> SessionId 
     session
 }
 
-/// Closes and locks the study, unblinds all of it.
+/// Closes and locks the study, and unblinds all of it.
 pub async fn to_the_end(trial: &Trial) {
     change(trial, Change::Close).await.unwrap();
     change(trial, Change::Lock { despite_outstanding: true }).await.unwrap();

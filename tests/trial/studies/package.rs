@@ -1,4 +1,4 @@
-//! A study's package: what it holds, read by the programs it is made for, and what is refused.
+//! A study's package: its contents, as the intended programs read them, and what is refused.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,13 @@ use serde_json::Value;
 use super::*;
 use crate::exports::{json, rows};
 
-/// Longer than one segment of an SPSS string, with characters of several bytes where its segments meet.
+/// A text longer than one segment of an SPSS string, with multi-byte characters where its segments meet.
 fn long_text() -> String {
     "Gefäß ".repeat(120)
 }
 
-/// What the surgeons say, one text a session: one that a spreadsheet would run, one that is long, one of several lines.
+/// The surgeons' comments, one in each session: one that a spreadsheet would run, one that is long, one of several
+/// lines.
 fn said() -> [String; 3] {
     ["=1+1 looks sharp".to_owned(), long_text(), "first line\nsecond, with \"quotes\"".to_owned()]
 }
@@ -41,7 +42,8 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// A data folder with the study at its end, whose sessions ran at these `sites`; drawn from `seed`.
+/// Makes a data folder with the study at its end. Its sessions ran at these `sites`. The server's random source begins
+/// with `seed`.
 async fn data_of(folder: &Path, seed: u64, sites: &[&str]) {
     std::fs::create_dir_all(folder).unwrap();
     let mut trial = a_trial_from(folder, seed).await;
@@ -60,8 +62,8 @@ async fn data_of(folder: &Path, seed: u64, sites: &[&str]) {
     trial.store.close().await;
 }
 
-/// Exports the study from the data folder `data`. Where standard error is no terminal, its lines tell how far it has
-/// come.
+/// Exports the study from the data folder `data`. Standard error is not a terminal here, so the progress appears in
+/// lines.
 fn exported(data: &Path, out: &Path, more: &[&str]) {
     let arguments = ["export", "--study", STUDY, "--data-dir", text(data), "--out", text(out)];
     let output = parfocal(&[&arguments[..], more].concat());
@@ -75,7 +77,7 @@ fn exported(data: &Path, out: &Path, more: &[&str]) {
     assert_eq!(last.1, format!("{} steps of joining", last.0));
 }
 
-/// The package of a study of three sessions at two sites.
+/// Makes the package of a study of three sessions at two sites.
 async fn package(folder: &Path) -> PathBuf {
     let data = folder.join("data");
     data_of(&data, 5, &["leeds", "leeds", "london"]).await;
@@ -84,7 +86,7 @@ async fn package(folder: &Path) -> PathBuf {
     out
 }
 
-/// What Python's DuckDB, Polars and pyreadstat find.
+/// The contents of the package, as DuckDB, Polars and pyreadstat in Python read them.
 fn python(package: &Path) -> Value {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folders = ["studies", "recordings"].map(|name| root.join("target").join(name));
@@ -109,7 +111,7 @@ async fn other_programs_read_what_was_said_with_its_types_and_labels() {
 
     let expected: BTreeSet<String> = said().into_iter().collect();
     assert_eq!(texts(&found["comments"]), expected, "Parquet");
-    // SPSS pads texts with spaces, so that a reader takes those at the end away.
+    // SPSS pads texts with spaces, so readers remove spaces at the end.
     let trimmed: BTreeSet<String> = expected.iter().map(|text| text.trim_end().to_owned()).collect();
     assert_eq!(texts(&found["spss_comments"]), trimmed, "SPSS");
     let redcap: BTreeSet<String> =
@@ -142,7 +144,7 @@ async fn other_programs_read_what_was_said_with_its_types_and_labels() {
     assert_eq!(found["redcap"]["times"][0], wall.strftime("%Y-%m-%d %H:%M:%S").to_string());
 }
 
-/// The names of the columns of a CSV file.
+/// The column names of a CSV file.
 fn header(folder: &Path, file: &str) -> Vec<String> {
     let mut reader = csv::Reader::from_path(folder.join(file)).unwrap();
     reader.headers().unwrap().iter().map(str::to_owned).collect()
@@ -178,7 +180,7 @@ async fn a_package_proves_itself_and_tells_what_was_changed() {
     }
     assert!(verified.contains("3 exports are as they were exported"), "{verified}");
 
-    // A head that was noted: of the row before the last of some export, and one that no export has.
+    // A noted head of the second last row of an export, and then a head that no export has.
     let session = std::fs::read_dir(package.join("sessions")).unwrap().next().unwrap().unwrap().path();
     let rows: Vec<_> =
         rows(&session, "chain").into_iter().map(|row| (row["number"].clone(), row["hash"].clone())).collect();
@@ -189,7 +191,7 @@ async fn a_package_proves_itself_and_tells_what_was_changed() {
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.code() == Some(1) && told.contains("no export in it has the row"), "{told}");
 
-    // Whoever changes a table and its checksum cannot change what the exports prove.
+    // A forger who changes a table and its checksum cannot change the evidence in the exports.
     let changed = package.join("comments.csv");
     let before = std::fs::read_to_string(&changed).unwrap();
     std::fs::write(&changed, before.replace("looks sharp", "looks blurred")).unwrap();
@@ -246,19 +248,19 @@ async fn two_sites_are_joined_and_what_does_not_belong_together_is_refused() {
 
     // One site twice.
     assert!(refusal(&["leeds", "leeds"]).contains("give each site once"), "one site twice");
-    // A blinded export beside one that tells the policies.
+    // A blinded export beside one that contains the policies.
     exported(&path("london-data"), &path("london-blinded"), &[]);
-    assert!(refusal(&["leeds", "london-blinded"]).contains("one tells the policies, the other does not"));
-    // A site that another database claims to be, too.
+    assert!(refusal(&["leeds", "london-blinded"]).contains("one contains the policies, the other does not"));
+    // Another database that claims to be the same site.
     data_of(&path("impostor-data"), 7, &["leeds"]).await;
     exported(&path("impostor-data"), &path("impostor"), &["--unblinded"]);
     assert!(refusal(&["leeds", "impostor"]).contains("their chains of records differ"));
-    // What is no export.
+    // A folder that is not an export.
     assert!(
         refusal(&["leeds", "leeds-data"]).contains("is neither the export of a session nor the package of a study")
     );
 
-    // An export that was changed, and one of another version.
+    // A changed export, and an export of another version.
     let session = std::fs::read_dir(path("london").join("sessions")).unwrap().next().unwrap().unwrap().path();
     let said = session.join("comments.csv");
     let before = std::fs::read_to_string(&said).unwrap();
@@ -310,7 +312,7 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     let reader = trial.store.reader().clone();
     assert_eq!(exports.state(&reader, STUDY).await.unwrap(), StudyExportState::None);
 
-    // Nothing is done between the two: the test has not waited yet.
+    // The export makes no progress between the two calls, because the test has not awaited anything yet.
     let first = exports.start(trial.recorder(), STUDY, false);
     let begun = StudyExportState::Running { unblinded: false, progress: Progress::default() };
     assert_eq!(first, begun);
@@ -332,7 +334,7 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     let accesses = rows(&export, "accesses");
     assert_eq!(accesses.len(), 1, "one export: {accesses:?}");
 
-    // The next one takes its place, once nobody downloads it any more.
+    // The next export replaces it. Its files stay as long as somebody downloads them.
     let _ = exports.start(trial.recorder(), STUDY, false);
     assert!(exports.made(&reader, STUDY).await.unwrap().is_none());
     assert!(made.folder.is_dir(), "it is being downloaded");

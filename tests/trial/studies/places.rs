@@ -1,4 +1,4 @@
-//! Who gets which place, by the rules that the definition states.
+//! Which place a session gets under the rules in the definition.
 
 use parfocal::ids::SessionId;
 use parfocal::trial::phase::SessionStatus;
@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::{definition, protocol};
 
-/// The study with these rules: 2 surgeons and 2 spare places at Leeds.
+/// The study with these rules. Leeds has 2 surgeons and 2 spare places.
 fn with_rules(aborted: &str, withdrawn: &str, repeated: &str) -> Definition {
     let text = definition()
         .replace("aborted = \"next-spare\"", &format!("aborted = \"{aborted}\""))
@@ -69,7 +69,7 @@ fn the_lists_of_two_sites_are_apart() {
     let study = with_rules("keep", "keep", "refuse");
     let elsewhere = Enrolled { site: "london".to_owned(), ..completed("S-01", 1) };
     assert_eq!(next(&study, std::slice::from_ref(&elsewhere), "S-02"), Ok(1));
-    // A surgeon who works at both is one surgeon.
+    // A surgeon who works at both sites is still one surgeon.
     assert!(matches!(next(&study, &[elsewhere], "S-01"), Err(StudyRefusal::Repeated { .. })));
 }
 
@@ -81,7 +81,7 @@ fn what_becomes_of_an_aborted_sessions_place_is_what_the_study_says() {
     assert!(is_used_up(&refused, 2), "{refused:?}");
     assert_eq!(next(&with_rules("same-place", "keep", "refuse"), &sessions, "S-03"), Ok(2));
     assert_eq!(next(&with_rules("next-spare", "keep", "refuse"), &sessions, "S-03"), Ok(3));
-    // The spare of one aborted session is one.
+    // One aborted session opens only one spare place.
     let taken = [completed("S-01", 1), aborted("S-02", 2), completed("S-03", 3)];
     let refused = next(&with_rules("next-spare", "keep", "refuse"), &taken, "S-04");
     assert!(is_used_up(&refused, 3), "{refused:?}");
@@ -100,7 +100,7 @@ fn a_place_whose_order_has_become_known_is_not_given_again() {
     let study = with_rules("same-place", "keep", "refuse");
     let known = Enrolled { unblinded: true, ..aborted("S-01", 1) };
     assert_eq!(next(&study, std::slice::from_ref(&known), "S-02"), Ok(2));
-    // A spare place opens in its stead.
+    // A spare place opens instead.
     let sessions = [known, completed("S-02", 2)];
     assert_eq!(next(&study, &sessions, "S-03"), Ok(3));
 }
@@ -124,7 +124,7 @@ fn what_becomes_of_a_withdrawn_surgeons_place_is_what_the_study_says() {
     assert!(is_used_up(&refused, 2), "{refused:?}");
     assert_eq!(next(&with_rules("keep", "same-place", "refuse"), &sessions, "S-03"), Ok(2));
     assert_eq!(next(&with_rules("keep", "next-spare", "refuse"), &sessions, "S-03"), Ok(3));
-    // Who withdrew does not come back.
+    // A surgeon who withdrew may not have another session.
     let back = next(&with_rules("keep", "next-spare", "next-spare"), &sessions, "S-02");
     assert_eq!(back, Err(StudyRefusal::Withdrew { participant: "S-02".to_owned() }));
 }
@@ -135,11 +135,11 @@ fn a_second_session_of_a_surgeon_is_what_the_study_says() {
     let refused = next(&with_rules("keep", "keep", "refuse"), &sessions, "S-01");
     assert_eq!(refused, Err(StudyRefusal::Repeated { participant: "S-01".to_owned() }));
     assert_eq!(next(&with_rules("keep", "keep", "next-spare"), &sessions, "S-01"), Ok(3));
-    // It does not cost a planned surgeon the place.
+    // The second session does not take the place of a planned surgeon.
     let repeated = [completed("S-01", 1), completed("S-01", 2)];
     assert_eq!(next(&with_rules("keep", "keep", "next-spare"), &repeated, "S-02"), Ok(3));
 
-    // After an aborted session that is replaced, the same surgeon may come again; after one that is kept, not.
+    // If an aborted session is replaced, the same surgeon may have another. If its place is kept, the surgeon may not.
     let once = [aborted("S-01", 1)];
     assert_eq!(next(&with_rules("next-spare", "keep", "refuse"), &once, "S-01"), Ok(2));
     assert!(matches!(next(&with_rules("keep", "keep", "refuse"), &once, "S-01"), Err(StudyRefusal::Repeated { .. })));

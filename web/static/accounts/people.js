@@ -1,4 +1,4 @@
-// The leads' page on accounts: makes them and changes them, each time with the lead's passphrase once more.
+// The leads' page for creating and changing accounts. Each change needs the lead's passphrase again.
 
 import { inWords, post } from "../shared/api.js";
 import { askIn } from "../shared/dialogs.js";
@@ -13,18 +13,18 @@ const first = byId("change-first", HTMLInputElement);
 /** @typedef {{ heading: string, consequence: string, go: string, danger?: boolean }} Words */
 
 /**
- * What is asked before each change.
+ * The texts of the dialog before each change.
  *
  * @type {Record<Change, (person: Person) => Words>}
  */
 const words = {
   role: ({ display }) => ({
-    heading: `Another role for ${display}`,
-    consequence: "It holds from the next request on, also where the person is signed in now.",
+    heading: `Change the role of ${display}`,
+    consequence: "It takes effect with the next request, even if the person is signed in now.",
     go: "Change the role",
   }),
   passphrase: ({ display }) => ({
-    heading: `Another passphrase for ${display}`,
+    heading: `Set a new passphrase for ${display}`,
     consequence:
       "All sign-ins of the account end. At the next one the person has to choose a passphrase that only they know.",
     go: "Set the passphrase",
@@ -49,7 +49,7 @@ const words = {
 };
 
 /**
- * The change as the server takes it.
+ * The change in the form that the server expects.
  *
  * @param {Change} change
  * @returns {Api.AccountAction}

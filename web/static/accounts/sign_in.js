@@ -1,4 +1,4 @@
-// The page to sign in.
+// The sign-in page.
 
 import { inWords, post, Refused } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
@@ -11,7 +11,7 @@ const chosen = byId("new-passphrase", HTMLInputElement);
 const again = byId("new-again", HTMLInputElement);
 const trouble = byId("sign-in-trouble");
 
-/** The status of the answer where a lead set the passphrase, and the person has to choose another. */
+/** The server's status if a lead set the passphrase and the person has to choose another. */
 const CHOOSE_ANOTHER = 409;
 
 form.addEventListener("submit", async (event) => {

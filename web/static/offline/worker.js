@@ -1,21 +1,21 @@
 // Keeps the surgeon's page and its files in this browser, so that the page opens without a network.
-// It keeps nothing else: no answer of the server's interface, nothing of a session, no other page.
-// The server sends this file after a line that sets `self.offline`, so that each version of the
-// program has a worker of its own.
+// It keeps nothing else: no answer of the HTTP interface, no data of a session, no other page.
+// The server puts a line that sets `self.offline` in front of this file, so that each version of the program has a
+// worker of its own.
 
 const worker = /** @type {ServiceWorkerGlobalScope} */ (/** @type {unknown} */ (self));
 const { version, files } = worker.offline;
 
-/** Every cache of every version has a name that begins so. */
+/** The names of the caches of all versions begin with this. */
 const FAMILY = "parfocal-surgeon-";
 const CACHE = FAMILY + version;
 
 const PAGE = "/surgeon";
 
-/** The header that only the surgeon's page has. It names the version of the files that the page asks for. */
+/** A header that only the surgeon's page has. It names the version of the files that the page loads. */
 const PAGE_VERSION = "parfocal-page-version";
 
-/** A network that swallows everything must not keep a surgeon waiting for a page that is here. */
+/** How long to wait for the server if the page is kept here. A dead network must not keep a surgeon waiting. */
 const PATIENCE_MS = 4000;
 
 worker.addEventListener("install", (event) => event.waitUntil(keepEverything()));
@@ -29,14 +29,14 @@ worker.addEventListener("fetch", (event) => {
   else if (files.includes(pathname)) event.respondWith(openFile(request));
 });
 
-/** A browser has all of a version or nothing of it: where one file fails, this worker is given up. */
+/** Keeps all files of this version. If one fails, the browser drops this worker, so no version is kept in part. */
 async function keepEverything() {
   const cache = await caches.open(CACHE);
   await cache.addAll([...files]);
 
   const answer = await fetch(PAGE, { cache: "no-store", redirect: "manual" });
   if (isPageOf(version, answer)) await cache.put(PAGE, answer);
-  // The page that is open has loaded all its files, so the newer worker need not wait for its end.
+  // An open page has already loaded all its files, so the newer worker need not wait until it is closed.
   await worker.skipWaiting();
 }
 
@@ -47,7 +47,7 @@ async function forgetOtherVersions() {
 }
 
 /**
- * The page as the server has it; the one that is kept where the server does not answer.
+ * The server's page, or the kept one if the server does not answer.
  *
  * @param {Request} request
  * @returns {Promise<Response>}
@@ -58,11 +58,11 @@ async function openPage(request) {
 
   try {
     const answer = await fetch(request, kept ? { signal: AbortSignal.timeout(PATIENCE_MS) } : undefined);
-    // A proxy answers so while the server is down.
+    // A proxy answers with such a status while the server is down.
     if (kept && answer.status >= 500) return kept;
 
     if (isPageOf(version, answer)) await cache.put(PAGE, answer.clone());
-    // The tablet is not let in any more, or the session is over for it.
+    // The answer is another page: the tablet is no longer let in, or the session is over for it.
     else if (!answer.headers.has(PAGE_VERSION)) await cache.delete(PAGE);
     return answer;
   } catch {

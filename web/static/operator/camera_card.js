@@ -1,4 +1,4 @@
-// The camera's settings: a figure to type for each, and a button either way.
+// The camera's settings: a number field for each, with a button for less and one for more.
 
 import { inWords, post, Refused } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
@@ -19,7 +19,7 @@ const settings = new CameraSettings();
 const rows = new Map();
 
 /**
- * Draws what `offer` holds. The card is hidden where the camera offers nothing.
+ * Draws the settings of `offer`. The card is hidden if the camera offers none.
  *
  * @param {Api.CameraOffer | null} offer
  */

@@ -1,15 +1,14 @@
-// Exposure, gain and frame rate of a camera that lets them be changed: their units, steps and
-// bounds.
+// Exposure, gain and frame rate of a camera where they can be changed: their units, steps and bounds.
 
 /**
- * Exposure is sent in microseconds and shown in milliseconds. A third of a stop is a photographer's
- * step.
+ * Exposure is sent in microseconds and shown in milliseconds. It changes by a third of a stop, the usual step in
+ * photography.
  */
 const THIRD_OF_A_STOP = 2 ** (1 / 3);
 
 /**
- * A value just asked for counts as the setting's until the camera has answered, so that quick taps
- * add up.
+ * A requested value counts as the setting's value for this long, until the camera has reported it. So quick taps add
+ * up.
  */
 export const SETTLED_MS = 2000;
 
@@ -17,7 +16,7 @@ export const SETTLED_MS = 2000;
  * @typedef {object} Kind
  * @property {string} label
  * @property {string} unit
- * @property {number} per what the server counts in, per unit that is shown
+ * @property {number} per the server's units per displayed unit
  * @property {(value: number) => number} less
  * @property {(value: number) => number} more
  */
@@ -42,7 +41,7 @@ export const KINDS = {
 };
 
 /**
- * A value as it is shown, in the unit that is shown.
+ * The server's `value` as displayed text, in the displayed unit.
  *
  * @param {Api.Setting} setting
  * @param {number} value
@@ -52,7 +51,7 @@ export function shown(setting, value) {
 }
 
 /**
- * What was typed, as the server counts it; NaN where that is not a number.
+ * The typed value in the server's unit; NaN if `text` is not a number.
  *
  * @param {Api.Setting} setting
  * @param {string} text
@@ -67,7 +66,7 @@ export function labelOf(setting) {
   return unit ? `${label}, ${unit}` : label;
 }
 
-/** The camera's settings as it offers them, and values that it has been asked for. */
+/** The settings that the camera offers, and the values just requested. */
 export class CameraSettings {
   /** @type {Api.Adjustable[]} */
   offered = [];
@@ -80,8 +79,7 @@ export class CameraSettings {
   }
 
   /**
-   * The value one step from the present one, within the bounds; null where the camera does not
-   * offer the setting.
+   * The value one step from the present one, within the bounds; null if the camera does not offer the setting.
    *
    * @param {Api.Setting} setting
    * @param {"less" | "more"} direction
@@ -94,7 +92,7 @@ export class CameraSettings {
   }
 
   /**
-   * The camera is asked for `value`. Returns what forgets that.
+   * Notes that `value` was requested. Returns a function that forgets the request.
    *
    * @param {Api.Setting} setting
    * @param {number} value
@@ -107,7 +105,7 @@ export class CameraSettings {
   }
 
   /**
-   * Why a value was refused: the bounds, in the unit that is shown.
+   * Says why a value was refused: names the bounds, in the displayed unit.
    *
    * @param {Api.Setting} setting
    */

@@ -1,4 +1,4 @@
-// Whether everything is ready for a trial: what the server finds at this machine, its devices and the
+// The card that says whether everything is ready for a trial: the server's checks of this machine, its devices and the
 // surgeon's tablet.
 
 import { get } from "../shared/api.js";
@@ -10,7 +10,7 @@ import { heading, passed, shown, sorted, summary } from "./checks_words.js";
 
 const button = byId("check-again", HTMLButtonElement);
 
-/** Hears whether something is to be put right before a trial. @type {(wrong: boolean) => void} */
+/** Called after each check with whether something must be put right before a trial. @type {(wrong: boolean) => void} */
 let told = () => {};
 
 /** @param {Finding} finding */
@@ -57,9 +57,9 @@ async function check() {
 }
 
 /**
- * Checks now, and when the operator asks for it.
+ * Runs the checks now, and whenever the operator presses the button.
  *
- * @param {(wrong: boolean) => void} found hears whether something is to be put right before a trial
+ * @param {(wrong: boolean) => void} found called with whether something must be put right before a trial
  */
 export function followChecks(found) {
   told = found;

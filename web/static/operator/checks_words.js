@@ -1,8 +1,8 @@
-// Whether everything is ready for a trial, in words.
+// The texts that say whether everything is ready for a trial.
 
 /** @typedef {Api.Schemas["Finding"]} Finding */
 
-/** How each verdict is shown, and what a screen reader says. The gravest comes first. */
+/** How each verdict is shown, and what a screen reader says. The most serious comes first. */
 const VERDICTS = /** @type {const} */ ([
   { verdict: "wrong", mark: "✗", words: "Put this right first", level: "bad" },
   { verdict: "advice", mark: "!", words: "Look at this", level: "warn" },
@@ -15,7 +15,7 @@ export function shown({ verdict }) {
 }
 
 /**
- * The findings that need somebody, the gravest first, and those that do not.
+ * Splits the findings into those that need attention, the most serious first, and those that do not.
  *
  * @param {Finding[]} findings
  */
@@ -25,7 +25,7 @@ export function sorted(findings) {
 }
 
 /**
- * What it comes to.
+ * All findings in one sentence.
  *
  * @param {Finding[]} findings
  */
@@ -34,7 +34,7 @@ export function summary(findings) {
   const wrong = count("wrong");
   const advice = count("advice");
 
-  if (wrong > 0) return `${things(wrong)} to put right before a trial.`;
+  if (wrong > 0) return `${things(wrong)} to fix before a trial.`;
   if (advice > 0) return `A trial can run. ${things(advice)} to look at.`;
   return "Everything is ready.";
 }
@@ -45,7 +45,7 @@ function things(number) {
 }
 
 /**
- * The title of the list of what is well.
+ * The title of the list of checks that passed.
  *
  * @param {number} number
  */
@@ -54,7 +54,7 @@ export function passed(number) {
 }
 
 /**
- * A subject as the beginning of a line.
+ * A subject with a capital letter, to begin a line.
  *
  * @param {string} subject
  */

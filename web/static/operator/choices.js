@@ -1,4 +1,4 @@
-// What a session can be prepared with, and which policies there are: the page's lists of them.
+// The lists to choose from when a session is prepared (participants, protocols, studies), and the list of policies.
 
 import { get, post } from "../shared/api.js";
 import { askIn } from "../shared/dialogs.js";
@@ -14,7 +14,7 @@ const protocols = byId("protocol", HTMLSelectElement);
 const policies = byId("policy", HTMLSelectElement);
 const studies = byId("study", HTMLSelectElement);
 
-/** What stands in the list of studies for a session outside any. */
+/** The value in the list of studies for a session outside any study. */
 const OUTSIDE = "outside";
 
 /** @type {Api.Choices | null} */
@@ -59,8 +59,8 @@ function draw(now, participant) {
 }
 
 /**
- * Whoever has no open study never hears of one. With one, nothing is chosen beforehand: a session
- * that was meant for the study must not end up outside.
+ * Hides the list of studies if none is open. If one is open, nothing is selected beforehand: a session that was meant
+ * for the study must not end up outside it.
  *
  * @param {Api.Choices} now
  */
@@ -77,14 +77,14 @@ function drawStudies(now) {
   );
 }
 
-/** The study and site that are chosen. */
+/** The chosen study and site; undefined if none is chosen. */
 function chosenStudy() {
   const [study = "", site = ""] = studies.value.split("/");
   return site ? { study, site } : undefined;
 }
 
 /**
- * The protocols that can be chosen: in a study those of its plan.
+ * The protocols that can be chosen. In a study these are the ones of its plan.
  *
  * @param {Api.Choices} now
  */
@@ -104,15 +104,15 @@ function drawProtocols(now) {
 }
 
 function drawSummary() {
-  // With its title: the list cuts long ones off.
+  // The summary includes the title, because the list cuts off long titles.
   const offered = choices ? offeredProtocols(choices) : [];
   const protocol = offered.find(({ name }) => name === protocols.value);
   setText(byId("protocol-summary"), protocol ? protocolWords(protocol) : "");
 }
 
 /**
- * Follows what the server offers: `drawn` is called after the lists were drawn anew, `prepare` with
- * the answer to a session that was prepared. Returns what asks the server again.
+ * Keeps the lists up to date with the server. Calls `drawn` after the lists were redrawn, and `prepare` with the answer
+ * when a session is prepared. Returns a function that asks the server again.
  *
  * @param {() => void} drawn
  * @param {(answer: Promise<Api.OperatorView | null>) => Promise<void>} prepare
@@ -122,7 +122,8 @@ export function followChoices(drawn, prepare) {
     const before = choices;
     try {
       const now = await get("/api/operator/choices");
-      // An open list is drawn anew only for news, and never for what was so before a participant was added here.
+      // Redraws a list, which may be open, only if something changed, and never from an answer older than a participant
+      // that was added here.
       if (choices !== before || JSON.stringify(now) === JSON.stringify(choices)) return;
       choices = now;
       draw(now, participants.value);
@@ -163,7 +164,7 @@ export function followChoices(drawn, prepare) {
 
   // Another operator may have added participants.
   for (const way of ["pointerenter", "focus"]) participants.addEventListener(way, refresh);
-  // And a researcher may have opened or closed a study.
+  // A researcher may have opened or closed a study.
   for (const way of ["pointerenter", "focus"]) studies.addEventListener(way, refresh);
   byId("add-participant").onclick = () => {
     askIn(byId("participant-dialog", HTMLDialogElement), byId("participant-trouble"), add);

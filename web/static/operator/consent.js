@@ -3,7 +3,7 @@
 import { askIn } from "../shared/dialogs.js";
 import { byId } from "../shared/dom.js";
 
-/** Today, on the clock of this device, as a date field has it. */
+/** Today's date by this device's clock, in the format of a date field. */
 function today() {
   const now = new Date();
   const pad = (/** @type {number} */ number) => String(number).padStart(2, "0");
@@ -11,7 +11,7 @@ function today() {
 }
 
 /**
- * Asks what the participant consented to.
+ * Opens the dialog, and calls `done` with the consent that was entered.
  *
  * @param {Api.OperatorView} view
  * @param {(consent: Api.NewConsent) => Promise<void>} done

@@ -1,4 +1,4 @@
-// The devices' health in words: a lamp each, and every warning as a sentence that says what to do.
+// The texts about the devices' health: a lamp for each, and for every warning a sentence that says what to do.
 
 /** @typedef {Stream.OperatorStatus} Status */
 /** @typedef {{ name: string, figure: string, level: "" | "warn" | "bad", title: string }} Lamp */
@@ -10,7 +10,7 @@ function milliseconds(micros) {
 }
 
 /**
- * A lamp for camera, lens and loop.
+ * The lamps for camera, lens and loop.
  *
  * @param {Status} status
  * @returns {Lamp[]}
@@ -58,7 +58,8 @@ function latencyWords({ latency_p50_micros: median, latency_p99_micros: p99 }) {
 }
 
 /**
- * One warning for each trouble: a failed camera or lens is also why the focus is held.
+ * One warning for each problem. If the focus is held because the camera or the lens failed, that gives one warning, not
+ * two.
  *
  * @param {Status} status
  * @returns {Warning[]}

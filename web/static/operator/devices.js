@@ -1,4 +1,4 @@
-// The devices' health as the operator sees it.
+// Draws the devices' health on the operator's page.
 
 import { make, redraw } from "../shared/dom.js";
 import { lamps, warnings } from "./device_words.js";
@@ -25,7 +25,7 @@ export function drawLamps(list, status) {
 }
 
 /**
- * What camera, lens and loop say about themselves, into the list of terms `list`.
+ * Draws what camera, lens and loop report about themselves into the description list `list`.
  *
  * @param {HTMLElement} list
  * @param {Status} status

@@ -1,4 +1,4 @@
-// Who focuses outside a session: a policy, or the operator's hand on the slider.
+// The card to choose who focuses outside a session: a policy, or the operator with the slider.
 
 import { post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
@@ -7,7 +7,7 @@ import { Orders } from "./orders.js";
 
 export const BY_HAND = "by-hand";
 
-/** What the list of policies shows during a session, when nobody may know which one runs. */
+/** The value that the list of policies shows during a session, when nobody may know which policy runs. */
 export const UNTOLD = "";
 
 const MIDDLE = 0.5;
@@ -21,8 +21,7 @@ let status = null;
 let dragging = false;
 
 /**
- * Draws what the loop's status tells about the focus. During a session, `blinded`, it draws nothing
- * of it.
+ * Draws the policy and the focal power of the loop's status. During a session (`blinded`) both are hidden.
  *
  * @param {Stream.OperatorStatus} next
  * @param {boolean} blinded
@@ -30,7 +29,7 @@ let dragging = false;
 export function drawFocus(next, blinded) {
   status = next;
   const { focal_power: power } = next;
-  // The status that tells again comes after the word that the session is closed.
+  // When a session is closed, the first status with a focal power arrives only after the message about it.
   const untold = blinded || power === null;
   const wasUntold = policies.value === UNTOLD;
   byId("focus-controls", HTMLFieldSetElement).disabled = untold;
@@ -49,7 +48,7 @@ export function drawFocus(next, blinded) {
   setText(byId("focal-power-value"), text);
 }
 
-/** Nothing from before the session stays, which would look as if it held now. */
+/** Clears the values from before the session, which would look like present ones. */
 function drawUntold() {
   setText(byId("focus-now"), "The session controls the focus until you close it.");
   policies.value = UNTOLD;

@@ -1,5 +1,5 @@
-// One line that says what the operator can do now. It follows from what the page shows anyway, and
-// so is the same whatever is being tried.
+// One line that says what the operator can do now. It is derived from what the page shows anyway, so it is the same for
+// every policy.
 
 import { minuteText } from "../shared/text.js";
 import { isOver, lacksConsent } from "./session_words.js";
@@ -7,12 +7,12 @@ import { isOver, lacksConsent } from "./session_words.js";
 /** @typedef {Api.OperatorView} View */
 
 /**
- * What the line follows from.
+ * The facts from which the line is derived.
  *
  * @typedef {object} Facts
  * @property {View | null} view
- * @property {boolean} known whether the server has said what is under way
- * @property {boolean} missed whether the server is not heard
+ * @property {boolean} known whether the server has said which session, if any, is under way
+ * @property {boolean} missed whether the server has been silent for too long
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} working whether camera and lens work, as far as is known
@@ -28,10 +28,10 @@ export function nowWords({ view, known, missed, heardAt, refused, working, wrong
       : `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
   }
   if (!known) return "Connecting to the server…";
-  if (!working) return "See to the camera or the lens first. The warning below says what is wrong.";
+  if (!working) return "Fix the camera or the lens first. The warning below says what is wrong.";
   if (view !== null) return sessionWords(view);
   return wrong
-    ? "Put right first what the card “Ready for a trial?” shows with a cross."
+    ? "First fix what the card “Ready for a trial?” marks with a cross."
     : "Choose a participant and a protocol, then prepare the session.";
 }
 

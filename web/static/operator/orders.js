@@ -1,5 +1,5 @@
-// One order at a time, so that the last one given is the last to arrive. Orders overtaken meanwhile
-// are left out.
+// Sends one order at a time, so that the last one given arrives last. An order that was replaced by a newer one before
+// it could be sent is left out.
 
 /** @template Order */
 export class Orders {

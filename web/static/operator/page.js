@@ -21,10 +21,7 @@ import { Traces } from "./traces.js";
 
 const TICK_MS = 250;
 
-/**
- * After this many frames without a belief the policy has none; the frames of a held lens have none
- * either.
- */
+/** After this many frames without a belief the policy counts as having none. Frames of a held lens have none either. */
 const BELIEF_FRAMES = 25;
 
 /** @type {Api.OperatorView | null} */
@@ -35,7 +32,7 @@ let framesWithoutBelief = BELIEF_FRAMES;
 
 /** Whether the checks found something to put right before a trial. */
 let wrong = false;
-/** Whether the server has said what is under way. */
+/** Whether the server has said which session, if any, is under way. */
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator");
@@ -98,7 +95,7 @@ viewer.live.listen({
   connection: (open) => {
     if (!open) {
       contact.lost();
-      // Where the sign-in has ended, the answer to this asks for it; a connection cannot.
+      // If the sign-in has ended, the answer to this request opens the dialog to sign in. The live connection cannot.
       get("/api/operator/session").catch(() => {});
       return;
     }

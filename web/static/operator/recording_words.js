@@ -1,4 +1,4 @@
-// How recording stands, in words.
+// The texts about the recording and the disk.
 
 const KB = 1e3;
 const MB = 1e6;
@@ -12,7 +12,7 @@ export function amount(bytes) {
 }
 
 /**
- * A length of time, as exactly as it helps.
+ * A length of time, rounded to a useful precision.
  *
  * @param {number} seconds
  */
@@ -26,7 +26,7 @@ export function lasting(seconds) {
 }
 
 /**
- * What is being recorded, or that nothing is.
+ * Says what is being recorded, or that nothing is.
  *
  * @param {Api.RecordingStatus} status
  */
@@ -42,7 +42,7 @@ export function nowWords(status) {
 }
 
 /**
- * How long the disk will last.
+ * Says how much space the disk has and, while the rate is known, how long it will last.
  *
  * @param {Api.RecordingStatus} status
  */
@@ -50,7 +50,7 @@ export function diskWords(status) {
   const { seconds_left: left, bytes_per_second: rate, free_bytes: free, reserve_bytes: reserve } = status;
   if (typeof free !== "number") return "";
 
-  const kept = `${amount(free)} free, of which ${amount(reserve ?? 0)} are kept for the trial`;
+  const kept = `${amount(free)} free; the trial’s reserve is ${amount(reserve ?? 0)}`;
   if (typeof left !== "number" || typeof rate !== "number") return `The disk has ${kept}.`;
   return `The disk lasts for about ${lasting(left)} at ${amount(rate)} a second (${kept}).`;
 }

@@ -1,5 +1,4 @@
-// The session under way: where it stands, what the operator can do with it, and what was said and
-// done in it.
+// The card of the session under way: its state, what the operator can do with it, and its comments and events.
 
 import { post, Refused } from "../shared/api.js";
 import { askReason, askWhetherMeant } from "../shared/dialogs.js";
@@ -155,7 +154,7 @@ export class SessionCard {
     askReason({
       heading: "The participant withdraws",
       consequence:
-        "From now on this session’s data are not shown, analysed or exported. That it was withdrawn remains on record. " +
+        "From now on this session’s data are not shown, analysed or exported. The record keeps that it was withdrawn. " +
         "This cannot be undone.",
       go: "Withdraw session",
       danger: true,
@@ -173,8 +172,8 @@ export class SessionCard {
   }
 
   /**
-   * Does `action` on the session that was shown when it was asked for: another operator may have
-   * closed that one.
+   * Does `action` on `session`, the session shown when the operator asked for it. Throws if another operator has closed
+   * that session since.
    *
    * @param {string} session
    * @param {Api.Action} action

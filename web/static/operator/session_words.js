@@ -1,4 +1,4 @@
-// The session as the operator reads it: its phase, its steps, what can be done with it.
+// The session's texts for the operator: its phase, its steps, what can be done with it.
 
 import { clockText } from "../shared/text.js";
 
@@ -32,7 +32,7 @@ export function phaseWords({ phase, setting, settings }) {
 }
 
 /**
- * What has become of each setting, in order.
+ * The state of each setting, in order; empty for a setting that is still to come.
  *
  * @param {View} view
  * @returns {("done" | "now" | "")[]}
@@ -47,7 +47,7 @@ export function steps({ phase, setting, settings }) {
 
 /**
  * @param {View} view
- * @param {number | null} seconds left of the setting's time, where it has a limit
+ * @param {number | null} seconds left of the setting's time; null if it has no limit
  */
 export function timeLeft({ phase, paused }, seconds) {
   if (phase !== "inspecting" || seconds === null) return "";
@@ -64,7 +64,7 @@ export function lacksConsent({ consent, consent_required: required }) {
 }
 
 /**
- * What is known of the participant's consent, or of a withdrawal; empty where there is nothing to say.
+ * Says what is known about the participant's consent or withdrawal; empty if there is nothing to say.
  *
  * @param {View} view
  */
@@ -113,7 +113,7 @@ export function deeds(view) {
 }
 
 /**
- * Says that the lens was stopped before that could be written down, and what will happen.
+ * Says that the lens was stopped before this could be recorded, and what will happen; empty if everything is recorded.
  *
  * @param {View} view
  */
@@ -126,7 +126,7 @@ export function unrecordedWords({ unrecorded, unrecorded_because: because }) {
 
 /** @param {Api.CommentLine} comment */
 export function commentWords(comment) {
-  // Nobody says nothing: such a comment was erased.
+  // Nobody sends an empty comment, so the text was erased.
   if (comment.kind === "mark") return "Marked this moment";
   if (comment.kind === "voice") return "Voice comment";
   if (comment.text === "") return "Erased";

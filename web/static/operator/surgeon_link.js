@@ -1,4 +1,4 @@
-// The surgeon's link, to be copied: in a study it is to the session under way alone.
+// Shows the surgeon's link, to be copied. In a study the link opens only the session under way.
 
 import { get } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
@@ -6,7 +6,7 @@ import { tellTrouble } from "../shared/trouble.js";
 
 const TOLD_MS = 2000;
 
-/** The server may have another address by then, as after a change of the network. */
+/** How often the link is asked for again. The server's address may change, for example with the network. */
 const ASK_AGAIN_MS = 60_000;
 
 export function offerLink() {
@@ -27,31 +27,31 @@ export function offerLink() {
   setInterval(askAgain, ASK_AGAIN_MS);
 }
 
-/** Shows the link by the server's present address. */
+/** Updates the link to the server's present address. */
 async function askAgain() {
   if (shownFor === null) return;
   try {
     draw(await get("/api/operator/surgeon-link"));
   } catch {
-    // The one that is shown stays until the next time.
+    // The shown link stays until the next attempt.
   }
 }
 
 /** @param {Api.Schemas["SurgeonLink"]} told */
 function draw({ link, qr }) {
   const field = byId("surgeon-link", HTMLInputElement);
-  // Somebody may be copying the one that is shown.
+  // Somebody may be copying the link that is shown.
   if (field.value === link) return;
   field.value = link;
   // The server's own picture, made from the link alone.
   byId("qr").innerHTML = qr;
 }
 
-/** What the link was last asked for. @type {string | null} */
+/** The session that the link opens; "" for the shared link; null if it must be asked for. @type {string | null} */
 let shownFor = null;
 
 /**
- * Shows the link that opens `session`, and the shared one where it is over or outside any study.
+ * Shows the link that opens `session`, or the shared link if the session is over or outside any study.
  *
  * @param {Api.OperatorView | null} session
  */
@@ -63,14 +63,14 @@ export function followLink(session) {
   showLink(wanted !== "");
 }
 
-/** @param {boolean} ofSession whether the link is to be to one session */
+/** @param {boolean} ofSession whether the link opens only one session */
 async function showLink(ofSession) {
   const trouble = byId("link-trouble");
   try {
     draw(await get("/api/operator/surgeon-link"));
     setText(trouble, "");
   } catch (error) {
-    // Asked for again when the session changes, or somebody has signed in.
+    // The link is asked for again when the session changes, or when somebody has signed in.
     shownFor = null;
     byId("surgeon-link", HTMLInputElement).value = "";
     byId("qr").replaceChildren();

@@ -1,4 +1,4 @@
-// Corrections in words: how an answer is written down and read back, and what is asked for.
+// Texts for corrections: how an answer is written into a field and read back, and the hints beside the field.
 
 /** @typedef {Api.SessionDetail["answers"][number]} AnswerLine */
 
@@ -6,7 +6,7 @@
 const NUMBERS = ["likert", "visual-analogue", "recognition"];
 
 /**
- * The answers that can be corrected: a surgeon's own words cannot.
+ * The answers that can be corrected. A surgeon's own words cannot.
  *
  * @param {AnswerLine[]} answers
  */
@@ -15,7 +15,7 @@ export function correctable(answers) {
 }
 
 /**
- * Where an answer stands and what it was asked, for a list.
+ * The name of an answer in a list: its setting and its question.
  *
  * @param {Pick<AnswerLine, "setting" | "text" | "question">} answer
  */
@@ -25,7 +25,7 @@ export function answerName({ setting, text, question }) {
 }
 
 /**
- * The answer so far: as it was corrected, if it was.
+ * The present answer, with its correction if there is one.
  *
  * @param {Pick<AnswerLine, "value" | "corrected">} answer
  * @returns {Api.AnswerValue}
@@ -35,7 +35,7 @@ export function soFar({ value, corrected }) {
 }
 
 /**
- * An answer as it is written into the field.
+ * An answer as text for the field.
  *
  * @param {Api.AnswerValue} value
  */
@@ -44,7 +44,7 @@ export function written(value) {
 }
 
 /**
- * The answer to a question of `kind` that stands in the field; null where it is none.
+ * Reads the answer to a question of `kind` from the field's text; null if it is not an answer.
  *
  * @param {string | null | undefined} kind
  * @param {string} text
@@ -60,7 +60,7 @@ export function read(kind, text) {
 }
 
 /**
- * What the field takes for a question of `kind`.
+ * Says what the field accepts for a question of `kind`.
  *
  * @param {string | null | undefined} kind
  */
@@ -73,13 +73,13 @@ export function hint(kind) {
     case "recognition":
       return "1 for no, 2 for not sure, 3 for yes.";
     case "ranking":
-      return "As it stands now: numbers with commas between.";
+      return "In the same form as now: numbers separated by commas.";
     case "sus":
-      return "The ten points from 1 to 5, with commas between.";
+      return "The ten points from 1 to 5, separated by commas.";
     case "nasa-tlx":
     case "surg-tlx":
-      return "The gradation of each scale, from 1 (rating 0) to 21 (rating 100), with commas between; then 1 or 2 for each pair.";
+      return "The gradation of each scale, from 1 (rating 0) to 21 (rating 100), separated by commas; then 1 or 2 for each pair.";
     default:
-      return "Numbers with commas between.";
+      return "Numbers separated by commas.";
   }
 }

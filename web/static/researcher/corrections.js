@@ -1,4 +1,4 @@
-// The dialogs by which a researcher corrects, adds a note, erases words, and records a withdrawal.
+// The dialogs in which a researcher corrects, adds a note, erases words, and records a withdrawal.
 
 import { get, post, Refused } from "../shared/api.js";
 import { askIn, askReason } from "../shared/dialogs.js";
@@ -10,11 +10,11 @@ import { voicePlayer } from "./voice.js";
  * @typedef {object} Asked
  * @property {string} heading
  * @property {string} consequence
- * @property {{ label: string, options: { value: string, text: string }[] }} [which] what is chosen from a list
- * @property {{ label: string, value: string, hint: string }} [text] what is written
- * @property {string} [reason] what stands in the field for the reason at first
- * @property {HTMLElement} [player] plays what is typed out
- * @property {(which: string) => void} [chosen] called when something of the list is chosen
+ * @property {{ label: string, options: { value: string, text: string }[] }} [which] a list to choose from
+ * @property {{ label: string, value: string, hint: string }} [text] a field to write in
+ * @property {string} [reason] the initial text of the field for the reason
+ * @property {HTMLElement} [player] plays the recording that is typed out
+ * @property {(which: string) => void} [chosen] called when an option of the list is chosen
  * @property {(answer: { which: string, text: string, reason: string }) => Promise<void>} done
  */
 
@@ -22,7 +22,7 @@ import { voicePlayer } from "./voice.js";
 function ask({ heading, consequence, which, text, reason: usual = "", player, chosen, done }) {
   setText(byId("correct-heading"), heading);
   setText(byId("correct-consequence"), consequence);
-  // A sound that plays ends with the dialog that it is removed from.
+  // The player is removed when the dialog closes, which also stops its sound.
   byId("correct-so-far").replaceChildren(...(player ? [player] : []));
   byId("correct-dialog").addEventListener("close", () => player?.remove(), { once: true });
 
@@ -49,7 +49,7 @@ function ask({ heading, consequence, which, text, reason: usual = "", player, ch
 }
 
 /**
- * Records a correction, and shows the page anew.
+ * Records a correction, and reloads the page.
  *
  * @param {string} session
  * @param {Api.NewCorrection} correction
@@ -60,7 +60,7 @@ async function record(session, correction) {
 }
 
 /**
- * Asks for the session's right participant.
+ * Asks for the correct participant of the session.
  *
  * @param {string} session
  * @param {string} old
@@ -70,14 +70,14 @@ export function correctParticipant(session, old, participants) {
   const others = participants.filter((code) => code !== old);
   ask({
     heading: "Correct the participant",
-    consequence: `The session stands as recorded, with ${old}. The right code stands beside it, here and in exports.`,
+    consequence: `The session keeps the recorded code ${old}. The correct code is shown beside it, here and in exports.`,
     which: { label: "Right participant", options: others.map((code) => ({ value: code, text: code })) },
     done: ({ which, reason }) => record(session, { field: "participant", old, new: which, reason }),
   });
 }
 
 /**
- * Asks for the right answer to a question.
+ * Asks for the correct answer to a question.
  *
  * @param {string} session
  */
@@ -89,7 +89,7 @@ export async function correctAnswer(session) {
   ask({
     heading: "Correct an answer",
     consequence:
-      "The surgeon’s answer stays as it was given. The right one stands beside it, and scores are computed from it.",
+      "The surgeon’s answer stays as it was given. The correct one is shown beside it, and scores use the correct one.",
     which: {
       label: "Answer",
       options: answers.map((answer) => ({ value: answer.key, text: answerName(answer) })),
@@ -105,7 +105,8 @@ export async function correctAnswer(session) {
     done: ({ which, text, reason }) => {
       const answer = find(which);
       const value = answer && read(answer.kind, text);
-      if (!answer || value == null) throw new Refused(422, `This is no answer. ${hint(answer?.kind)}`, true);
+      if (!answer || value == null)
+        throw new Refused(422, `This is not a valid answer. ${hint(answer?.kind)}`, true);
       return record(session, { field: "value", record: which, old: soFar(answer), new: value, reason });
     },
   });
@@ -121,14 +122,14 @@ export async function correctAnswer(session) {
 export function askNote(session, key, old) {
   ask({
     heading: old ? "Change the note" : "Add a note",
-    consequence: "The surgeon’s words stay as they are. The note stands beside them, here and in exports.",
+    consequence: "The surgeon’s words stay as they are. The note is shown beside them, here and in exports.",
     text: { label: "Note", value: old, hint: "" },
     done: ({ text, reason }) => record(session, { field: "note", record: key, old, new: text, reason }),
   });
 }
 
 /**
- * Asks for what was said aloud in a comment, typed out.
+ * Asks for the text of a voice comment, typed out from its recording.
  *
  * @param {string} session
  * @param {Api.TimelineComment} comment
@@ -139,7 +140,7 @@ export function askTranscript(session, comment) {
   ask({
     heading: old ? "Change what was typed out" : "Type out what was said",
     consequence:
-      "The recording stays as it is. What you type stands beside it, here and in exports, with who typed it and when.",
+      "The recording stays as it is. What you type is shown beside it, here and in exports, with who typed it and when.",
     text: { label: "What was said", value: old, hint: "" },
     reason: old ? "" : "Typed out from the recording",
     player: voicePlayer(session, comment) ?? undefined,
@@ -148,7 +149,7 @@ export function askTranscript(session, comment) {
 }
 
 /**
- * Asks whether words are to be erased.
+ * Asks whether to erase words.
  *
  * @param {string} session
  * @param {"comment" | "answer"} subject
@@ -158,16 +159,16 @@ export function askErasure(session, subject, key) {
   askReason({
     heading: "Erase these words",
     consequence:
-      "The words leave the database for good, with every note on them. Backups and exports made earlier still " +
-      "hold them. The record stays, and says that its words were erased, by whom and why. Do not repeat the words here.",
-    go: "Erase for good",
+      "The words are permanently deleted from the database, with every note on them. Earlier backups and exports " +
+      "still hold them. The record stays, and says that its words were erased, by whom and why. Do not repeat the words here.",
+    go: "Erase permanently",
     danger: true,
     done: (reason) => erase(session, { subject, record: key, reason }),
   });
 }
 
 /**
- * Asks whether all words of a withdrawn session are to be erased.
+ * Asks whether to erase all words of a withdrawn session.
  *
  * @param {string} session
  */
@@ -175,9 +176,9 @@ export function askErasureOfAll(session) {
   askReason({
     heading: "Erase all words of this session",
     consequence:
-      "Every comment with its sound, every answer in words and every note leaves the database for good. Backups and " +
-      "exports made earlier still hold them. The records stay, and say that their words were erased, by whom and why.",
-    go: "Erase all for good",
+      "All comments with their sound, all answers in words and all notes are permanently deleted from the database. " +
+      "Earlier backups and exports still hold them. The records stay, and say that their words were erased, by whom and why.",
+    go: "Erase all permanently",
     danger: true,
     done: async (reason) => {
       await post("/api/researcher/sessions/{session}/erasures/all", { reason }, { session });
@@ -187,26 +188,26 @@ export function askErasureOfAll(session) {
 }
 
 /**
- * Asks whether the reason of an event is to be erased.
+ * Asks whether to erase the reason of an event.
  *
  * @param {string} session
- * @param {string} number the event's
+ * @param {string} number the event's number
  */
 export function askErasureOfReason(session, number) {
   askReason({
     heading: "Erase this reason",
     consequence:
-      "The reason leaves the database for good, also where the study’s audit trail repeats it. Backups and exports " +
-      "made earlier still hold it. The event stays, and the audit trail says that its words were erased, by whom and " +
+      "The reason is permanently deleted from the database, also where the study’s audit trail repeats it. Earlier " +
+      "backups and exports still hold it. The event stays, and the audit trail says that its words were erased, by whom and " +
       "why. Do not repeat the words here.",
-    go: "Erase for good",
+    go: "Erase permanently",
     danger: true,
     done: (reason) => erase(session, { subject: "event", record: number, reason }),
   });
 }
 
 /**
- * Erases words, and shows the page without them.
+ * Erases words, and reloads the page.
  *
  * @param {string} session
  * @param {Api.NewErasure} erasure

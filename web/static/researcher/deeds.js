@@ -1,4 +1,4 @@
-// What a researcher does to a session: correct, add notes, erase words, record a withdrawal, unblind.
+// A researcher's actions on a session: correct, add notes, erase words, record a withdrawal, unblind.
 
 import { get, inWords, post } from "../shared/api.js";
 import { askConfirmed, askReason } from "../shared/dialogs.js";
@@ -18,7 +18,7 @@ import { outstandingWords } from "./timeline_words.js";
 const page = byId("session").dataset;
 const session = page.session ?? "";
 const ended = page.ended === "true";
-/** Empty where the session is outside any study. */
+/** Empty if the session is outside any study. */
 const study = page.study ?? "";
 
 /** @param {string} moment */
@@ -26,13 +26,13 @@ function timeOfDay(moment) {
   return new Date(moment).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
 }
 
-/** What a surgeon's tablet may still hold, in words; null where nothing may be outstanding. */
+/** Says what a surgeon's tablet may still hold; null if nothing is outstanding, or if the server does not answer. */
 async function outstandingNow() {
   try {
     const { outstanding } = await get("/api/researcher/sessions/{session}", { session });
     return outstandingWords(outstanding, timeOfDay);
   } catch {
-    // Where the server does not answer now, it will ask when it is told to unblind.
+    // The server checks this again when it is told to unblind.
     return null;
   }
 }
@@ -50,8 +50,8 @@ async function unblind() {
     "export will always say so. The surgeon’s and operator’s pages still do not show the policies.";
 
   const ofStudy =
-    `This session belongs to study ${study}, which stays blinded. To unblind one session alone is an emergency ` +
-    `measure. Who did it and why stands in every export: name no policy in the reason.${late}`;
+    `This session belongs to study ${study}, which stays blinded. Unblinding a single session is an emergency ` +
+    `measure. Every export says who did it and why, so do not name a policy in the reason.${late}`;
 
   const isEmergency = !ended || study !== "";
   const asked = {
@@ -76,7 +76,7 @@ async function unblind() {
   else askReason({ ...asked, done: (reason) => done(reason) });
 }
 
-// Each of these is there only where the session allows it.
+// Each of these buttons exists only if the session allows it.
 document.getElementById("unblind")?.addEventListener("click", unblind);
 document.getElementById("withdraw")?.addEventListener("click", () => askWithdrawal(session));
 document.getElementById("erase-all")?.addEventListener("click", () => askErasureOfAll(session));

@@ -1,5 +1,5 @@
-// The focus metric over time, below the timeline. Each policy has a metric of its own, so each setting has a scale of
-// its own: what can be compared is the course within a setting.
+// Draws the focus metric over time, below the timeline. Each policy has its own metric, so each setting has its own
+// scale. Values can be compared only within a setting.
 
 import { movePlayhead, playheadLine, shape } from "./svg.js";
 import { metricPath, Scale } from "./timeline.js";

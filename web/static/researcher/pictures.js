@@ -1,5 +1,5 @@
-// The pictures of a recording as they come from the server: a few at a time, ahead of playback, and forgotten when
-// they are far behind.
+// Loads the pictures of a recording from the server: a few at a time, ahead of playback. The oldest ones are dropped
+// when there are too many.
 
 /**
  * @template Picture
@@ -17,22 +17,22 @@ export class Pictures {
   #atOnce;
   #kept;
 
-  /** Those that are there, the one that came last at the end. @type {Map<number, Arrived<Picture>>} */
+  /** The pictures that have arrived, by frame, the latest at the end. @type {Map<number, Arrived<Picture>>} */
   #there = new Map();
   /** @type {Map<number, AbortController>} */
   #coming = new Map();
-  /** Those that are needed, the most urgent first. @type {number[]} */
+  /** The frames that are needed, the most urgent first. @type {number[]} */
   #wanted = [];
 
   /**
    * @param {object} options
    * @param {(frame: number, signal: AbortSignal) => Promise<Picture>} options.load
-   * @param {(error: unknown) => string | null} options.explain why the server has no such picture, in words; null where
-   *   it did not answer
-   * @param {(frame: number) => void} options.arrived
-   * @param {(error: unknown) => void} options.failed the server did not answer
-   * @param {number} [options.atOnce] pictures asked for at the same time
-   * @param {number} [options.kept] pictures that are kept
+   * @param {(error: unknown) => string | null} options.explain says why the server has no such picture; null if it did
+   *   not answer
+   * @param {(frame: number) => void} options.arrived called when a picture, or the reason why there is none, arrives
+   * @param {(error: unknown) => void} options.failed called when the server does not answer
+   * @param {number} [options.atOnce] how many pictures are requested at the same time
+   * @param {number} [options.kept] how many pictures are kept
    */
   constructor({ load, explain, arrived, failed, atOnce = 4, kept = 60 }) {
     this.#load = load;
@@ -49,7 +49,7 @@ export class Pictures {
   }
 
   /**
-   * Asks for the pictures of `frames`, the most urgent first, and no longer for others.
+   * Requests the pictures of `frames`, the most urgent first, and cancels all other requests.
    *
    * @param {number[]} frames
    */
@@ -64,7 +64,7 @@ export class Pictures {
     this.#ask();
   }
 
-  /** Forgets all pictures: they are wanted in another size. */
+  /** Drops all pictures, because they are now wanted in another size. */
   clear() {
     this.want([]);
     for (const frame of [...this.#there.keys()]) this.#forget(frame);
@@ -91,7 +91,7 @@ export class Pictures {
       else if (!coming.signal.aborted) this.#failed(error);
     }
 
-    // Asked for no longer.
+    // This request was cancelled meanwhile.
     if (this.#coming.get(frame) !== coming) {
       close(arrived?.picture);
       return;
@@ -120,7 +120,7 @@ export class Pictures {
 }
 
 /**
- * Gives back a bitmap's memory.
+ * Releases a bitmap's memory.
  *
  * @param {any} picture
  */

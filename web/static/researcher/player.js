@@ -7,13 +7,13 @@ import { momentText, valuesAt } from "./player_words.js";
 import { Playhead } from "./playhead.js";
 import { Track } from "./track.js";
 
-/** Pictures asked for ahead of playback: a second at 25 a second. */
+/** How many pictures are requested ahead of playback: one second at 25 pictures a second. */
 const AHEAD = 25;
 
-/** A comment is played from so long before it, in seconds: what it is about was seen before it was said. */
+/** Playback begins this many seconds before a comment, because what it is about was seen before it was said. */
 const BEFORE_COMMENT = 3;
 
-/** Keys that an element of this kind needs for itself. */
+/** Elements that need the keys for themselves. */
 const TYPING = "input:not([type=range]), textarea, select, dialog";
 
 export class Player {
@@ -29,7 +29,7 @@ export class Player {
   #size = "cell";
   /** The frame on the canvas. @type {number | null} */
   #drawn = null;
-  /** When the playhead was moved last, in milliseconds; null while it stands. @type {number | null} */
+  /** When playback last moved the playhead, in milliseconds; null while it is paused. @type {number | null} */
   #movedAt = null;
 
   #canvas = byId("player-picture", HTMLCanvasElement);
@@ -71,7 +71,7 @@ export class Player {
     return this.#track.spans();
   }
 
-  /** Seconds of the timeline. */
+  /** Where the playhead is, in seconds of the timeline. */
   get seconds() {
     return this.#playhead.seconds;
   }
@@ -83,7 +83,7 @@ export class Player {
   }
 
   /**
-   * Plays from a little before `seconds`, when something was said.
+   * Plays from a little before `seconds`, the time of a comment.
    *
    * @param {number} seconds
    */
@@ -122,7 +122,7 @@ export class Player {
 
     if (event.key === "ArrowLeft") this.#step(-1);
     else if (event.key === "ArrowRight") this.#step(1);
-    // A button or link does its own work.
+    // On a button or link the space bar has its usual effect.
     else if (event.key === " " && !target.closest("button, a")) this.#toggle();
     else return;
     event.preventDefault();
@@ -157,7 +157,7 @@ export class Player {
       this.#movedAt = null;
       return;
     }
-    // After a long pause, as of a hidden page, it goes on where it was.
+    // After a long gap, for example while the page was hidden, playback continues where it was.
     const elapsed = Math.min((now - (this.#movedAt ?? now)) / 1000, 0.25);
     this.#movedAt = now;
     this.#playhead.advance(elapsed, (frame) => this.#pictures.get(frame) !== undefined);

@@ -1,8 +1,8 @@
-// Playback in words.
+// Texts beside the playback.
 
 import { nearestPoint, powerOf, settingAt } from "./timeline.js";
 
-/** Values further than this from the moment on screen say nothing about it. In seconds. */
+/** Values further away in time than this are not shown for the moment on screen. In seconds. */
 const NEAR = 2;
 
 /**
@@ -18,7 +18,7 @@ export function momentText(seconds) {
 }
 
 /**
- * What is known of the moment on screen, as names and values.
+ * The values known for the moment on screen, as pairs of name and value.
  *
  * @param {Api.Timeline} timeline
  * @param {string[]} policies

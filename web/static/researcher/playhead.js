@@ -1,36 +1,36 @@
-// Where playback stands on the timeline, and how it moves: never past a picture that has not come yet.
+// Where playback is on the timeline, and how it moves. It never moves past a picture that has not arrived yet.
 
-/** More pictures a second than this nobody can tell apart: faster playback leaves frames out. */
+/** Nobody can distinguish more pictures per second than this. Faster playback leaves frames out. */
 const MOST_A_SECOND = 30;
 
 /** @typedef {import("./track.js").Track} Track */
 
 export class Playhead {
-  /** Seconds of the timeline. */
+  /** Position on the timeline, in seconds. */
   seconds;
   playing = false;
-  /** Seconds of the timeline that pass in a second. */
+  /** Seconds of the timeline that pass in one second. */
   speed = 1;
   /** Whether it waits for a picture. */
   waiting = false;
 
   #track;
-  /** Frames a second of the recording, which take a while to find out. */
+  /** Frames per second of the recording. Kept here because computing it takes a while. */
   #rate;
 
-  /** @param {Track} track with at least one frame */
+  /** @param {Track} track must have at least one frame */
   constructor(track) {
     this.#track = track;
     this.#rate = track.rate;
     this.seconds = track.secondsOf(0);
   }
 
-  /** The frame to show; null where nothing was recorded. */
+  /** The frame to show; null if nothing was recorded at this moment. */
   get frame() {
     return this.#track.at(this.seconds);
   }
 
-  /** Begins to play: from the start again where the end was reached. */
+  /** Starts to play. If the end was reached, it starts again from the beginning. */
   play() {
     if (this.#track.before(this.seconds) === this.#track.length - 1) this.seconds = this.#track.secondsOf(0);
     this.playing = true;
@@ -47,24 +47,24 @@ export class Playhead {
   }
 
   /**
-   * Goes `count` frames on, or back where it is negative, and pauses.
+   * Moves `count` frames forward, or backward if it is negative, and pauses.
    *
    * @param {number} count
    */
   step(count) {
     this.pause();
     const here = this.#track.before(this.seconds);
-    // Between two recordings, one step back leads to the frame before.
+    // Between two recordings, one step back leads to the last frame of the earlier one.
     const from = count < 0 && this.frame === null ? here + 1 : here;
     this.seconds = this.#track.secondsOf(from + count);
   }
 
   /**
-   * Moves on by `elapsed` seconds of playing, over gaps, and as far as `isThere` says of each frame that its picture
-   * is there.
+   * Moves on by `elapsed` seconds of playing. It skips gaps, and goes no further than the last frame whose picture is
+   * there.
    *
    * @param {number} elapsed
-   * @param {(frame: number) => boolean} isThere
+   * @param {(frame: number) => boolean} isThere whether a frame's picture has arrived
    */
   advance(elapsed, isThere) {
     const track = this.#track;
@@ -90,7 +90,7 @@ export class Playhead {
   }
 
   /**
-   * The frames whose pictures are needed now and next, `count` at most.
+   * The frames whose pictures are needed now and next, at most `count`.
    *
    * @param {number} count
    */
@@ -104,7 +104,7 @@ export class Playhead {
     for (let next = first + step; next < this.#track.length && frames.length < count; next += step) {
       if (!frames.includes(next)) frames.push(next);
     }
-    // One step back is as likely as one on, while it stands.
+    // While playback is paused, a step back is as likely as a step forward.
     if (!this.playing && first > 0) frames.splice(2, 0, first - 1);
     return frames.slice(0, count);
   }

@@ -1,4 +1,4 @@
-// One session over time as the researcher sees it: the timeline, its recording and the list of comments move together.
+// The researcher's page of one session over time. The timeline, the recording and the list of comments move together.
 
 import { get, inWords } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
@@ -27,9 +27,9 @@ let player = null;
 let pointOut = () => {};
 /** Moves the playhead on the timeline. @type {(seconds: number) => void} */
 let movePlayhead = () => {};
-/** Turns pixels of the timeline into seconds. @type {Scale | null} */
+/** Converts pixels of the timeline into seconds. @type {Scale | null} */
 let scale = null;
-/** The last comment that playback has come past; -1 before the first. */
+/** The last comment that playback has passed; -1 before the first. */
 let passed = -1;
 
 const NARROWEST_DRAWING = 320;
@@ -44,7 +44,7 @@ function withFocalPath() {
 
 async function load() {
   try {
-    // That the focal path is looked at is recorded, so only where it is shown.
+    // The server records that somebody looked at the focal path. So it is loaded only if it is shown.
     timeline = withPath
       ? await withFocalPath()
       : await get("/api/researcher/sessions/{session}/course", { session });
@@ -62,7 +62,7 @@ async function load() {
 }
 
 /**
- * Offers to play what was recorded. Without a recording, the page is as it would be without this.
+ * Opens the player for the session's recordings. If there are none, it leaves the page as it is.
  *
  * @param {Api.Timeline} shown
  */
@@ -89,7 +89,7 @@ async function openPlayer(shown) {
 }
 
 /**
- * Points out comments as playback comes past them.
+ * Follows the playhead, and points out comments as playback passes them.
  *
  * @param {number} seconds
  * @param {boolean} playing
@@ -142,7 +142,7 @@ function listComments(comments) {
 function besideComment(comment) {
   const { key, kind, note, erased } = comment;
   const isVoice = kind === "voice";
-  // Of a voice comment the note is what was said: it stands in the line itself.
+  // The note on a voice comment is the text that was typed out. It is shown in the line itself.
   const noted = note && !isVoice ? make("p", { className: "note" }, `Note: ${note}`) : null;
   const button = (
     /** @type {string} */ label,
@@ -151,7 +151,7 @@ function besideComment(comment) {
   ) => make("button", { type: "button", className: `small ${level}`, onclick }, label);
   const write = () => (isVoice ? askTranscript(session, comment) : askNote(session, key, note ?? ""));
   const deeds = ended ? [button(isVoice ? "Type out…" : "Note…", "", write)] : [];
-  // Where only the sound is gone, its typed words can still be erased.
+  // If only the sound was erased, the typed words can still be erased.
   const hasWords = !erased || (isVoice && note);
   if (ended && kind !== "mark" && hasWords) {
     deeds.push(button("Erase…", "danger", () => askErasure(session, "comment", key)));
@@ -161,7 +161,7 @@ function besideComment(comment) {
 }
 
 /**
- * Answers that do not count: given on another device than a later one, or too late.
+ * Lists the answers that do not count, because another device gave a later one or because they arrived too late.
  *
  * @param {Api.SetAside[]} answers
  */
@@ -186,14 +186,14 @@ function choose(index) {
   }
   const line = lines[index];
   if (!line) return;
-  // While the recording plays, the page stays where its picture is.
+  // If there is a player, the page must not scroll away from its picture.
   if (player) scrollWithin(byId("comment-list"), line);
   else line.scrollIntoView({ block: "nearest" });
 }
 
 /**
- * Points out a comment that the keyboard has come to. A tap does so when it ends: to scroll while
- * it lasts would move the comment from below the finger.
+ * Points out a comment that was reached with the keyboard. A tap points out its comment only when it ends, because
+ * scrolling earlier would move the comment away from under the finger.
  *
  * @param {FocusEvent} event
  * @param {number} index
@@ -203,7 +203,7 @@ function reach({ currentTarget }, index) {
 }
 
 /**
- * Brings `line` into sight within `list`, and scrolls nothing else.
+ * Scrolls `list` so that `line` is visible, and scrolls nothing else.
  *
  * @param {HTMLElement} list
  * @param {HTMLElement} line
@@ -216,7 +216,7 @@ function scrollWithin(list, line) {
 }
 
 /**
- * Points out a comment, and plays what was seen before it.
+ * Points out a comment, and plays the recording from a little before it.
  *
  * @param {number} index
  */
@@ -225,7 +225,7 @@ function jump(index) {
   const comments = timeline?.comments ?? [];
   const comment = comments[index];
   if (!comment) return;
-  // What was said before the place where playback begins is not pointed out instead.
+  // Keeps playback, which begins earlier, from pointing out an earlier comment instead.
   passed = comments.length;
   player?.playBefore(comment.seconds);
 }
@@ -253,7 +253,7 @@ function draw() {
 }
 
 /**
- * Whether to draw the metric: beside a recording that is played, if a policy had any.
+ * Whether to draw the metric: only if there is a player, and if a policy had a metric.
  *
  * @param {Api.Timeline} shown
  */

@@ -7,7 +7,7 @@ import "../shared/sign_in.js";
 const definition = byId("definition", HTMLTextAreaElement);
 const go = byId("plan-go", HTMLButtonElement);
 
-/** The sites that were named: none stands for all. */
+/** The sites that were named. An empty list means all sites. */
 function sites() {
   const named = byId("sites", HTMLInputElement).value.split(",");
   return named.map((site) => site.trim()).filter((site) => site !== "");

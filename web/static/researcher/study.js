@@ -1,4 +1,4 @@
-// One study: every change of it asks who does it, and why.
+// The page of one study. Every change asks for a reason, and some changes for the passphrase again.
 
 import { get, post } from "../shared/api.js";
 import { askConfirmed, askReason } from "../shared/dialogs.js";
@@ -12,11 +12,11 @@ const study = byId("study").dataset.study ?? "";
 /** @typedef {import("../shared/dialogs.js").Ask} Ask */
 
 /**
- * Makes the change, signed by whoever is signed in, and shows what became of the study.
+ * Makes the change in the name of the person who is signed in, and reloads the page.
  *
  * @param {Api.StudyAction} change
  * @param {string} reason
- * @param {string} [passphrase] asked for once more
+ * @param {string} [passphrase] entered again for this change
  */
 async function make(change, reason, passphrase) {
   const path = "/api/researcher/studies/{study}/changes";
@@ -111,7 +111,7 @@ function withdraw(button) {
     {
       heading: `${participant} withdrew`,
       consequence:
-        "What becomes of the place is stated in the plan. From now on the session’s data stay out of exports.",
+        "The plan says what happens to the place. From now on the session’s data stay out of exports.",
       go: "Record the withdrawal",
       danger: true,
     },
@@ -122,7 +122,7 @@ function withdraw(button) {
 /** @type {Record<string, () => void | Promise<void>>} */
 const actions = { open, close, lock, unblind };
 for (const [id, action] of Object.entries(actions)) {
-  // The page has the buttons that fit where the study stands.
+  // The page has only those buttons that fit the study's state.
   document.getElementById(id)?.addEventListener("click", async () => {
     try {
       await action();

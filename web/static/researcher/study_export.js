@@ -1,5 +1,5 @@
-// The study's export: started here, made by the server, downloaded here. The page asks how far it has come; it may be
-// closed meanwhile.
+// The study's export. It is started here, made by the server, and downloaded here. The page asks for its progress, and
+// may be closed meanwhile.
 
 import { get, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
@@ -8,11 +8,11 @@ import { failedWords, progressShare, progressWords, readyWords } from "./study_e
 
 const PATH = "/api/researcher/studies/{study}/export";
 
-/** Between two questions how far it has come. */
+/** Time between two requests for the progress. */
 const ASK_AGAIN_MS = 1000;
 
 /**
- * Shows how the export of `study` stands, and starts one when asked to.
+ * Shows the state of the export of `study`, and starts an export when a button is pressed.
  *
  * @param {string} study
  */
@@ -34,7 +34,7 @@ export function showExport(study) {
     });
   }
 
-  /** Asks until it is finished: a server that does not answer may answer again. */
+  /** Asks for the state until the export is finished. If the server does not answer, it is asked again. */
   async function ask() {
     try {
       show(await get(PATH, { study }));

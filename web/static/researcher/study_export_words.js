@@ -1,6 +1,6 @@
-// How a study's export stands, in words.
+// Texts about the state of a study's export.
 
-/** Of the time that an export takes, the share until all sessions are exported; the rest is joining them. */
+/** Fraction of an export's time that is spent on exporting the sessions. The rest is spent on joining them. */
 const EXPORTING = 0.7;
 
 /** @param {number} count */
@@ -14,7 +14,7 @@ function withPolicies(unblinded) {
 }
 
 /**
- * What is being done now.
+ * Says what the export is doing now.
  *
  * @param {Extract<Api.StudyExportState, { state: "running" }>} running
  */
@@ -27,7 +27,7 @@ export function progressWords({ progress, unblinded }) {
 }
 
 /**
- * How much of it is done, 0 to 1.
+ * The fraction of the export that is done, from 0 to 1.
  *
  * @param {Api.StudyExportProgress} progress
  */

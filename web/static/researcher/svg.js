@@ -1,4 +1,4 @@
-// Shapes of the researcher's drawings.
+// SVG shapes for the researcher's drawings.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -15,7 +15,7 @@ export function shape(tag, attributes, text) {
 }
 
 /**
- * A line from top to bottom that shows where playback stands; not drawn until it is moved.
+ * A vertical line that shows where playback is. It is hidden until it is first moved.
  *
  * @param {{ top: number, bottom: number }} edges
  */

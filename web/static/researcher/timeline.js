@@ -1,25 +1,24 @@
-// The timeline's arithmetic: where in the drawing a moment and a focal power lie, and the path
-// between them.
+// The timeline's arithmetic: where a moment and a focal power are in the drawing, and the paths through them.
 
 /** @typedef {Api.Timeline} Timeline */
 /** @typedef {Api.TimelinePoint} Point */
 
-/** The drawing's height, and the room for words around its plot, in pixels. */
+/** The drawing's height, and the space for text around its plot, in pixels. */
 export const HEIGHT = 260;
 const EDGE = { left: 44, right: 12, top: 42, bottom: 26 };
 
-/** Where the path is not drawn, comments stand in the middle. */
+/** Comments are drawn at this focal power if the focal path is not drawn. */
 const MIDDLE = 0.5;
 
 /** Steps between the times below the drawing, in seconds. */
 const TICK_STEPS = [5, 10, 15, 30, 60, 120, 300, 600];
 const LONGEST_TICK_STEP = 900;
 
-/** A time below the drawing needs this much room. */
+/** A time below the drawing needs this many pixels. */
 const TICK_WIDTH = 90;
 
 /**
- * Seconds from the start to the last thing that happened; at least 1.
+ * Seconds from the start to the last thing that happened, at least 1.
  *
  * @param {Timeline} timeline
  */
@@ -29,7 +28,7 @@ export function lengthOf({ settings, pauses, points, comments, set_aside: setAsi
   return Math.max(1, ...spans, ...moments);
 }
 
-/** Turns seconds and focal power into pixels of a drawing of this width. */
+/** Converts seconds and focal power into pixels of a drawing that is `width` pixels wide. */
 export class Scale {
   total;
   width;
@@ -49,7 +48,7 @@ export class Scale {
   }
 
   /**
-   * The seconds at a pixel, within the timeline.
+   * The seconds at a pixel, clamped to the timeline.
    *
    * @param {number} x
    */
@@ -74,8 +73,7 @@ export class Scale {
   }
 
   /**
-   * The box of a span of time, at least `narrowest` pixels wide. One without an end goes on to the
-   * end.
+   * The box of a span of time, at least `narrowest` pixels wide. A span without an end lasts to the timeline's end.
    *
    * @param {{ from: number, to?: number | null }} span
    * @param {number} narrowest
@@ -95,7 +93,7 @@ export class Scale {
 }
 
 /**
- * The focal power that the lens had: as measured, or else as asked for.
+ * The focal power of the lens: as measured, or as asked for if it was not measured.
  *
  * @param {Point} point
  */
@@ -104,7 +102,7 @@ export function powerOf(point) {
 }
 
 /**
- * The focal power at about `seconds`; the middle where no path is drawn.
+ * The focal power at about `seconds`; the middle if there are no points.
  *
  * @param {Point[]} points
  * @param {number} seconds
@@ -115,7 +113,7 @@ export function powerAt(points, seconds) {
 }
 
 /**
- * The point nearest to `seconds`, if there is any.
+ * The point nearest to `seconds`; null if there are no points.
  *
  * @param {Point[]} points
  * @param {number} seconds
@@ -131,7 +129,7 @@ export function nearestPoint(points, seconds) {
 }
 
 /**
- * The setting under way at `seconds`, from 1; null between settings.
+ * The number of the setting under way at `seconds`, counted from 1; null between settings.
  *
  * @param {Timeline["settings"]} settings
  * @param {number} seconds
@@ -144,9 +142,9 @@ export function settingAt(settings, seconds) {
 }
 
 /**
- * The last comment said by `seconds`, by its place; -1 before the first.
+ * The index of the last comment made by `seconds`; -1 before the first.
  *
- * @param {{ seconds: number }[]} comments in whatever order
+ * @param {{ seconds: number }[]} comments in any order
  * @param {number} seconds
  */
 export function lastComment(comments, seconds) {
@@ -159,8 +157,8 @@ export function lastComment(comments, seconds) {
 }
 
 /**
- * A line through `value` of each point, as the `d` of an SVG path. It is broken between settings,
- * where there is no value, and where frames were counted anew.
+ * A line through `value` of each point, as the `d` of an SVG path. It is broken between settings, where there is no
+ * value, and where the count of frames started again.
  *
  * @param {Point[]} points
  * @param {(point: Point) => number | null | undefined} value
@@ -176,8 +174,8 @@ export function linePath(points, value, scale) {
 }
 
 /**
- * The line of the metric between `top` and `bottom`, as the `d` of an SVG path. The greatest metric of each setting
- * lies at the top, 0 at the bottom.
+ * The line of the metric between `top` and `bottom`, as the `d` of an SVG path. The largest metric of each setting is
+ * at the top, 0 at the bottom.
  *
  * @param {Point[]} points
  * @param {Scale} scale

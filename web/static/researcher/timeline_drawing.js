@@ -1,5 +1,5 @@
-// A session's timeline as SVG: settings shaded, pauses hatched, focal power over time, a marker for
-// each comment, and one for each answer that does not count.
+// Draws a session's timeline as SVG: settings shaded, pauses hatched, focal power over time, a marker for each comment,
+// and one for each answer that does not count.
 
 import { make } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
@@ -7,10 +7,10 @@ import { movePlayhead, playheadLine, shape } from "./svg.js";
 import { HEIGHT, linePath, powerAt, powerOf, Scale } from "./timeline.js";
 import { commentWords, description, setAsideWords } from "./timeline_words.js";
 
-/** The height of the strip that says what was recorded. */
+/** The height of the strip that marks what was recorded, in pixels. */
 const STRIP = 4;
 
-/** A setting narrower than this shows its number alone. */
+/** A setting narrower than this, in pixels, shows its number alone. */
 const ROOM_FOR_A_NAME = 70;
 const POLICY_NAME_WIDTH = 130;
 
@@ -24,7 +24,7 @@ const POLICY_NAME_WIDTH = 130;
  * @param {Timeline} timeline
  * @param {object} options
  * @param {Scale} options.scale
- * @param {boolean} options.withPath whether to draw the focal path, which may tell policies apart
+ * @param {boolean} options.withPath whether to draw the focal path, which may reveal the policies
  * @param {string[]} options.policies the policy of each setting; empty while blinded
  * @param {{ from: number, to: number }[]} options.recorded the spans of time that were recorded
  * @param {(comment: number) => void} options.choose called when a comment's marker is pointed at
@@ -72,7 +72,7 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
 }
 
 /**
- * A strip at the foot of the plot.
+ * A strip at the foot of the plot for a span of time that was recorded.
  *
  * @param {{ from: number, to: number }} span
  * @param {Scale} scale
@@ -99,7 +99,7 @@ function settingShapes(span, policies, scale) {
 
   const policy = policies[setting - 1];
   if (policy && isRoomy) {
-    // A name that would leave the picture ends with it.
+    // A name that would reach beyond the drawing is aligned to its right edge.
     const leavesPicture = scale.right - box.x < POLICY_NAME_WIDTH;
     const place = leavesPicture
       ? { x: scale.right, "text-anchor": "end" }
@@ -110,7 +110,7 @@ function settingShapes(span, policies, scale) {
 }
 
 /**
- * Hatched: the lens stood still, whatever was to drive it.
+ * Hatched boxes for the pauses. During a pause the lens stood still, no matter which policy would have driven it.
  *
  * @param {Timeline["pauses"]} pauses
  * @param {Scale} scale
@@ -146,7 +146,7 @@ function axes(scale, withPower) {
       const place = { x: scale.left - 8, y: scale.y(power) + 4, "text-anchor": "end" };
       parts.push(shape("text", { class: "tick", ...place }, power.toFixed(1)));
     }
-    // On two lines: beside it stands the first setting's name.
+    // On two lines, because the first setting's name is beside it.
     parts.push(shape("text", { class: "tick", x: 0, y: 14 }, "focal"));
     parts.push(shape("text", { class: "tick", x: 0, y: 28 }, "power"));
   }
@@ -173,7 +173,7 @@ function commentMarker(comment, { x, y, foot }, choose, jump) {
   );
   group.addEventListener("pointerenter", choose);
   group.addEventListener("click", (event) => {
-    // The drawing below would seek to the comment itself.
+    // Otherwise the drawing below would seek to the moment of the comment itself.
     event.stopPropagation();
     jump();
   });

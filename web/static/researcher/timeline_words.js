@@ -1,11 +1,11 @@
-// The timeline in words.
+// Texts about the timeline.
 
 import { counted } from "../shared/text.js";
 
 /** @typedef {Api.Timeline} Timeline */
 
 /**
- * What the drawing shows, for a screen reader.
+ * Describes the drawing for a screen reader.
  *
  * @param {Timeline} timeline
  * @param {boolean} withPath whether the focal path is drawn
@@ -25,7 +25,7 @@ export function description({ settings, pauses, comments, set_aside: setAside },
 /** @param {Api.TimelineComment} comment */
 export function commentWords(comment) {
   const { kind, note, erased } = comment;
-  // What was said aloud can be read once it was typed out, and then stays when the sound goes.
+  // A voice comment can be read once it was typed out. The text stays when the sound is erased.
   if (kind === "voice" && note) return erased ? `${note} (sound erased on ${erased.slice(0, 10)})` : note;
   if (erased) return `Erased on ${erased.slice(0, 10)}`;
   if (kind === "voice") return "Voice comment, not typed out yet";
@@ -33,7 +33,7 @@ export function commentWords(comment) {
 }
 
 /**
- * What an answer that does not count says, and why it does not.
+ * Text about an answer that does not count: the answer, and why it does not count.
  *
  * @param {Pick<Api.SetAside, "value" | "counted" | "late">} answer
  */
@@ -43,18 +43,18 @@ export function setAsideWords({ value, counted, late }) {
   return `${answerWords(value)} (${why}${instead})`;
 }
 
-/** @param {Api.AnswerValue} value a 0 among points is one that was not given */
+/** @param {Api.AnswerValue} value a 0 among points means that the item was not answered */
 function answerWords(value) {
-  // Nobody answers with nothing: such a text was erased.
+  // Nobody gives an empty answer, so the text was erased.
   if (value === "") return "erased";
   return Array.isArray(value) ? value.map((part) => (part === 0 ? "–" : part)).join(", ") : String(value);
 }
 
 /**
- * What a surgeon's tablet may still hold; null where nothing may be outstanding.
+ * Says what a surgeon's tablet may still hold; null if nothing can be outstanding.
  *
  * @param {Api.Outstanding | null | undefined} outstanding
- * @param {(moment: string) => string} timeOf writes a moment as a time of day
+ * @param {(moment: string) => string} timeOf formats a moment as a time of day
  */
 export function outstandingWords(outstanding, timeOf) {
   if (!outstanding) return null;

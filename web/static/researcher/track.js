@@ -1,11 +1,11 @@
-// The frames of a session's recordings on its timeline: which one was on screen at a moment, and which follow.
+// The frames of a session's recordings on its timeline: which frame was on screen at a moment, and which ones follow.
 
 /** @typedef {Pick<Api.RecordingCourse, "name" | "kind" | "from" | "times_ms">} Recording */
 
-/** A frame is on screen until the next, but not for longer than this: then nothing was recorded. In seconds. */
+/** A frame is on screen until the next one, but for at most this many seconds. After that, nothing was recorded. */
 export const LONGEST = 1;
 
-/** The frames of all recordings, in the order in which they were exposed. A frame is named by its place here. */
+/** The frames of all recordings, in the order of their exposure. A frame is identified by its index in this order. */
 export class Track {
   /** @type {{ seconds: number, recording: Recording, frame: number }[]} */
   #frames;
@@ -23,7 +23,7 @@ export class Track {
   }
 
   /**
-   * When frame `index` was exposed, in seconds of the timeline; the nearest frame's beyond either end.
+   * When frame `index` was exposed, in seconds of the timeline. Beyond either end, the time of the nearest frame.
    *
    * @param {number} index
    */
@@ -33,7 +33,7 @@ export class Track {
   }
 
   /**
-   * The recording of frame `index`, and its place in it.
+   * The recording of frame `index`, and the frame's index within that recording.
    *
    * @param {number} index
    */
@@ -42,7 +42,7 @@ export class Track {
   }
 
   /**
-   * The last frame exposed by `seconds`; -1 before the first.
+   * The index of the last frame exposed by `seconds`; -1 before the first.
    *
    * @param {number} seconds
    */
@@ -58,7 +58,7 @@ export class Track {
   }
 
   /**
-   * The frame that was on screen at `seconds`; null where nothing was recorded.
+   * The index of the frame that was on screen at `seconds`; null if nothing was recorded then.
    *
    * @param {number} seconds
    */
@@ -67,7 +67,7 @@ export class Track {
     return index >= 0 && seconds - this.secondsOf(index) <= LONGEST ? index : null;
   }
 
-  /** Frames a second, as most of them follow one another; 0 of fewer than two. */
+  /** Frames per second, from the median time between frames; 0 if there are fewer than two frames. */
   get rate() {
     const gaps = this.#frames.slice(1).map(({ seconds }, index) => seconds - this.secondsOf(index));
     const middle = gaps.sort((a, b) => a - b)[gaps.length >> 1];

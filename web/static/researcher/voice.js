@@ -1,10 +1,10 @@
-// What a surgeon said aloud, on the researcher's page: played, and its state in words.
+// Voice comments on the researcher's page: their player, and a text about their state.
 
 import { make } from "../shared/dom.js";
 import { clockText, counted } from "../shared/text.js";
 
 /**
- * The player of a voice comment; null where there is nothing to play.
+ * The player of a voice comment, or only its state if no sound is there; null for other comments.
  *
  * @param {string} session
  * @param {Api.TimelineComment} comment
@@ -24,7 +24,7 @@ export function voicePlayer(session, { key, voice, erased }) {
 }
 
 /**
- * How long a recording is, and whether all of it is there.
+ * Says how long a recording is, and whether all of it is there.
  *
  * @param {NonNullable<Api.TimelineComment["voice"]>} voice
  */

@@ -1,7 +1,6 @@
-// Talks JSON with the server, and tells three outcomes apart: it worked, the server refused, nobody
-// answered.
+// Sends JSON to the server, and tells three outcomes apart: success, a refusal by the server, no answer.
 
-/** The server's refusal; its message is written for people. */
+/** A request that the server refused. Its message is written for people. */
 export class Refused extends Error {
   /**
    * @param {number} status
@@ -15,34 +14,33 @@ export class Refused extends Error {
   }
 
   /**
-   * Whether the same request would be refused again: the server itself found a fault in what was
-   * sent.
+   * Whether the same request would be refused again, because the server itself found a fault in it.
    */
   get final() {
     return this.ours && [400, 404, 409, 413, 422].includes(this.status);
   }
 }
 
-/** What a page does when the server wants somebody to sign in. */
+/** Called when the server requires somebody to sign in. */
 let signInNeeded = () => {};
 
-/** @param {() => void} ask called when the server refuses because nobody is signed in who may */
+/** @param {() => void} ask called when the server refuses because nobody with the right to do this is signed in */
 export function onSignInNeeded(ask) {
   signInNeeded = ask;
 }
 
-/** Longer than the server makes somebody wait after failed attempts to sign in. */
+/** The timeout of a request. Longer than the server's delay after failed attempts to sign in. */
 const PATIENCE_MS = 12000;
 
 /**
- * A text that was cut may end with half an emoji, which JSON cannot carry. It is sent as the
- * replacement character.
+ * A text that was cut may end with half an emoji, which JSON cannot carry. The half is sent as the replacement
+ * character.
  *
  * @param {string} _name
  * @param {unknown} value
  */
 function wellFormed(_name, value) {
-  // Older browsers lack the method; the server then refuses the text, and it is back in its box.
+  // Older browsers lack the method. The server then refuses the text, and the text goes back into its box.
   return typeof value === "string" ? (value.toWellFormed?.() ?? value) : value;
 }
 
@@ -102,14 +100,14 @@ function explanation(status) {
 
 /**
  * @param {string} path
- * @param {Record<string, string>} names what stands in place of each `{name}`
+ * @param {Record<string, string>} names the value of each `{name}` in the path
  */
 function fill(path, names) {
   return path.replace(/\{(\w+)\}/g, (_, name) => encodeURIComponent(names[name] ?? ""));
 }
 
 /**
- * Gets what the server has at `path`.
+ * Gets the JSON at `path`.
  *
  * @template {Api.GetPath} Path
  * @param {Path} path
@@ -121,12 +119,12 @@ export async function get(path, names = {}) {
 }
 
 /**
- * Gets the picture that the server has at `path`.
+ * Gets the picture at `path`.
  *
  * @param {string} path
- * @param {Record<string, string>} names what stands in place of each `{name}`
+ * @param {Record<string, string>} names the value of each `{name}` in the path
  * @param {Record<string, string>} query
- * @param {AbortSignal} signal ends the request when it is needed no longer
+ * @param {AbortSignal} signal ends the request when it is no longer needed
  */
 export async function getPicture(path, names, query, signal) {
   const response = await fetch(`${fill(path, names)}?${new URLSearchParams(query)}`, {
@@ -151,7 +149,7 @@ export async function post(path, body, names = {}) {
 }
 
 /**
- * Sends what must not be lost. Only the server's own 204 says that it is on the disk.
+ * Sends data that must not be lost. Only the server's own status 204 confirms that it is on the disk.
  *
  * @param {string} path
  * @param {unknown} body
@@ -162,7 +160,7 @@ export async function keep(path, body) {
 }
 
 /**
- * Sends a piece of sound that must not be lost. Only the server's own 204 says that it is on the disk.
+ * Sends a piece of sound that must not be lost. Only the server's own status 204 confirms that it is on the disk.
  *
  * @param {string} path
  * @param {ArrayBuffer} audio
@@ -174,10 +172,10 @@ export async function keepAudio(path, audio, type) {
 }
 
 /**
- * An error in words.
+ * The text to show for an error.
  *
  * @param {unknown} error
- * @param {string} [noAnswer] the words for a server that did not answer
+ * @param {string} [noAnswer] the text if the server did not answer
  */
 export function inWords(error, noAnswer = "No connection to the server. Try again in a moment.") {
   return error instanceof Refused ? error.message : noAnswer;

@@ -31,9 +31,9 @@ export function pixelsPerCss(canvas) {
 }
 
 /**
- * Keeps the pixels of `canvas` the screen's own, and calls `draw` when they change. Returns a function to
- * call now and then: no event tells reliably that the window has come to a screen with another number of
- * pixels per CSS pixel, as nothing on the page need change its size.
+ * Keeps `canvas` at the screen's own resolution, and calls `draw` when that changes. Call the returned function now
+ * and then: no event reports reliably that the window has moved to a screen with another number of pixels per CSS
+ * pixel, because nothing on the page need change its size.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {() => void} draw

@@ -1,18 +1,18 @@
-// Whether the server is heard, and since when it is not.
+// Whether the server has been heard recently, and when it was last heard.
 
-/** A connection that is lost and back this soon was never missed. */
+/** A lost connection is reported only if the server stays silent for longer than this. */
 const BACK_SOON_MS = 2000;
 
-/** The server says something at least every 5 s. One that says nothing for longer is missed. */
+/** The server sends something at least every 5 s. An open connection that is silent for longer is reported. */
 const SILENCE_MS = 7000;
 
-/** @typedef {{ page: () => number, wall: () => number }} Clock both in milliseconds; anybody may set `wall` */
+/** @typedef {{ page: () => number, wall: () => number }} Clock both in milliseconds; people can set `wall` */
 
 export class Contact {
   #clock;
-  /** When the server was last heard, by the wall clock: this is shown to people. @type {number | null} */
+  /** When the server was last heard, by the wall clock. This is shown to people. @type {number | null} */
   #heardAt;
-  /** The same by the page's clock, which nobody can set; at first when the page was opened. */
+  /** The same by the page's clock, which nobody can set. Initially the time when the page was opened. */
   #heard;
   /** Whether there is no connection. A page begins without one. */
   #isLost = true;
@@ -21,8 +21,8 @@ export class Contact {
 
   /**
    * @param {Clock} clock
-   * @param {{ heardAt: number, certificateEnd: number | null } | null} earlier what an earlier load of the page knew,
-   *   in milliseconds since 1970
+   * @param {{ heardAt: number, certificateEnd: number | null } | null} earlier the values of an earlier load of the
+   *   page, in milliseconds since 1970
    */
   constructor(clock, earlier) {
     this.#clock = clock;
@@ -31,7 +31,7 @@ export class Contact {
     this.#heard = clock.page();
   }
 
-  /** The server said something. */
+  /** Call this whenever the server sends something. */
   heard() {
     this.#heardAt = this.#clock.wall();
     this.#heard = this.#clock.page();
@@ -39,15 +39,15 @@ export class Contact {
   }
 
   /**
-   * The server said until when its certificate is valid.
+   * The server announced until when its certificate is valid.
    *
-   * @param {string | null} until
+   * @param {string | null} until a date that `Date.parse` reads; null if the server has no certificate
    */
   certifiedUntil(until) {
     this.#certificateEnd = until === null ? null : Date.parse(until);
   }
 
-  /** The connection is gone. */
+  /** Call this when the connection is lost. */
   lost() {
     this.#isLost = true;
   }
@@ -57,20 +57,20 @@ export class Contact {
     return this.#heardAt;
   }
 
-  /** When the server's certificate ends, in milliseconds since 1970; null where it has none, or has not said. */
+  /** When the server's certificate ends, in milliseconds since 1970; null if it has none or has not said. */
   get certificateEnd() {
     return this.#certificateEnd;
   }
 
   /**
-   * Whether the server's certificate, as it was last told, has ended by this device's clock. A browser then refuses
-   * the server as it refuses one that it does not trust.
+   * Whether the server's certificate has ended by this device's clock, as far as this page knows. The browser then
+   * refuses the server like any server that it does not trust.
    */
   get isCertificateOver() {
     return this.#certificateEnd !== null && this.#clock.wall() >= this.#certificateEnd;
   }
 
-  /** Whether the server has not been heard for long enough to tell somebody. */
+  /** Whether the server has been silent for so long that somebody should know. */
   get isMissed() {
     const silent = this.#clock.page() - this.#heard;
     return silent > (this.#isLost ? BACK_SOON_MS : SILENCE_MS);

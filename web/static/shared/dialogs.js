@@ -1,4 +1,4 @@
-// Dialogs that ask for something. They stay open, and say why, until it has been done.
+// Dialogs that ask for something. If the action fails, the dialog stays open and shows why.
 
 import { inWords } from "./api.js";
 import { byId, setText } from "./dom.js";
@@ -13,8 +13,7 @@ import { byId, setText } from "./dom.js";
  */
 
 /**
- * Opens `dialog`. On submit it awaits `done()`, and closes if that worked; `trouble` shows why it
- * did not.
+ * Opens `dialog`. On submit it awaits `done()`, and closes if that succeeds. If it fails, `trouble` shows why.
  *
  * @param {HTMLDialogElement} dialog
  * @param {HTMLElement} trouble
@@ -47,7 +46,7 @@ export function askIn(dialog, trouble, done) {
 }
 
 /**
- * Asks whether something is meant.
+ * Asks the person to confirm something.
  *
  * @param {Ask & { done: () => Promise<void> }} ask
  */
@@ -65,7 +64,7 @@ export function askReason(ask) {
 }
 
 /**
- * Asks for a reason, and once more for the passphrase of whoever is signed in.
+ * Asks for a reason, and once more for the passphrase of the person who is signed in.
  *
  * @param {Ask & { done: (reason: string, passphrase: string) => Promise<void> }} ask
  */

@@ -1,7 +1,7 @@
 // Finding and making elements. Text is only ever set as text, never as markup.
 
 /**
- * The element with this id, of the kind that the page's template gives it.
+ * The element with this id. Throws if there is none, or if it is not of class `kind`.
  *
  * @template {HTMLElement} [Kind=HTMLElement]
  * @param {string} id
@@ -39,7 +39,7 @@ export function make(tag, properties = {}, ...children) {
 }
 
 /**
- * Sets text only where it differs, so that screen readers hear changes and nothing else.
+ * Sets the text only if it differs, so that screen readers announce changes and nothing else.
  *
  * @param {HTMLElement} element
  * @param {string} text
@@ -52,8 +52,7 @@ export function setText(element, text) {
 const drawn = new WeakMap();
 
 /**
- * Replaces the children of `parent` only where they differ: nothing is read out twice, and focus
- * and selection stay.
+ * Replaces the children of `parent` only if they differ. So nothing is read out twice, and focus and selection stay.
  *
  * @param {HTMLElement} parent
  * @param {HTMLElement[]} nodes

@@ -1,46 +1,46 @@
 // The part of the picture that the view is fitted to: the bright circle, not the dark sides of the
-// sensor. It stays where it is while the circle trembles or is lost for a while, whatever the focus does.
+// sensor. It does not change while the circle trembles or is lost for a while, whatever the focus does.
 
 /** @typedef {{ width: number, height: number }} Extent */
 /** @typedef {{ x: number, y: number, width: number, height: number }} Region */
 
-/** Shown around the circle, in parts of its radius. */
+/** Width of the margin shown around the circle, as a fraction of its radius. */
 const MARGIN = 0.03;
 
-/** The circle is fitted anew once it has moved or grown by more than this part of its radius ... */
+/** The view is fitted again only if the circle has moved or grown by more than this fraction of its radius. */
 const MOVED = 0.08;
-/** ... to a place that later pictures agree on, to this part of the radius, ... */
+/** Later pictures must agree on the new circle to within this fraction of its radius ... */
 const AGREED = 0.04;
-/** ... for so long. */
+/** ... for this long. */
 const LASTING_MS = 1000;
 
-/** The view then glides there: after so long, 63 % of the way is left behind. */
+/** The view then glides to the new fit. After this long it has covered 63 % of the way. */
 const GLIDE_MS = 150;
-/** Cells by which a glide may be off when it ends. */
+/** A glide ends when it is off by less than this, in mosaic cells. */
 const THERE = 0.25;
 
-/** Follows the bright circle. Lengths in mosaic cells, from the picture's upper left corner. */
+/** Follows the bright circle. Lengths are in mosaic cells, from the picture's upper left corner. */
 export class Fit {
   #glides;
   /** @type {Extent | null} */
   #cells = null;
   /** @type {Stream.Circle | null} */
   #circle = null;
-  /** A circle elsewhere, and since when it has been seen. @type {{ circle: Stream.Circle, since: number } | null} */
+  /** A circle at another place, and since when it is seen. @type {{ circle: Stream.Circle, since: number } | null} */
   #doubted = null;
   /** @type {Region} */
   #target = { x: 0, y: 0, width: 1, height: 1 };
   #region = this.#target;
   #seenAt = 0;
 
-  /** @param {{ glides: boolean }} options whether the view may glide; else it jumps */
+  /** @param {{ glides: boolean }} options whether the view glides to a new fit; otherwise it jumps */
   constructor({ glides }) {
     this.#glides = glides;
   }
 
   /**
-   * Takes in a picture of `cells`, with its circle, if one is seen, at `now` (milliseconds); gives the
-   * part to show.
+   * Updates the fit from a picture of size `cells`, shown at `now` (milliseconds). `circle` is null if none is seen.
+   * Returns the part to show.
    *
    * @param {Extent} cells
    * @param {Stream.Circle | null} circle
@@ -63,7 +63,7 @@ export class Fit {
   }
 
   /**
-   * Whether the circle stands elsewhere by now.
+   * Whether the circle has stayed at a new place for long enough to fit the view again.
    *
    * @param {Stream.Circle} circle
    * @param {number} now
@@ -104,7 +104,7 @@ export class Fit {
 }
 
 /**
- * The part of a picture that holds `circle`; all of it where there is none.
+ * The part of a picture that holds `circle`; the whole picture if there is no circle.
  *
  * @param {Stream.Circle | null} circle
  * @param {Extent} cells

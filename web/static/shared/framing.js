@@ -1,23 +1,22 @@
-// Where the picture stands in its box: fitted, or as far as somebody has zoomed in. Nothing but a person
-// changes the zoom.
+// Where the picture is placed in its box: fitted, or zoomed in by a person. Only people change the zoom.
 
 /** @typedef {import("./fit.js").Extent} Extent */
 /** @typedef {import("./fit.js").Region} Region */
 /** @typedef {{ x: number, y: number }} Point */
 
-/** One can zoom in to this many times the fitted view, and at least to one sensor sample a screen pixel. */
+/** The largest zoom is this many times the fitted view, or one sensor sample per screen pixel if that is more. */
 const LARGEST_ZOOM = 4;
 /** Samples along each side of a mosaic cell. */
 const SAMPLES = 4;
 
-/** What a double tap zooms in by. */
+/** A double tap zooms in by this factor. */
 const DOUBLE_TAP = 2.5;
 
-/** A zoom as good as none. */
+/** A smaller zoom counts as none. */
 const HARDLY = 1.01;
 
 /**
- * Lengths on the page in CSS pixels from the box's upper left corner, on the picture in mosaic cells.
+ * Lengths on the page are in CSS pixels from the box's upper left corner. Lengths on the picture are in mosaic cells.
  */
 export class Framing {
   /** @type {Extent} */
@@ -28,18 +27,18 @@ export class Framing {
   /** @type {Region} */
   #region = { x: 0, y: 0, width: 1, height: 1 };
   /**
-   * What stands in the box's middle, and CSS pixels a cell, as somebody chose; null for the fitted view.
-   * Kept as it was chosen, also while the box has a shape that does not allow it.
+   * The point of the picture in the box's middle, and CSS pixels per cell, as a person chose them; null for the fitted
+   * view. Kept as chosen, even while the box's shape does not allow it.
    *
    * @type {(Point & { scale: number }) | null}
    */
   #chosen = null;
 
   /**
-   * The box has another size, or the screen another number of its pixels per CSS pixel.
+   * Sets the box's size and the screen's density.
    *
-   * @param {Extent} box
-   * @param {number} density
+   * @param {Extent} box in CSS pixels
+   * @param {number} density screen pixels per CSS pixel
    */
   resize(box, density) {
     this.#box = { width: Math.max(1, box.width), height: Math.max(1, box.height) };
@@ -47,7 +46,7 @@ export class Framing {
   }
 
   /**
-   * A picture of `cells` is shown, and `region` is the part to fit.
+   * Sets the size of the picture shown, and the part of it to fit.
    *
    * @param {Extent} cells
    * @param {Region} region
@@ -57,13 +56,13 @@ export class Framing {
     this.#region = region;
   }
 
-  /** Where the picture's upper left corner stands, and CSS pixels a cell. */
+  /** Where the picture's upper left corner is, and CSS pixels per cell. */
   get place() {
     const { x, y, scale } = this.#middle;
     return { left: this.#box.width / 2 - x * scale, top: this.#box.height / 2 - y * scale, scale };
   }
 
-  /** How much larger than fitted the picture is. */
+  /** How many times larger the picture is than in the fitted view. */
   get zoom() {
     return this.#middle.scale / this.#fitted.scale;
   }
@@ -74,10 +73,10 @@ export class Framing {
   }
 
   /**
-   * Zooms by `factor`; what is under `point` stays there.
+   * Zooms by `factor`. The part of the picture under `point` stays there.
    *
    * @param {number} factor
-   * @param {Point} [point] the box's middle, if not given
+   * @param {Point} [point] the box's middle by default
    */
   zoomBy(factor, point = { x: this.#box.width / 2, y: this.#box.height / 2 }) {
     const { left, top, scale } = this.place;
@@ -97,7 +96,7 @@ export class Framing {
   }
 
   /**
-   * Drags the picture, as far as it goes; only where it is zoomed.
+   * Drags the picture, as far as its edges allow. Does nothing in the fitted view.
    *
    * @param {number} dx
    * @param {number} dy
@@ -134,7 +133,7 @@ export class Framing {
     return Math.max(LARGEST_ZOOM * this.#fitted.scale, SAMPLES / this.#density);
   }
 
-  /** What stands in the middle. */
+  /** The point of the picture in the box's middle, and CSS pixels per cell. */
   get #middle() {
     return this.#chosen ? this.#allowed(this.#chosen) : this.#fitted;
   }
@@ -145,7 +144,7 @@ export class Framing {
   }
 
   /**
-   * The nearest to what was chosen that leaves no more of the box empty than the fitted view does.
+   * The view nearest to `chosen` that leaves no more of the box empty than the fitted view does.
    *
    * @param {Point & { scale: number }} chosen
    */

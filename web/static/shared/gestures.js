@@ -1,17 +1,17 @@
-// What fingers and a mouse do on the picture: drag, pinch, double tap.
+// Gestures of fingers and a mouse on the picture: drag, pinch, double tap.
 
 /** @typedef {import("./framing.js").Point} Point */
 
-/** CSS pixels that a finger may move, or two taps lie apart: gloves are not precise. */
+/** CSS pixels that a finger may move during a tap, and that two taps may be apart. Gloves are not precise. */
 const SLOP = 12;
 const NEAR = 40;
 
-/** The longest tap, and the longest time from one to the next, milliseconds. */
+/** The longest tap, and the longest time from one tap to the next, in milliseconds. */
 const TAP_MS = 350;
 const DOUBLE_MS = 400;
 
 /**
- * What gestures move.
+ * The picture that gestures move.
  *
  * @typedef {object} Movable
  * @property {(factor: number, point: Point) => void} zoomBy
@@ -19,10 +19,10 @@ const DOUBLE_MS = 400;
  * @property {(point: Point) => void} toggle
  */
 
-/** Makes pointers into movements. Points in CSS pixels, times in milliseconds. */
+/** Turns pointer events into movements of the picture. Points are in CSS pixels, times in milliseconds. */
 export class Gestures {
   #target;
-  /** Where each pointer is, in the order in which they came. @type {Map<number, Point>} */
+  /** Where each pointer is, in the order in which they went down. @type {Map<number, Point>} */
   #pointers = new Map();
   /** A touch that may become a tap. @type {(Point & { at: number }) | null} */
   #press = null;
@@ -41,7 +41,7 @@ export class Gestures {
    */
   down(id, point, now) {
     this.#pointers.set(id, point);
-    // The second finger of a pinch is no tap, and neither was the first.
+    // A second finger makes this a pinch. Neither finger is a tap then.
     this.#press = this.#pointers.size === 1 ? { ...point, at: now } : null;
     if (this.#pointers.size > 1) this.#tap = null;
   }
@@ -81,7 +81,7 @@ export class Gestures {
   }
 
   /**
-   * The browser has taken the pointer for something else.
+   * The browser has taken over the pointer, for example to scroll.
    *
    * @param {number} id
    */

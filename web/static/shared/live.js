@@ -1,26 +1,26 @@
-// The live connection: one WebSocket a page, for pictures and state. It reconnects by itself.
+// The live connection: one WebSocket per page, for pictures and state. It reconnects by itself.
 
 import { drawAndAcknowledge } from "./pacing.js";
 import { Reconnection } from "./reconnection.js";
 
 const LOOK_MS = 1000;
 
-/** The server closes the connection with this code when the page's link opens nothing any more. */
+/** The server closes the connection with this code when the page's link is no longer valid. */
 const LINK_OVER = 4403;
 
-/** How long the server may learn later how large the picture is on the screen: while it is pinched, it changes. */
+/** Delay before the server is told the picture's size on the screen. During a pinch the size keeps changing. */
 const SCREEN_MS = 150;
 
 /**
- * What a page hears. A picture is to be drawn before `frame` returns.
+ * A page's callbacks. `frame` must draw its picture before it returns.
  *
  * @typedef {object} Listener
  * @property {(frame: Stream.Frame) => void} [frame]
  * @property {(view: any) => void} [session] the session's view, or null
  * @property {(status: any) => void} [status] the devices' state
- * @property {() => void} [heard] the server said something, whatever it was
+ * @property {() => void} [heard] the server sent something, whatever it was
  * @property {(open: boolean) => void} [connection]
- * @property {() => void} [over] the page's link opens nothing any more; no connection is tried again
+ * @property {() => void} [over] the page's link is no longer valid; no connection is tried again
  */
 
 export class Live {
@@ -30,11 +30,11 @@ export class Live {
   /** @type {WebSocket | null} */
   #socket = null;
   #reconnection = new Reconnection();
-  /** Screen pixels that the picture covers. @type {number | null} */
+  /** Screen pixels that the picture covers from left to right. @type {number | null} */
   #screen = null;
-  /** Whether the link opens nothing any more. */
+  /** Whether the page's link is no longer valid. */
   #over = false;
-  /** Whether the server will be told soon. */
+  /** Whether a timer runs that will tell the server `#screen`. */
   #screenWaits = false;
 
   /** @param {"surgeon" | "operator" | "researcher"} role */
@@ -42,11 +42,11 @@ export class Live {
     this.#role = role;
     document.addEventListener("visibilitychange", () => this.#tellVisibility());
 
-    // A network that came back, or a page brought back from the browser's cache, need not wait for its turn.
+    // When the network or a page from the browser's cache comes back, there is no need to wait for the next attempt.
     window.addEventListener("online", () => this.#connectAnew());
     window.addEventListener("pageshow", () => this.#connect());
 
-    // Listeners are added after construction, and must miss nothing.
+    // Connects only later, because listeners are added after construction and must miss nothing.
     queueMicrotask(() => this.#connect());
     setInterval(() => this.#isSilent() && this.#connectAnew(), LOOK_MS);
   }
@@ -57,8 +57,8 @@ export class Live {
   }
 
   /**
-   * The whole picture covers `width` pixels of the screen from left to right: the server sends pictures
-   * of a size to suit.
+   * Tells the server that the whole picture covers `width` pixels of the screen from left to right. The server chooses
+   * the size of its pictures to suit.
    *
    * @param {number} width
    */
@@ -78,8 +78,8 @@ export class Live {
   }
 
   /**
-   * A link that broke silently leaves a socket that looks open; closing it would wait for the other
-   * end.
+   * Opens a new connection without waiting for the old one to close. A link that broke silently leaves a socket that
+   * looks open, and closing it would wait for the other end.
    */
   #connectAnew() {
     const socket = this.#socket;
@@ -184,8 +184,8 @@ function send(socket, message) {
 }
 
 /**
- * Returns a function that waits for an answer and hands its view of the session to `follow`, unless
- * a view came over `live` meanwhile: that one is newer, or soon followed by one that is.
+ * Returns a function that waits for an answer and passes its view of the session to `follow`. If a view came over
+ * `live` meanwhile, the answer is dropped: the other view is newer, or a newer one follows soon.
  *
  * @template View
  * @param {Live} live

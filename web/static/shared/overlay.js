@@ -1,5 +1,4 @@
-// What is drawn on the picture. `scale` is screen pixels per mosaic cell, `line` a line's width in
-// screen pixels.
+// Overlays drawn on the picture. `scale` is screen pixels per mosaic cell, `line` a line's width in screen pixels.
 
 import { contextOf } from "./canvas.js";
 import { markDetail } from "./peaking.js";
@@ -7,14 +6,14 @@ import { markDetail } from "./peaking.js";
 const PATCH_COLOUR = "#5cf2ff";
 const AREA_COLOUR = "#ffffff";
 
-/** Wider pictures are searched for detail at this width, to stay cheap. */
+/** Wider pictures are reduced to this width before the search for detail, to save time. */
 const PEAKING_WIDTH = 640;
 
-/** Cells at the edge of the content area that are not searched: the edge itself is sharp. */
+/** Pixels at the edge of the content area that are not searched, because the edge itself is sharp. */
 const PEAKING_MARGIN = 8;
 
 /**
- * A line that is seen on dark and on bright.
+ * Draws a line that is visible on dark and on bright parts of the picture.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {string} colour
@@ -33,7 +32,7 @@ function stroke(context, colour, width, path) {
 }
 
 /**
- * The patch that the focus is judged by: its four corners.
+ * Draws the four corners of the patch in which the focus is measured.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Stream.Patch} patch
@@ -64,7 +63,7 @@ export function drawPatch(context, patch, scale, line) {
 }
 
 /**
- * The circle that holds the picture.
+ * Draws the content area: the circle that holds the picture.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Stream.Circle} area
@@ -85,9 +84,9 @@ export class Peaking {
   #marks = contextOf(document.createElement("canvas"));
 
   /**
-   * Searches a new picture of `cells`, always at the size of the cells: what counts as sharp does not
-   * depend on the size that the server sends. `area`, if there is one, is the circle outside which there
-   * is nothing to see.
+   * Searches a new picture of `cells` for detail. The search runs at a size that depends on `cells` alone, so what
+   * counts as sharp does not depend on the size that the server sends. Outside the circle `area`, if there is one,
+   * there is nothing to see.
    *
    * @param {ImageBitmap} bitmap
    * @param {import("./fit.js").Extent} cells

@@ -1,6 +1,5 @@
 /**
- * The page's checkboxes for overlays: `apply(name, on)` is called for each now, and whenever one
- * changes.
+ * Calls `apply(name, on)` for each of the page's overlay checkboxes, now and whenever one changes.
  *
  * @param {(name: string, on: boolean) => void} apply
  */

@@ -1,13 +1,13 @@
-// The page asks for the next picture by acknowledging the one before, once that is on screen. A
-// slow tablet or a poor network so gets fewer pictures, and never old ones.
+// The page asks for the next picture by acknowledging the previous one, once that is on screen. So a slow tablet or a
+// poor network gets fewer pictures, but never old ones.
 
 /**
- * Length of a frame message's first field, which is the length of its header: u16, little-endian.
+ * Length of a frame message's first field. The field holds the length of the header: u16, little-endian.
  */
 const LENGTH_BYTES = 2;
 
 /**
- * Takes a frame's message apart: length of the header, header (JSON), JPEG.
+ * Splits a frame message into its parts: length of the header, header (JSON), JPEG.
  *
  * @param {ArrayBuffer} message
  * @returns {{ header: Stream.Header, jpeg: Uint8Array<ArrayBuffer> }}
@@ -37,6 +37,6 @@ export async function drawAndAcknowledge(message, { decode, draw, acknowledge, c
     complain(error);
   }
 
-  // Also after a picture that could not be shown: the next one may be good.
+  // A picture that could not be shown is acknowledged too: the next one may be good.
   acknowledge(header.frame);
 }

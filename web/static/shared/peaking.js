@@ -1,17 +1,17 @@
-// Focus peaking: marks the finest detail, which only what is in focus has.
+// Focus peaking: marks the finest detail. Only parts of the picture that are in focus have it.
 
 const MARK_RGBA = [57, 255, 110, 255];
 
-/** What noise alone makes of the measure. */
+/** The measure does not exceed this value through noise alone. */
 const NOISE = 40;
 
 /**
- * Marks the pixels within `circle` that differ most from the mean of their four neighbours (the
- * Laplacian: a blurred edge, however strong, hardly has one): by four times the mean, and by more
- * than noise alone. Taken from green, which carries most of the detail.
+ * Marks the pixels within `circle` that differ most from the mean of their four neighbours: more than four times as
+ * much as the average pixel, and more than by noise alone. This difference is the Laplacian. It is small at a blurred
+ * edge, however strong the edge. Computed from green, which carries most of the detail.
  *
  * @param {Uint8ClampedArray} rgba the picture, `width` by `height` pixels
- * @param {Uint8ClampedArray} marks of the same size, all zero: gets the marks
+ * @param {Uint8ClampedArray} marks receives the marks; of the same size, all zero
  * @param {number} width
  * @param {number} height
  * @param {Stream.Circle | null} circle

@@ -4,8 +4,7 @@ const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 
 /**
- * The server says something at least every 5 s. After this long without a word the connection is
- * dead.
+ * The server sends something at least every 5 s. After this long without a message the connection counts as dead.
  */
 const SILENCE_MS = 12000;
 
@@ -14,7 +13,7 @@ export class Reconnection {
   #heardAt = 0;
 
   /**
-   * The server was heard, or a connection to it was begun.
+   * Call this when the server sends something, or when a connection is begun.
    *
    * @param {number} now milliseconds
    */
@@ -22,7 +21,7 @@ export class Reconnection {
     this.#heardAt = now;
   }
 
-  /** The connection stands. */
+  /** Call this when the connection is open. */
   opened() {
     this.#wait = FIRST_WAIT_MS;
   }
@@ -33,8 +32,8 @@ export class Reconnection {
   }
 
   /**
-   * Milliseconds to wait before the next attempt: twice as long after each, up to a limit.
-   * Randomness keeps the pages of a restarted server from all coming at one moment.
+   * Milliseconds to wait before the next attempt: twice as long after each attempt, up to a limit. The random part
+   * keeps all pages from coming back at the same moment after the server restarts.
    *
    * @param {number} random from 0 to 1
    */

@@ -1,12 +1,12 @@
-// What a browser keeps over a reload. A device may be full, or its owner may have switched storage
-// off: then reading finds nothing and writing returns false, and the page remembers for itself.
+// Storage that survives a reload of the page. A device may be full, or its owner may have switched storage off. Then
+// reading finds nothing and writing returns false, and the page keeps the text in memory.
 
 /**
  * @typedef {object} Store
  * @property {(name: string) => string | null} read
- * @property {(name: string, text: string) => boolean} write whether it is kept
+ * @property {(name: string, text: string) => boolean} write returns whether the text is stored
  * @property {(name: string) => void} remove
- * @property {(prefix: string) => string[]} names
+ * @property {(prefix: string) => string[]} names all stored names that begin with `prefix`
  */
 
 /**

@@ -1,7 +1,7 @@
 // How times and counts are written.
 
 /**
- * Seconds as `1:05`. Time gone by counts whole seconds; for time that is left, pass `Math.ceil`.
+ * Seconds as `1:05`. Elapsed time is rounded down. For remaining time, pass `Math.ceil`.
  *
  * @param {number} seconds
  * @param {(seconds: number) => number} [round]

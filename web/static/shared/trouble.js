@@ -1,9 +1,10 @@
-// Where a page says why something was not done, until the server answers again.
+// Messages on a page that say why something was not done. If the server did not answer, they disappear when it answers
+// again.
 
 import { inWords, Refused } from "./api.js";
 import { setText } from "./dom.js";
 
-/** Elements that say that the server did not answer. */
+/** Elements that show a message until the server answers again. */
 const waiting = new Set();
 
 /**
@@ -11,7 +12,7 @@ const waiting = new Set();
  *
  * @param {HTMLElement} element
  * @param {unknown} error
- * @param {string} [noAnswer] the words for a server that did not answer
+ * @param {string} [noAnswer] the text if the server did not answer
  */
 export function tellTrouble(element, error, noAnswer) {
   if (error instanceof Refused) tell(element, inWords(error));
@@ -38,7 +39,7 @@ export function tellUntilAnswered(element, text) {
   setText(element, text);
 }
 
-/** Takes back what was said about a server that did not answer. */
+/** Clears the messages that were shown until the server answers again. */
 export function serverAnswered() {
   for (const element of waiting) setText(element, "");
   waiting.clear();

@@ -1,6 +1,5 @@
 /**
- * A random UUID, version 4. `crypto.randomUUID` is missing on plain http, which a tablet in theatre
- * uses.
+ * A random UUID, version 4. `crypto.randomUUID` does not exist on plain HTTP, which a tablet in theatre uses.
  *
  * @returns {string}
  */

@@ -16,7 +16,7 @@ const LOOK_MS = 250;
 
 /** A live view within an element, which must be positioned and have a size of its own. */
 export class Viewer {
-  /** The stream, which brings the session and the devices' state too. */
+  /** The live connection. It also brings the session's view and the devices' state. */
   live;
 
   #element;
@@ -91,7 +91,7 @@ export class Viewer {
     return this.#last?.header.frame ?? null;
   }
 
-  /** The server's run that counted the frame on screen. */
+  /** The server's run that the number `frame` belongs to; null before the first frame. */
   get run() {
     return this.#last?.header.run ?? null;
   }
@@ -102,7 +102,7 @@ export class Viewer {
   }
 
   /**
-   * Switches an overlay.
+   * Switches an overlay on or off.
    *
    * @param {Overlay} name
    * @param {boolean} on
@@ -132,7 +132,7 @@ export class Viewer {
     if (!this.#stale.hidden) this.#tellAge();
   }
 
-  /** Puts the picture where it is to stand, and all that depends on it. */
+  /** Puts the picture in its place, and updates everything that depends on that place. */
   #place() {
     if (!this.#last) return;
     const { left, top, scale } = this.#framing.place;
@@ -158,7 +158,7 @@ export class Viewer {
     const context = this.#overlay;
     const { width, height } = context.canvas;
     const drawn = this.#shown.size > 0 ? this.#last : null;
-    // Cleared again for each picture, an empty canvas as large as the view would be composed anew each time.
+    // Clearing an empty overlay for each picture would make the browser composite the whole view again each time.
     if (!drawn && this.#isOverlayClear) return;
     context.resetTransform();
     context.clearRect(0, 0, width, height);
@@ -185,7 +185,8 @@ export class Viewer {
     const isStale = age === null || age > STALE_MS;
     this.#element.classList.toggle("viewer-is-stale", isStale);
 
-    // The seconds count on. A screen reader is told only when the picture stops being live, and when it is again.
+    // The text on screen counts the seconds. Screen readers announce only when the picture stops being live, and when
+    // it is live again.
     if (this.#stale.hidden === isStale) {
       setText(this.#heard, isStale ? "The picture is not live" : "The picture is live again");
     }
@@ -195,7 +196,7 @@ export class Viewer {
 }
 
 /**
- * A picture's extent in mosaic cells, in which places on it are told.
+ * A picture's extent in mosaic cells, the unit of all places on the picture.
  *
  * @param {Stream.Header} header
  */

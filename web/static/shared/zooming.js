@@ -1,12 +1,15 @@
-// Brings what is done on an element, by fingers, mouse, wheel or keys, to the framing of its picture.
+// Applies the input on an element (fingers, mouse, wheel, keys) to the framing of its picture.
 
 import { Gestures } from "./gestures.js";
 
-/** A key zooms by this factor, and moves by this part of the box. */
+/** A key zooms by this factor, or moves by this fraction of the box. */
 const KEY_ZOOM = 1.25;
 const KEY_MOVE = 0.1;
 
-/** What a CSS pixel of the wheel, a line and a page zoom by; a pinch on a touchpad comes as a wheel with Ctrl. */
+/**
+ * Logarithm of the zoom for each CSS pixel of the wheel; CSS pixels of a line and of a page. A pinch on a touchpad
+ * comes as a wheel event with Ctrl.
+ */
 const WHEEL = 0.0015;
 const TOUCHPAD_PINCH = 0.01;
 const LINE = 40;
@@ -16,7 +19,7 @@ const PAGE = 400;
 const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /**
- * Lets people zoom `framing` on `element`; `changed` is called after each change.
+ * Lets people zoom `framing` by input on `element`. Calls `changed` after each change.
  *
  * @param {HTMLElement} element
  * @param {import("./framing.js").Framing} framing
@@ -51,7 +54,7 @@ export function followZooming(element, framing, changed) {
     const before = framing.zoom;
     framing.zoomBy(Math.exp(-event.deltaY * unit * (event.ctrlKey ? TOUCHPAD_PINCH : WHEEL)), pointOf(event));
 
-    // What does not zoom scrolls the page.
+    // A wheel event that does not zoom scrolls the page.
     if (event.ctrlKey || framing.zoom !== before) event.preventDefault();
     changed();
   };

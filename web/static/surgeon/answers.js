@@ -1,17 +1,16 @@
-// Where answers are kept on this device until they are saved: in the outbox, and as drafts while
-// they are being written.
+// Where answers are kept on this device until the server has saved them: in the outbox, or as drafts while they are
+// being written.
 
 export const PATH = "/api/surgeon/answers";
 
 /**
- * The questions of a session: after a setting, by its segment, or at the end, where the segment is
- * null.
+ * A set of questions in a session: those after a setting, named by its segment, or those at the end (null).
  *
  * @typedef {{ session: string, segment: string | null }} Place
  */
 
 /**
- * Where the questions on screen belong.
+ * The place of the questions on screen.
  *
  * @param {Api.SurgeonView} state
  * @returns {Place}
@@ -21,7 +20,7 @@ export function placeOf(state) {
 }
 
 /**
- * The name of a question's place on this device.
+ * The name under which this device keeps the answer to a question.
  *
  * @param {Place} place
  * @param {string} question
@@ -31,8 +30,8 @@ export function slotOf({ session, segment }, question) {
 }
 
 /**
- * Sends text answers that were left half-written, in whatever tab, by questions that are no longer
- * on screen: as they stand.
+ * Sends text answers that were left half-written, in any tab, if their questions are no longer on screen. They are sent
+ * as they are.
  *
  * @param {import("./outbox.js").Outbox} outbox
  * @param {import("./drafts.js").Drafts} drafts

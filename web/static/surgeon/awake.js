@@ -1,5 +1,5 @@
-// Keeps the tablet's screen on while a session is under way (Screen Wake Lock API). A browser takes
-// that back whenever the page goes out of sight, so it is asked again when the page comes back.
+// Keeps the tablet's screen on while a session is under way (Screen Wake Lock API). A browser ends the lock whenever
+// the page is hidden, so the page asks for it again when it is shown.
 
 import { isEnded } from "./words.js";
 
@@ -17,9 +17,9 @@ export class Awake {
 
   /**
    * @param {object} around
-   * @param {(() => Promise<Lock>) | null} around.request null where the browser cannot
-   * @param {() => boolean} around.isVisible whether the page is in sight
-   * @param {() => void} around.changed called when it turns out whether the screen stays on
+   * @param {(() => Promise<Lock>) | null} around.request null if the browser has no such lock
+   * @param {() => boolean} around.isVisible whether the page is visible
+   * @param {() => void} around.changed called when `advice` has changed
    */
   constructor({ request, isVisible, changed }) {
     this.#request = request;
@@ -34,7 +34,7 @@ export class Awake {
     else this.#release();
   }
 
-  /** Asks for what is wanted and not there. The page calls this whenever it comes into sight. */
+  /** Asks for the lock if it is wanted and missing. The page calls this whenever it becomes visible. */
   async ask() {
     if (!this.#wanted || this.#lock || this.#asking || !this.#request || !this.#isVisible()) return;
     this.#asking = true;
@@ -54,7 +54,7 @@ export class Awake {
     lock.addEventListener("release", () => {
       if (this.#lock === lock) this.#lock = null;
     });
-    // The session ended while the browser was asked.
+    // The session ended while the request was under way.
     if (!this.#wanted) this.#release();
   }
 
@@ -71,14 +71,14 @@ export class Awake {
     await lock?.release().catch(() => {});
   }
 
-  /** What somebody has to do for the screen to stay on; empty where the page sees to it. */
+  /** What people have to do to keep the screen on; empty if the page does it. */
   get advice() {
     if (this.#request !== null && !this.#refused) return "";
     return "This browser does not keep the screen on. Set the tablet so that its screen stays on.";
   }
 }
 
-/** How this browser is asked to keep the screen on; null where it cannot be. */
+/** The function that asks this browser to keep the screen on; null if it has none. */
 export function screenLock() {
   // Missing without a secure context, and in older browsers.
   const { wakeLock } = navigator;

@@ -1,4 +1,4 @@
-// Radio buttons as the questions have them: a scale of numbers, or a few choices in words.
+// Radio buttons for the questions: a scale of numbers, or a few choices in words.
 
 import { make } from "../shared/dom.js";
 import { NOT_ANSWERED } from "./questions.js";
@@ -6,11 +6,11 @@ import { NOT_ANSWERED } from "./questions.js";
 /**
  * @typedef {object} Choices
  * @property {HTMLElement} element
- * @property {(point: number | null) => void} check shows which is chosen, from 1
+ * @property {(point: number | null) => void} check shows which button is chosen, counted from 1; null for none
  */
 
 /**
- * Radio buttons from 1 to `points`, with what the ends mean.
+ * Radio buttons from 1 to `points`, with the meanings of both ends.
  *
  * @param {string} name
  * @param {{ points: number, low: string, high: string }} ends
@@ -18,7 +18,7 @@ import { NOT_ANSWERED } from "./questions.js";
  * @returns {Choices}
  */
 export function drawScale(name, { points, low, high }, choose) {
-  // Room for the mark is kept, so that nothing moves when it comes or goes.
+  // The mark always takes up its space, so that nothing moves when it appears or disappears.
   const ends = make(
     "div",
     { className: "ends" },

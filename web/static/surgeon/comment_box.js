@@ -3,14 +3,14 @@
 import { byId, make, setText } from "../shared/dom.js";
 import { followDrafts } from "./device.js";
 
-/** A second tap on the same button within this time is the same tap. */
+/** A second tap on the same button within this time is ignored. */
 const SAME_TAP_MS = 700;
 
 /** A text longer than this gets a taller box. */
 const TALL_LETTERS = 90;
 
 /**
- * Draws `comments`, and passes on what the surgeon does with them.
+ * Draws `comments`, and passes the surgeon's input on to them.
  *
  * @param {import("./comments.js").Comments} comments
  * @param {import("./outbox.js").Outbox} outbox
@@ -108,7 +108,7 @@ export function commentBox(comments, outbox) {
     draw();
   });
   followDrafts(followOtherTabs);
-  // A page that was put to sleep may not have been told.
+  // A page that was asleep may have missed an event.
   document.addEventListener("visibilitychange", () => followOtherTabs());
 
   box.addEventListener("input", () => {

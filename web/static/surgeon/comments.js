@@ -1,17 +1,17 @@
-// The comment that is being written, and those that were said. A comment belongs to the setting
-// under which it was begun, even when the setting changes while it is being written. One begun in
-// another tab is offered, not shown.
+// The comment that is being written, and the comments that were made. A comment belongs to the setting under which it
+// was begun, even if the setting changes while it is being written. A comment begun in another tab is offered, not
+// shown.
 
 import { counted } from "../shared/text.js";
 import { heldWords } from "./words.js";
 
 export const PATH = "/api/surgeon/comments";
 
-/** As much of a draft elsewhere as its button shows. */
+/** How many characters of another tab's draft its button shows. */
 const OFFERED_LETTERS = 16;
 
 /**
- * Where something is said: what was on screen at that moment.
+ * What was on screen when a comment was made.
  *
  * @typedef {object} Place
  * @property {string} session
@@ -25,7 +25,7 @@ const OFFERED_LETTERS = 16;
 /** @typedef {{ kind: "text" | "quick", text: string } | { kind: "mark" }} Said */
 
 /**
- * A comment as it is posted.
+ * A comment in the form that the server expects.
  *
  * @param {Said} what
  * @param {Partial<Place>} place
@@ -40,16 +40,16 @@ function textOf({ value }) {
 }
 
 export class Comments {
-  /** What stands in the box. */
+  /** The text in the box. */
   text = "";
 
-  /** Why the last comment was not saved. */
+  /** Why the last comment was not saved; empty if it was. */
   trouble = "";
 
   #outbox;
   #drafts;
   #here;
-  /** The number of each setting that was on screen. @type {Map<string, number>} */
+  /** The number of each setting that was on screen, by its segment. @type {Map<string, number>} */
   #numbers = new Map();
   /** @type {import("./drafts.js").Draft | null} */
   #draft = null;
@@ -93,17 +93,17 @@ export class Comments {
     this.trouble = "";
   }
 
-  /** What stands in the box is sent as it stands: it is about the session that goes. */
+  /** Sends the text in the box as it is, because it is about the session that is no longer shown. */
   #sendBox() {
     const text = this.text.trim();
-    // A tab that took it over sends it.
+    // If another tab took the draft over, that tab sends it.
     if (!this.#session || text === "" || !this.#draft || this.#draft.claimed) return;
     const about = { session: this.#session, ...this.#begun };
     this.#outbox.add(PATH, comment({ kind: "text", text }, about), null, this.#draft.take());
   }
 
   /**
-   * Half-written comments on sessions that were put away are sent as they stand: their box is gone.
+   * Sends half-written comments on sessions other than `session` as they are, because their box is gone.
    *
    * @param {string | null} session
    */
@@ -118,9 +118,9 @@ export class Comments {
   }
 
   /**
-   * What other tabs do with drafts. One may have sent or taken over the draft in `taken`.
+   * Empties the box if another tab has sent or taken over its draft.
    *
-   * @param {string | null} [taken]
+   * @param {string | null} [taken] the slot of a draft that another tab has sent or taken over
    */
   followOtherTabs(taken = null) {
     if (this.#draft && (this.#draft.isIn(taken) || this.#draft.claimed)) this.write("");
@@ -137,8 +137,8 @@ export class Comments {
   }
 
   /**
-   * What was begun in another tab, while nothing is being written here: its text, whole and
-   * shortened.
+   * The comment begun in another tab, whole and shortened. Null if there is none, or while something is being written
+   * here.
    */
   get offer() {
     if (this.disabled || this.text !== "") return null;
@@ -155,7 +155,7 @@ export class Comments {
     return this.#draft?.elsewhere().find((draft) => textOf(draft) !== "");
   }
 
-  /** Takes over what was begun in another tab; whether there was anything. */
+  /** Takes over the comment begun in another tab. Returns whether there was one. */
   takeOver() {
     const other = this.#begunElsewhere();
     if (!other || !this.#draft) return false;
@@ -166,7 +166,7 @@ export class Comments {
   }
 
   /**
-   * The box now holds `text`.
+   * Sets the text in the box and keeps it as a draft.
    *
    * @param {string} text
    */
@@ -178,13 +178,13 @@ export class Comments {
     this.#draft?.write(text === "" ? null : { text, begun: this.#begun });
   }
 
-  /** Sends what stands in the box; whether there was anything to send. */
+  /** Sends the text in the box. Returns whether there was anything to send. */
   submit() {
     const here = this.#here();
     const text = this.text.trim();
     if (!here || text === "") return false;
 
-    // It was said now, whenever it was begun.
+    // The comment counts as made now, no matter when it was begun.
     const { key } = this.#draft?.take() ?? {};
     this.#outbox.add(PATH, comment({ kind: "text", text }, { ...here, ...this.#begun }), null, { key });
     this.write("");
@@ -193,7 +193,7 @@ export class Comments {
   }
 
   /**
-   * Sends a quick comment or a mark; whether there is a session to say it in.
+   * Sends a quick comment or a mark. Returns false if there is no session to which it could belong.
    *
    * @param {Said} what
    */
@@ -205,7 +205,7 @@ export class Comments {
   }
 
   /**
-   * The outbox has news of an entry.
+   * Call this when an entry of the outbox has changed.
    *
    * @param {import("./outbox.js").Change} change
    */
@@ -231,7 +231,7 @@ export class Comments {
   }
 
   /**
-   * The number of the setting that the box's comment is about, where that is not the one on screen.
+   * The number of the setting that the comment in the box is about; null if that is the setting on screen.
    */
   get aboutOtherSetting() {
     const begun = this.#begun;
@@ -240,7 +240,7 @@ export class Comments {
   }
 
   /**
-   * How far what was said has got.
+   * Whether all comments are saved, with the text to show.
    *
    * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
    */

@@ -1,10 +1,10 @@
-// Asks for a second press before something that cannot be undone. The second press must be meant:
-// neither the other half of a double tap nor one long after.
+// Asks for a second press before something that cannot be undone. The second press must be deliberate: neither the
+// other half of a double tap nor a press long after the first.
 
-/** Sooner than this after the first press it is the same press. */
+/** A press sooner than this after the first one counts as the same press. */
 const SAME_PRESS_MS = 400;
 
-/** Later than this after the first press it is a first press again. */
+/** A press later than this after the first one counts as a first press again. */
 export const FORGOTTEN_MS = 4000;
 
 export class Confirmation {
@@ -12,7 +12,7 @@ export class Confirmation {
   #firstAt = null;
 
   /**
-   * What a press at `now` (milliseconds) is: the first one, the same one again, or the second one.
+   * Takes a press at `now` (milliseconds). Returns whether it is the first one, the same one again, or the second one.
    *
    * @param {number} now
    * @returns {"first" | "same" | "second"}

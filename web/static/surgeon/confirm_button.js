@@ -1,12 +1,12 @@
-// A button that asks for a second press. Its two labels, `.first` and `.second`, lie on each other,
-// so that nothing moves when they change.
+// A button that asks for a second press. Its two labels, `.first` and `.second`, lie on top of each other, so that
+// nothing moves when they change.
 
 import { setText } from "../shared/dom.js";
 import { Confirmation, FORGOTTEN_MS } from "./confirm.js";
 
 /**
- * Calls `done()` at the second press on `button`; `heard` tells screen readers of the first.
- * Returns what forgets the first press.
+ * Calls `done()` at the second press on `button`. The element `heard` announces the first press to screen readers.
+ * Returns a function that forgets the first press.
  *
  * @param {HTMLElement} button
  * @param {HTMLElement} heard
@@ -30,7 +30,7 @@ export function askForSecondPress(button, heard, done) {
     draw(false);
   }
 
-  // A key held down is one press.
+  // A key that is held down counts as one press.
   button.addEventListener("keydown", (event) => event.repeat && event.preventDefault());
   button.addEventListener("click", () => {
     const press = confirmation.press(performance.now());

@@ -1,4 +1,4 @@
-// What this device keeps, joined to the browser: its storage, its clocks, its tabs, its network.
+// Connects everything that this device keeps to the browser: to its storage, clocks, tabs and network.
 
 import { keep, keepAudio } from "../shared/api.js";
 import { storeOn } from "../shared/storage.js";
@@ -22,11 +22,11 @@ export const origins = new Origins(store, clock, uuid);
 export const drafts = new Drafts(store, origins, uuid, tab);
 export const lastView = new LastView(store, document.body.dataset.link ?? "", clock.wall);
 
-/** What to do where this browser keeps nothing; empty where it keeps things. */
+/** What to do if this browser cannot store anything; empty if it can. */
 export const storage = storageAdvice(store);
 
 /**
- * Runs `run` after `ms`; returns what cancels that.
+ * Runs `run` after `ms` milliseconds. Returns a function that cancels it.
  *
  * @param {() => void} run
  * @param {number} ms
@@ -36,7 +36,7 @@ export function later(run, ms) {
   return () => clearTimeout(timer);
 }
 
-/** An outbox that follows this browser's network and its other tabs. */
+/** Opens the outbox for text. It follows this browser's network and other tabs. */
 export function openOutbox() {
   /** @type {import("./disk_store.js").DiskStore<import("./outbox.js").Entry>} */
   const spare = diskStoreOn(() => indexedDB, "parfocal.outbox");
@@ -51,7 +51,7 @@ export function openOutbox() {
   return outbox;
 }
 
-/** An outbox for what is said aloud, which follows this browser's network. */
+/** Opens the outbox for voice. It follows this browser's network. */
 export function openVoiceOutbox() {
   const outbox = new VoiceOutbox({
     store: diskStoreOn(() => indexedDB, "parfocal.voice"),
@@ -74,8 +74,8 @@ export function openVoiceOutbox() {
 const RELOADED = "parfocal.reloaded-for-microphone";
 
 /**
- * Loads the page again, once for each session: a page that was loaded when no voice was asked for
- * may not use the microphone. Whether it is being loaded again.
+ * Loads the page again, but only once for each session. This is needed because a page that was loaded when no voice was
+ * asked for may not use the microphone. Returns whether the page is being loaded again.
  *
  * @param {string} session
  */
@@ -86,7 +86,7 @@ export function reloadForMicrophone(session) {
 }
 
 /**
- * Calls `changed` when another tab has written a draft, and with the draft's slot when it has sent
+ * Calls `changed` with null when another tab has written a draft, and with the draft's slot when another tab has sent
  * it or taken it over.
  *
  * @param {(slot: string | null) => void} changed
@@ -98,8 +98,8 @@ export function followDrafts(changed) {
 }
 
 /**
- * While the page is in sight its tab's name is stored nowhere, so that a tab duplicated from it
- * gets a name of its own.
+ * Stores the tab's name while the page is hidden or being left, and removes it while the page is visible. So a tab that
+ * is duplicated from a visible one gets a name of its own.
  *
  * @param {boolean} leaving
  */

@@ -1,21 +1,20 @@
-// What this device keeps in IndexedDB, which can say when something is on the disk itself: a tablet
-// that loses its power has it still. Where a browser has none, as in some private windows, nothing is
-// kept, and the page says so.
+// Storage in IndexedDB. It can report when something is on the disk itself, so that it survives if the tablet loses its
+// power. If a browser has no IndexedDB, as in some private windows, nothing is kept, and the page says so.
 
 const KEPT = "steps";
 
 /**
- * Where things are kept by their ids.
+ * A store of things by their ids.
  *
  * @template {{ id: string }} Thing
  * @typedef {object} DiskStore
  * @property {() => Promise<Thing[]>} all
- * @property {(thing: Thing) => Promise<boolean>} put whether it is on the disk
+ * @property {(thing: Thing) => Promise<boolean>} put resolves to whether the thing is on the disk
  * @property {(id: string) => Promise<void>} remove
  */
 
 /**
- * A store of this name.
+ * The store called `name`. It is opened at its first use.
  *
  * @template {{ id: string }} Thing
  * @param {() => IDBFactory} factory may throw where storage is switched off
@@ -46,7 +45,7 @@ export function diskStoreOn(factory, name) {
     async put(thing) {
       try {
         const database = await open();
-        // By default browsers leave it to the system when it reaches the disk.
+        // By default browsers leave it to the operating system when data reach the disk.
         const transaction = database.transaction(KEPT, "readwrite", { durability: "strict" });
         transaction.objectStore(KEPT).put(thing);
         await ended(transaction);
@@ -63,7 +62,7 @@ export function diskStoreOn(factory, name) {
         transaction.objectStore(KEPT).delete(id);
         await ended(transaction);
       } catch {
-        // Sent again after a reload, it is known by its key.
+        // If the thing is sent again after a reload, the server recognises its key.
       }
     },
   };
@@ -100,7 +99,7 @@ function ended(transaction) {
   return new Promise((resolve, reject) => {
     transaction.oncomplete = () => resolve();
     transaction.onerror = () => reject(transaction.error);
-    // A full disk aborts it.
+    // A full disk aborts the transaction.
     transaction.onabort = () => reject(transaction.error);
   });
 }

@@ -1,6 +1,6 @@
-// What is being written, kept on this device. A draft belongs to the tab that it is written in.
-// Another tab may take it over when asked to, and sends it as it stands once its place is gone. It
-// carries the key under which it will be sent, so that it is saved once even if two tabs send it.
+// Drafts: texts that are being written, kept on this device. A draft belongs to the tab in which it is written. Another
+// tab may take it over when asked to, and sends it as it is once its place is gone. A draft carries the key under which
+// it will be sent, so that it is saved once even if two tabs send it.
 
 const PREFIX = "parfocal.draft.";
 
@@ -13,14 +13,14 @@ const PREFIX = "parfocal.draft.";
  */
 
 /**
- * A draft of any tab: `rest` is what follows the asked-for start of its name, `owner` its tab,
- * `slot` where it is stored.
+ * A draft of any tab. `rest` is its name without the start that was searched for, `owner` its tab, and `slot` the name
+ * under which it is stored.
  *
  * @typedef {Kept & { rest: string, owner: string, slot: string }} Found
  */
 
 export class Drafts {
-  /** This tab, also after a reload. */
+  /** The name of this tab. It stays the same after a reload. */
   tab;
   #store;
   #origins;
@@ -49,7 +49,7 @@ export class Drafts {
   }
 
   /**
-   * The drafts on this device whose names begin with `start`, of whatever tab.
+   * The drafts on this device whose names begin with `start`, of all tabs.
    *
    * @param {string} start
    * @returns {Found[]}
@@ -63,7 +63,7 @@ export class Drafts {
   }
 
   /**
-   * What stands in `slot`. An older page stored the value alone.
+   * The draft in `slot`; null if there is none. Older versions of the page stored the value alone.
    *
    * @param {string} slot
    * @returns {Kept | null}
@@ -84,10 +84,10 @@ export class Drafts {
   }
 
   /**
-   * A value that is written now, under the key of what was written before it.
+   * Adds a key and the present stamp to a value.
    *
    * @param {any} value
-   * @param {string} [key]
+   * @param {string} [key] the key of the draft's earlier text; a new one if there was none
    * @returns {Kept}
    */
   stamped(value, key = this.#newId()) {
@@ -95,7 +95,7 @@ export class Drafts {
   }
 
   /**
-   * Whether the device keeps it.
+   * Stores a draft. Returns whether the device keeps it.
    *
    * @param {string} slot
    * @param {Kept} kept
@@ -105,7 +105,7 @@ export class Drafts {
   }
 
   /**
-   * Takes a draft of any tab off this device: it is sent, or taken over.
+   * Removes a draft of any tab from this device, because it was sent or taken over.
    *
    * @param {{ slot: string }} draft
    */
@@ -114,7 +114,7 @@ export class Drafts {
   }
 
   /**
-   * Whether `name`, of something in storage, is a draft's.
+   * Whether `name` in the storage belongs to a draft.
    *
    * @param {string} name
    */
@@ -144,13 +144,13 @@ export class Draft {
     this.#stored = this.#kept !== null;
   }
 
-  /** What was being written, or null. */
+  /** The value of the draft, or null. */
   read() {
     return this.#kept?.value ?? null;
   }
 
   /**
-   * Keeps `value`; null forgets it.
+   * Keeps `value` as the draft. Null removes the draft.
    *
    * @param {any} value
    */
@@ -164,8 +164,7 @@ export class Draft {
   }
 
   /**
-   * Gives the key and stamp under which to send what was written, and forgets it. Both are missing
-   * where nothing was written.
+   * Removes the draft, and returns the key and stamp under which to send it. Both are missing if nothing was written.
    *
    * @returns {{ key?: string, given?: Stamp }}
    */
@@ -178,7 +177,7 @@ export class Draft {
   }
 
   /**
-   * Whether this draft stands in `slot`.
+   * Whether this draft is stored in `slot`.
    *
    * @param {string | null} slot
    */
@@ -192,13 +191,13 @@ export class Draft {
     return kept !== null && this.elsewhere().some(({ key }) => key === kept.key);
   }
 
-  /** The drafts of the same thing in other tabs. */
+  /** The drafts with the same name in other tabs. */
   elsewhere() {
     return this.#drafts.of(this.#name).filter(({ rest, owner }) => rest === "" && owner !== this.#drafts.tab);
   }
 
   /**
-   * Takes over `other`, one of those elsewhere.
+   * Takes over `other`, one of the drafts of `elsewhere()`.
    *
    * @param {Found} other
    */

@@ -1,8 +1,8 @@
-// What holds the button down: a finger, the mouse or a key. One at a time talks.
+// Tracks what holds the talk button down: a finger, the mouse or a key. Only one of them can talk at a time.
 
 export class Grip {
   #talk;
-  /** What was pressed last and is not let go yet. @type {string | null} */
+  /** What was pressed last and is not released yet. @type {string | null} */
   #by = null;
 
   /** @param {Pick<import("./talk.js").Talk, "press" | "release" | "state">} talk */
@@ -11,8 +11,8 @@ export class Grip {
   }
 
   /**
-   * Something is pressed. A pedal on which something lies stays down when its recording has ended: it
-   * does not keep a finger from talking, and talks again only when it was let go.
+   * `by` is pressed. A pedal may stay down after its recording has ended, for example because something lies on it. It
+   * then does not keep a finger from talking, and it talks again only after it was released.
    *
    * @param {string} by
    */
@@ -22,7 +22,7 @@ export class Grip {
   }
 
   /**
-   * Something is let go: whether it was what held the button.
+   * `by` is released. Returns whether it was what held the button.
    *
    * @param {string} by
    */
@@ -33,7 +33,7 @@ export class Grip {
     return true;
   }
 
-  /** The page no longer hears whether something is held. */
+  /** Call this when the page can no longer notice whether the button is held. */
   leave() {
     if (this.#by === null) return;
     this.#by = null;

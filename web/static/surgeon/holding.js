@@ -1,6 +1,6 @@
-// Tells the server how much of what was said in a session this device still holds, so that nobody
-// unblinds the session without knowing. It tells once when a session is first shown, and from the
-// session's end on whenever that changes.
+// Tells the server how many comments and answers of a session this device still holds, so that nobody unblinds the
+// session without knowing. It does so once when a session is first shown, and from the session's end on whenever the
+// number changes.
 
 import { Refused } from "../shared/api.js";
 
@@ -10,7 +10,7 @@ const UNDER_WAY = "under way";
 /** @typedef {Api.SurgeonView | null} View */
 
 /**
- * A session that the server does not know needs no telling.
+ * Throws `error` unless it is a final refusal. The server need not be told about a session that it does not know.
  *
  * @param {unknown} error
  */
@@ -25,7 +25,7 @@ export class Holding {
   #unsent;
   #post;
   #later;
-  /** What the server knows, by session. @type {Map<string, string>} */
+  /** What the server was last told, by session. @type {Map<string, string>} */
   #known = new Map();
   #sessions;
   /** @type {View} */
@@ -62,7 +62,7 @@ export class Holding {
   }
 
   /**
-   * Entries and half-written texts. An order of settings that was not confirmed is no answer.
+   * The number of unsent entries and half-written texts. A ranking of settings that was not confirmed does not count.
    *
    * @param {string} session
    */
@@ -84,7 +84,7 @@ export class Holding {
     return shown?.session === session && shown.phase !== "completed" && shown.phase !== "aborted";
   }
 
-  /** What the server does not know yet, or null. */
+  /** The next thing that the server does not know yet, or null. */
   #news() {
     for (const session of this.#outbox.sessions) this.#sessions.add(session);
     for (const session of this.#voice.sessions) this.#sessions.add(session);

@@ -1,4 +1,4 @@
-// Workload indices, and a ranking with shared places, as forms.
+// Forms for workload indices, and for a ranking in which settings may share a place.
 
 import { make } from "../shared/dom.js";
 import { drawScale, drawWords } from "./choices.js";
@@ -7,7 +7,7 @@ import { drawTrack } from "./track.js";
 
 /** @typedef {import("./question_form.js").Drawn} Drawn */
 
-/** Gradations of a workload scale, which count from 0 to 100 in steps of 5. */
+/** Number of gradations of a workload scale: 0 to 100 in steps of 5. */
 const GRADATIONS = 21;
 
 /**
@@ -104,7 +104,7 @@ export function drawPlaces(answer, heading, changed) {
   };
 }
 
-/** The mark of an item that is still open; room for it is kept. */
+/** The mark of an unanswered item. It always takes up its space. */
 function gap() {
   return make("span", { className: "gap" }, NOT_ANSWERED);
 }

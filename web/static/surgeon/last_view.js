@@ -1,22 +1,22 @@
-// The session as the server last told it, kept on this device, so that the page knows where it
-// stands when it is loaded again without a network. It is the surgeon's view, which holds nothing of
-// a policy. It belongs to the link by which the tablet was let in, and goes when the session ends.
+// Keeps the server's last view of the session on this device, so that the page can show it when it is loaded again
+// without a network. It is the surgeon's view, which contains nothing about a policy. It belongs to the link by which
+// the tablet was let in, and is removed when the session ends.
 
 import { isEnded } from "./words.js";
 
 const NAME = "parfocal.last-view";
 
-/** After this long the tablet may be in other hands, and the session on the server elsewhere. */
+/** The view is kept for this long. Later, another person may hold the tablet, and the session may have moved on. */
 const KEPT_MS = 2 * 60 * 60 * 1000;
 
 /** @typedef {Api.SurgeonView} View */
 
 /**
- * What is known of the server while it is not heard.
+ * What is known about the server while it is silent.
  *
  * @typedef {object} Heard
  * @property {number} heardAt when it was last heard, in milliseconds since 1970
- * @property {number | null} certificateEnd when its certificate ends, likewise; null where it has none, or did not say
+ * @property {number | null} certificateEnd when its certificate ends, likewise; null if it has none or has not said
  */
 
 /** @typedef {Heard & { link: string, view: View }} Kept */
@@ -38,7 +38,7 @@ export class LastView {
   }
 
   /**
-   * The server told this view.
+   * Keeps a view that the server has just sent. Forgets the last one if no session is under way.
    *
    * @param {View | null} view
    */
@@ -47,20 +47,20 @@ export class LastView {
       this.forget();
       return;
     }
-    // Time goes on while nobody is heard: what is left then is not known, nor whether a prompt is due.
+    // Time passes while the server is silent. So the remaining time is not known then, nor whether a prompt is due.
     const lasting = { ...view, remaining_seconds: null, prompt: null };
     const certificateEnd = this.#parse()?.certificateEnd ?? null;
     this.#write({ link: this.#link, heardAt: this.#wall(), certificateEnd, view: lasting });
   }
 
-  /** The server told nothing new of the session, and this is what else is known of it. @param {Heard} heard */
+  /** Updates what is known about the server. The kept view stays the same. @param {Heard} heard */
   touch(heard) {
     const kept = this.read();
     if (kept) this.#write({ ...kept, ...heard });
   }
 
   /**
-   * What is kept and may still be shown.
+   * The kept view, if it may still be shown.
    *
    * @returns {Kept | null}
    */
@@ -89,7 +89,7 @@ export class LastView {
 
   /** @param {Kept} kept */
   #write(kept) {
-    // A device that keeps nothing opens the page without it.
+    // If the device cannot store this, the page opens without a last view.
     this.#store.write(NAME, JSON.stringify(kept));
   }
 }

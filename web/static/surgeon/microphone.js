@@ -1,20 +1,19 @@
-// The microphone, and what the browser records of it. What goes wrong is said in a sentence that
-// tells what to do.
+// Records from the microphone. The message of each error says what to do.
 
-/** In the order in which they are preferred. The server takes these and no others. */
+/** Formats of the recording, in order of preference. The server accepts no others. */
 const TYPES = ["audio/webm;codecs=opus", "audio/mp4", "audio/ogg;codecs=opus"];
 
-/** Enough for speech that somebody types out. */
+/** Enough for speech that is transcribed by a person. */
 const BITS_PER_SECOND = 32000;
 
-/** A recording is handed out in pieces of this length. */
+/** A recording is delivered in pieces of this length. */
 const PIECE_MS = 1000;
 
-/** What is wrong, for the person who reads it. */
+/** A problem with the microphone. Its message is written for people. */
 export class MicrophoneTrouble extends Error {}
 
 /**
- * Why this page cannot record at all; empty where it can.
+ * Says why this page cannot record at all; empty if it can.
  *
  * @param {boolean} allowed whether the page was loaded with the right to ask for the microphone
  */
@@ -36,19 +35,19 @@ function recordedType() {
  * A recording under way.
  *
  * @typedef {object} Recording
- * @property {string} type what it is, as the server knows it
+ * @property {string} type media type, one of `TYPES`
  * @property {() => number} level how loud it is now, from 0 to 1
  * @property {() => void} stop
  */
 
 /**
- * What a recording does.
+ * A recording's callbacks.
  *
  * @typedef {object} Heard
  * @property {() => void} started
  * @property {(sound: Blob) => void} piece
- * @property {() => void} lost the microphone was taken away
- * @property {() => void} stopped nothing more comes
+ * @property {() => void} lost the microphone was taken away, or the recorder failed
+ * @property {() => void} stopped the recording has ended; no more pieces come
  */
 
 /**
@@ -100,7 +99,7 @@ async function openMicrophone() {
 }
 
 /**
- * Why the browser gave no microphone.
+ * Says why the browser gave no access to the microphone.
  *
  * @param {string} name of the error
  */
@@ -121,7 +120,7 @@ export function refusalWords(name) {
 }
 
 /**
- * Measures how loud a stream is. Where that cannot be measured the level is 0, and recording goes on.
+ * Measures how loud a stream is. If that is impossible, the level is 0 and the recording continues.
  *
  * @param {MediaStream} stream
  */
@@ -143,7 +142,7 @@ function levelOf(stream) {
   }
 }
 
-/** The quietest sound that the meter shows, in decibels below full scale. */
+/** The quietest sound that the meter shows, in decibels relative to full scale. */
 const QUIETEST_DB = -60;
 
 /**

@@ -1,11 +1,10 @@
-// Whether a tap or a key is meant for the full-screen notice at a change of setting. One that began
-// before the notice was there, or the second half of a double tap, is not. Keys of a comment that
-// is being typed are not either.
+// Decides whether a tap or a key is meant for the full-screen notice at a change of setting. A tap that began before
+// the notice appeared is not, nor is the second half of a double tap, nor are keys of a comment that is being typed.
 
 /** A tap this soon after the notice appeared was meant for what was there before. */
 const NOT_MEANT_MS = 600;
 
-/** A key this soon after another belongs to what was being typed. */
+/** A key this soon after another one belongs to a text that is being typed. */
 const TYPING_MS = 600;
 
 /** @typedef {{ key: string, repeat: boolean, ctrlKey: boolean, metaKey: boolean, altKey: boolean }} Key */
@@ -16,7 +15,7 @@ export class NoticeGuard {
   #typedAt = Number.NEGATIVE_INFINITY;
 
   /**
-   * The notice appeared.
+   * Call this when the notice appears.
    *
    * @param {number} now milliseconds
    */
@@ -25,8 +24,8 @@ export class NoticeGuard {
   }
 
   /**
-   * What to do with a key pressed while the notice is `open`: let it through, swallow it, or write
-   * it into the comment box, where the surgeon was `writing` when the notice appeared.
+   * What to do with a key: let it through, swallow it, or write it into the comment box. Keys always pass unless the
+   * notice is `open`. `writing` says whether the surgeon was writing in the box when the notice appeared.
    *
    * @param {Key} key
    * @param {number} now
@@ -48,8 +47,8 @@ export class NoticeGuard {
   }
 
   /**
-   * Whether a click is meant. Some browsers take a space's release for a click, whatever became of
-   * its press.
+   * Whether a click is meant for the notice. Some browsers turn the release of the space bar into a click, even if its
+   * press was swallowed.
    *
    * @param {number} now
    * @param {boolean} byKey

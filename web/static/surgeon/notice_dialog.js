@@ -6,8 +6,8 @@ import { NoticeGuard } from "./notice.js";
 const TAP = "Tap to continue";
 
 /**
- * `accept(segment)` is called when the surgeon taps the notice of `segment`. A surgeon who is
- * writing in `box` when the notice appears goes on writing there.
+ * Calls `accept(segment)` when the surgeon taps the notice of `segment`. A surgeon who is writing in `box` when the
+ * notice appears can continue to write there.
  *
  * @param {HTMLTextAreaElement} box
  * @param {(segment: string) => void} accept
@@ -23,7 +23,7 @@ export function noticeDialog(box, accept) {
 
   document.addEventListener("keydown", onKey, true);
   dialog.addEventListener("cancel", (event) => event.preventDefault());
-  // A browser may close a dialog against that (Escape, a tablet's back gesture): then it comes back.
+  // A browser may close the dialog all the same (Escape, a tablet's back gesture). Then it is opened again.
   dialog.addEventListener("close", () => segment !== null && dialog.showModal());
 
   /** @param {KeyboardEvent} event */

@@ -1,21 +1,21 @@
-// One line that says what the surgeon can do now. It follows from where the session stands and from
-// what is not saved yet, and so is the same whatever is being tried.
+// One line that says what the surgeon can do now. It is derived from the session's state and from what is not saved
+// yet, so it is the same for every policy.
 
 import { minuteText } from "../shared/text.js";
 
 /** @typedef {Api.SurgeonView} View */
 
 /**
- * What the line follows from.
+ * The facts from which the line is derived.
  *
  * @typedef {object} Facts
  * @property {View | null} view
- * @property {boolean} known whether it is known what is under way
- * @property {boolean} missed whether the server is not heard
+ * @property {boolean} known whether it is known which session, if any, is under way
+ * @property {boolean} missed whether the server has been silent for too long
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
- * @property {boolean} unsent whether a comment stands in the box
- * @property {boolean} unsaved whether anything said is not saved yet
+ * @property {boolean} unsent whether there is a comment in the box
+ * @property {boolean} unsaved whether any comment or answer is not saved yet
  */
 
 /** @param {Facts} facts */
@@ -64,5 +64,5 @@ function unreachableWords(view, heardAt, refused) {
   const why = refused ? `${since} Its certificate has ended: tell the operator.` : since;
   return view === null
     ? `${why} This page keeps trying.`
-    : `${why} You can go on commenting: it is saved here and sent later.`;
+    : `${why} You can continue to comment. Comments are saved here and sent later.`;
 }

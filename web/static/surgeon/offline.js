@@ -1,23 +1,23 @@
-// The service worker that opens this page without a network. Browsers have one only where the page
-// is encrypted and its certificate trusted, or comes from this machine. Elsewhere the page works as
-// it does, and needs the network to be opened.
+// The service worker that opens this page without a network. Browsers allow one only if the page is encrypted and its
+// certificate trusted, or if the page comes from this machine. Otherwise the page works all the same, but needs the
+// network to be opened.
 
 const WORKER = "/surgeon/worker.js";
 const PAGE = "/surgeon";
 
-/** How the worker's caches are called: `offline/worker.js`. */
+/** The names of the worker's caches begin with this (see `offline/worker.js`). */
 const FAMILY = "parfocal-surgeon-";
 
-/** Lets this browser keep the page. */
+/** Registers the worker, so that this browser keeps the page. */
 export async function keepPage() {
   try {
     await navigator.serviceWorker?.register(WORKER, { scope: PAGE });
   } catch {
-    // No room, storage switched off, or a certificate that is not trusted: the page does without.
+    // No space, storage switched off, or a certificate that is not trusted: the page works without the worker.
   }
 }
 
-/** The tablet's link opens nothing any more: this browser is not to open the page by itself either. */
+/** Removes the kept page. If the tablet's link is no longer valid, this browser must not open the page by itself. */
 export async function forgetPage() {
   try {
     const names = await caches.keys();

@@ -1,30 +1,29 @@
-// Where and when something is said: on which device, as which of all that is said there, and how
-// long ago. An entry may wait for the network. Its wait is measured by the page's monotonic clock,
-// which nobody can set.
+// Where and when something is said: on which device, with which sequence number there, and how long ago. An entry may
+// wait for the network. Its wait is measured by the page's monotonic clock, which nobody can set.
 
 const DEVICE = "parfocal.device";
 const SEQUENCE = "parfocal.sequence";
 
 /**
- * A tablet that loses its power forgets the numbers that it gave in its last seconds. Each load of the
- * page leaves out so many, so that none is given twice.
+ * A tablet that loses its power forgets the sequence numbers that it gave in its last seconds. So each load of the page
+ * leaves out this many numbers, so that none is given twice.
  */
 const LEFT_OUT = 1000;
 
 /**
- * The clocks of a hidden page may differ by this much. By more, the device slept, or its clock was
- * set.
+ * The page's clock and the wall clock may drift apart by this much while the page is hidden. If they differ by more,
+ * the device slept, or its clock was set.
  */
 const DRIFT_MS = 1000;
 
 /**
  * @typedef {object} Clock
  * @property {() => number} page milliseconds since this page was loaded; stands still while the device sleeps
- * @property {() => number} wall milliseconds since 1970; anybody may set it
+ * @property {() => number} wall milliseconds since 1970; people can set it
  */
 
 /**
- * What is kept with something that is said. `clock` is missing in entries of an older page.
+ * Kept with everything that is said. `clock` is missing in entries of older versions of the page.
  *
  * @typedef {object} Stamp
  * @property {string} [device]
@@ -39,13 +38,12 @@ export class Origins {
   /** This load of the page: only two readings of one page's clock can be compared. */
   #page;
   /**
-   * The device's name where nothing can be stored: then each load of the page counts as a device.
+   * The device's name if nothing can be stored. Then each load of the page counts as a device of its own.
    */
   #ownDevice;
   #latest = 0;
   /**
-   * For how long the page's clock stood still while the device slept, as far as the wall clock
-   * tells.
+   * For how long, in milliseconds, the page's clock stood still while the device slept, judged by the wall clock.
    */
   #slept = 0;
   /** @type {{ page: number, wall: number } | null} */
@@ -64,7 +62,7 @@ export class Origins {
   }
 
   /**
-   * The page went out of sight or came back: it may have slept meanwhile.
+   * Call this when the page is hidden or shown again: the device may have slept in between.
    *
    * @param {boolean} hidden
    */
@@ -78,7 +76,7 @@ export class Origins {
     this.#hiddenSince = hidden ? { page, wall } : null;
   }
 
-  /** This device: the same in all tabs of its browser. */
+  /** The name of this device: the same in all tabs of its browser. */
   device() {
     const known = this.#store.read(DEVICE);
     if (known) return known;
@@ -98,7 +96,7 @@ export class Origins {
   }
 
   /**
-   * To be kept with what is said now.
+   * A stamp to keep with something that is said now.
    *
    * @returns {Stamp}
    */
@@ -112,7 +110,7 @@ export class Origins {
   }
 
   /**
-   * What the server is told of a stamp at the moment of sending.
+   * The stamp in the form in which it is sent to the server, at the moment of sending.
    *
    * @param {Stamp} stamp
    * @returns {Api.Origin}

@@ -1,10 +1,9 @@
-// Keeps what was said until the server says that it is saved. Every entry is first written to this
-// device, under a key of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. Browsers
-// bring localStorage to the disk some seconds later; a spare copy is there at once, so that a tablet
-// that loses its power loses nothing either. The
-// entry's idempotency key makes sending it twice harmless, and its origin makes the order of
-// sending harmless. What the server refuses stays on this device too, and is tried again when the
-// page is next opened.
+// Keeps comments and answers until the server confirms that they are saved. Every entry is first written to this
+// device, under a key of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. Browsers write
+// localStorage to the disk only some seconds later. A spare copy is on the disk at once, so that a tablet that loses
+// its power loses nothing either. The entry's idempotency key makes sending it twice harmless, and its origin makes the
+// order of sending harmless. What the server refuses also stays on this device, and is tried again when the page is
+// next opened.
 
 import { inWords, Refused } from "../shared/api.js";
 
@@ -15,8 +14,8 @@ const LONGEST_WAIT_MS = 8000;
 /** @typedef {import("./origin.js").Stamp} Stamp */
 
 /**
- * Something said. `slot` is the question that it answers, if it does; `drafted` whether another tab
- * may send the same draft under the same key; `stored` whether this device keeps it over a reload.
+ * A comment or an answer. `slot` is the question that it answers, or null. `drafted` says whether another tab may send
+ * the same draft under the same key. `stored` says whether this device keeps the entry over a reload.
  *
  * @typedef {object} Entry
  * @property {string} id sorts in the order in which things were said
@@ -30,7 +29,7 @@ const LONGEST_WAIT_MS = 8000;
  */
 
 /**
- * What has become of an entry; `heard` says whether the server answered.
+ * A change of an entry's state. `heard` says whether the server answered.
  *
  * @typedef {object} Change
  * @property {Entry} entry
@@ -41,24 +40,24 @@ const LONGEST_WAIT_MS = 8000;
 
 /**
  * @typedef {object} Surroundings
- * @property {import("../shared/storage.js").Store} store at hand at once, in every tab
+ * @property {import("../shared/storage.js").Store} store available at once, in every tab
  * @property {import("./disk_store.js").DiskStore<Entry>} spare a copy that is on the disk itself
  * @property {import("./origin.js").Origins} origins
  * @property {(path: string, body: unknown) => Promise<void>} send resolves once the server has saved it
  * @property {() => string} newId
  * @property {() => number} wall milliseconds since 1970
- * @property {(run: () => void, ms: number) => () => void} later returns what cancels it
+ * @property {(run: () => void, ms: number) => () => void} later returns a function that cancels the call
  */
 
 export class Outbox {
   /**
-   * Why the last attempt failed, if it did.
+   * Why the last attempt to send failed; null if it succeeded.
    *
    * @type {string | null}
    */
   trouble = null;
 
-  /** Settles once what only the spare copy has is here too. @type {Promise<void>} */
+  /** Resolves once the entries that only the spare copy has are restored. @type {Promise<void>} */
   ready;
 
   #around;
@@ -72,7 +71,7 @@ export class Outbox {
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
-  /** What this page has taken off the device, by id. @type {Set<string>} */
+  /** Ids of the entries that this page has removed from the device. @type {Set<string>} */
   #done = new Set();
 
   /** @param {Surroundings} around */
@@ -89,7 +88,7 @@ export class Outbox {
     this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
   }
 
-  /** Takes what the device forgot when it lost its power. What was sent by then is known by its key. */
+  /** Restores entries that the device lost with its power. If one was already sent, the server recognises its key. */
   async #restore() {
     for (const entry of await this.#around.spare.all()) {
       const isElsewhere = this.#around.store.read(PREFIX + entry.id) !== null;
@@ -102,8 +101,8 @@ export class Outbox {
   }
 
   /**
-   * Calls `listener` whenever an entry is added, saved, refused, or could not be sent. Returns what
-   * ends that.
+   * Calls `listener` whenever an entry is added, saved, refused, or could not be sent. Returns a function that ends the
+   * subscription.
    *
    * @param {(change: Change) => void} listener
    */
@@ -123,7 +122,7 @@ export class Outbox {
   }
 
   /**
-   * What the server refused of a session and this device still keeps.
+   * The entries of a session that the server refused and this device still keeps.
    *
    * @param {string} session
    */
@@ -132,7 +131,7 @@ export class Outbox {
   }
 
   /**
-   * How much of what was said in a session this device holds, in all its tabs: not saved yet, or
+   * The number of entries of a session that this device holds in all its tabs, because they are not saved yet or were
    * refused.
    *
    * @param {string} session
@@ -154,15 +153,15 @@ export class Outbox {
   }
 
   /**
-   * Takes something to be sent to `path`.
+   * Adds an entry that is to be sent to `path`.
    *
    * @param {string} path
    * @param {Record<string, unknown>} body
-   * @param {string | null} [slot] the question that it answers, if it does
-   * @param {{ key?: string, given?: Stamp }} [from] the draft that it was written as
+   * @param {string | null} [slot] the question that it answers, or null
+   * @param {{ key?: string, given?: Stamp }} [from] the draft of this entry
    */
   add(path, body, slot = null, from = {}) {
-    // A clock that is set back must not put what is said later before what was said.
+    // If the clock is set back, later entries must still sort after earlier ones.
     this.#latest = Math.max(this.#around.wall(), this.#latest + 1);
     const { key = this.#around.newId(), given = this.#around.origins.stamp() } = from;
 
@@ -185,8 +184,7 @@ export class Outbox {
   }
 
   /**
-   * What the server refused for `slot` is in the surgeon's hands again, who has now given another
-   * answer.
+   * Forgets what the server refused for `slot`, because the surgeon has now given another answer.
    *
    * @param {string} slot
    */
@@ -205,7 +203,7 @@ export class Outbox {
     return this.waiting.filter((entry) => entry.slot === slot || entry.slot?.startsWith(`${slot}/`));
   }
 
-  /** Tries now rather than at the end of the present wait. */
+  /** Tries to send now, without waiting any longer. */
   nudge() {
     this.#cancel();
     this.#wait = FIRST_WAIT_MS;
@@ -213,8 +211,8 @@ export class Outbox {
   }
 
   /**
-   * Waits until nothing for `path` is unsaved: true. False as soon as an attempt at such an entry
-   * failed, or the server did not answer.
+   * Waits until no entry for `path` is waiting, and returns true. Returns false as soon as such an entry could not be
+   * sent, or the server did not answer.
    *
    * @param {string} path
    */
@@ -256,8 +254,7 @@ export class Outbox {
   }
 
   /**
-   * Sends one entry. Returns whether the server answered at all, so that the next entry is worth
-   * trying.
+   * Sends one entry. Returns whether the server answered at all. If it did, the next entry is worth trying.
    *
    * @param {Entry} entry
    * @returns {Promise<boolean>}
@@ -283,7 +280,7 @@ export class Outbox {
    */
   #failed(entry, error) {
     if (error instanceof Refused && error.status === 409 && entry.drafted) {
-      // Another tab has sent an earlier text of the same draft under this key: this one is something else.
+      // Another tab has sent an earlier text of the same draft under this key. This text needs a key of its own.
       entry.drafted = false;
       entry.body.key = this.#around.newId();
       entry.stored = this.#store(entry);
@@ -304,7 +301,7 @@ export class Outbox {
   }
 
   /**
-   * Another tab saved or replaced what both held.
+   * Another tab saved or replaced an entry that both tabs held.
    *
    * @param {string} name the entry's name in storage
    */
@@ -316,7 +313,7 @@ export class Outbox {
   }
 
   /**
-   * Takes `entry` off this device: it is saved, replaced, or in a person's hands again.
+   * Removes `entry` from this device, because it is saved, replaced, or back in its box.
    *
    * @param {Entry} entry
    */
@@ -329,8 +326,8 @@ export class Outbox {
   }
 
   /**
-   * Where and when `entry` was said. Entries of an older page know only the wall clock, and its
-   * answers not even that.
+   * Where and when `entry` was said. Comments from older versions of the page have only the wall clock's time. Answers
+   * from those versions have no time at all.
    *
    * @param {Entry} entry
    */

@@ -1,6 +1,7 @@
-// A tablet whose link opens nothing any more: what it still holds is handed over all the same.
+// The page of a tablet whose link is no longer valid. What the tablet still holds is sent nevertheless.
 
 import { byId, setText } from "../shared/dom.js";
+import { counted } from "../shared/text.js";
 import { lastView, openOutbox, openVoiceOutbox } from "./device.js";
 import { forgetPage } from "./offline.js";
 
@@ -11,11 +12,12 @@ let began = outbox.waiting.length;
 function draw() {
   const left = outbox.waiting.length + voice.waiting;
   began = Math.max(began, left);
-  if (left > 0) setText(byId("held"), `This tablet still holds ${left} of what was said. It is being sent.`);
-  else if (began > 0) setText(byId("held"), "All that this tablet held has been saved.");
+  const held = counted(left, "comment or answer is", "comments and answers are");
+  if (left > 0) setText(byId("held"), `${held} still on this tablet. Sending…`);
+  else if (began > 0) setText(byId("held"), "Everything on this tablet has been saved.");
 }
 
-// Whoever holds the tablet next is not shown where this session stood.
+// The next person to hold the tablet must not see the state of this session.
 lastView.forget();
 forgetPage();
 

@@ -1,5 +1,4 @@
-// The surgeon's page: follows the session's state as the server sends it, and shows the same
-// whatever is being tried.
+// The surgeon's page: follows the session's state as the server sends it. It looks the same for every policy.
 
 import { get, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
@@ -43,7 +42,7 @@ const TICK_MS = 250;
 
 /** @type {View | null} */
 let state = null;
-/** Whether it is known what is under way: the server has said it, or an earlier load of this page has kept it. */
+/** Whether the session under way is known, from the server or from what an earlier load of this page has kept. */
 let known = false;
 /** When the setting's time ends, by the page's clock. @type {number | null} */
 let endsAt = null;
@@ -99,7 +98,7 @@ function here() {
 /* State in */
 
 /**
- * The server told what is under way.
+ * Follows the view that the server has sent; null if no session is under way.
  *
  * @param {View | null} next
  */
@@ -110,7 +109,7 @@ function followServer(next) {
   follow(next);
 }
 
-/** The page was loaded while the server is not heard: it shows the session as it was last told. */
+/** Shows the last view that was kept, if the page was loaded while the server is silent. */
 function followLastView() {
   const last = known ? null : lastView.read();
   if (last) follow(last.view);
@@ -127,7 +126,7 @@ function follow(next) {
   box.follow(state);
   talking.follow(state);
   drawPanel();
-  // After the form has gone, which hands over what stood in it.
+  // Only after the form was removed, because removing it hands over the text that was in it.
   sendLeftAnswers(outbox, drafts, state);
   if (state) questionPanel?.takeAnswers(state);
   holding.follow(state);
@@ -144,14 +143,13 @@ async function refresh() {
   try {
     await followAnswer(get("/api/surgeon/session"));
   } catch (error) {
-    // A server that does not answer is told of at the top, and asked again by the connection.
+    // If the server does not answer, the top of the page says so, and the live connection asks again.
     if (error instanceof Refused) tell(byId("trouble"), error.message);
   }
 }
 
 /**
- * Does `action`. The page then shows what the server's state says, whether this tab or another
- * moved it.
+ * Does `action`. The page then shows the server's state, no matter which tab changed it.
  *
  * @param {Api.Action} action
  */
@@ -171,7 +169,7 @@ async function act(action) {
 }
 
 /**
- * Whether the page still stands where `action` was meant, so that its refusal is news.
+ * Whether the session is still at the point for which `action` was meant, so that its refusal matters.
  *
  * @param {Api.Action} action
  */
@@ -228,7 +226,7 @@ function followStatus(status) {
   setText(byId("device-notice"), status.notice ?? "");
 }
 
-/* What stands over the picture */
+/* Panel over the picture */
 
 function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
@@ -264,7 +262,7 @@ function panelContent() {
   }
 }
 
-/** What to see to before the trial starts, where the browser does not see to it. */
+/** What people have to do before the trial starts, because the browser does not do it. */
 function advice() {
   return [awake.advice, storage].filter((words) => words !== "");
 }
@@ -313,7 +311,7 @@ outbox.subscribe(({ entry, state: reached, reason }) => {
 
   const isLast = outbox.pending(slotOf(place, question)).length === 0;
   if (reached !== "saved" || isLast) questionPanel?.show(question, reached, reason);
-  // Another device may have given a newer answer, which counts: the server knows.
+  // Another device may have given a newer answer, which counts instead. The server knows.
   if (reached === "saved" && isLast) refresh();
 });
 
@@ -333,7 +331,7 @@ viewer.live.listen({
   heard: () => contact.heard(),
   session: followServer,
   status: followStatus,
-  // The session is over for this tablet. What it holds is still sent, and the server says the rest.
+  // The session is over for this tablet. What the tablet holds is still sent. The server's answer says the rest.
   over: () => {
     forgetPage();
     followServer(null);
@@ -368,7 +366,7 @@ function tick() {
 }
 
 document.addEventListener("visibilitychange", () => awake.ask());
-// The next load of the page is to know since when the server was not heard, and whether its certificate has ended.
+// The next load of the page must know since when the server is silent, and whether its certificate has ended.
 addEventListener("pagehide", () => {
   const { heardAt, certificateEnd } = contact;
   if (heardAt !== null) lastView.touch({ heardAt, certificateEnd });

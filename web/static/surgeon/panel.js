@@ -1,11 +1,11 @@
-// What stands over the picture: cards with one thing to say.
+// The panel over the picture. It shows cards, each with a single message, or the questions.
 
 import { byId, make } from "../shared/dom.js";
 
 /** @typedef {{ className: string, nodes: HTMLElement[] }} Content */
 
 /**
- * @param {string} className where the card stands
+ * @param {string} className classes of the panel; they decide where the card is placed
  * @param {string} heading
  * @param {string} text
  * @param {HTMLElement | null} [more]

@@ -1,4 +1,4 @@
-// The questions as a form.
+// Draws the questions as a form.
 
 import { make, setText } from "../shared/dom.js";
 import { drawScale, drawWords } from "./choices.js";
@@ -16,23 +16,23 @@ import { drawTrack } from "./track.js";
 
 /** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
 
-/** Whether settings were recognised, from 1. */
+/** The labels for whether settings were recognised. The values count from 1. */
 const RECOGNITION = ["No", "Not sure", "Yes"];
 
 /**
- * One question's element; `draw` shows the answer's state, `wantedPlace` the first place still to
- * be answered.
+ * One question's element. `draw` shows the answer's state. `wantedPlace` returns the first place that is still to be
+ * answered.
  *
  * @typedef {object} QuestionBox
  * @property {AnyAnswer} answer
  * @property {HTMLFieldSetElement} element
  * @property {() => void} draw
- * @property {() => boolean} isBusy whether the surgeon is in its field
+ * @property {() => boolean} isBusy whether the surgeon is writing in its field
  * @property {() => HTMLElement} wantedPlace
  */
 
 /**
- * What is particular to one kind of question.
+ * The parts of a question that depend on its kind.
  *
  * @typedef {object} Drawn
  * @property {HTMLElement[]} nodes
@@ -140,7 +140,7 @@ function drawScaleQuestion(answer, changed) {
 }
 
 /**
- * What a question that takes one number is answered with.
+ * Draws the input of a question whose answer is one number.
  *
  * @param {Api.Question} question
  * @param {(point: number) => void} choose

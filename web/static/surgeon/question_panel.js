@@ -1,4 +1,4 @@
-// The questions on screen: draws them, sends what is answered, and says what is still open.
+// The questions on screen: draws them, sends the answers, and says which questions are still open.
 
 import { make } from "../shared/dom.js";
 import { tell, tellUntilAnswered } from "../shared/trouble.js";
@@ -27,12 +27,12 @@ export class QuestionPanel {
   constructor(state, outbox, finish) {
     this.#outbox = outbox;
     this.#finish = finish;
-    // What is given belongs here, wherever the session has gone meanwhile.
+    // Answers belong to this place, even if the session has moved on meanwhile.
     this.#place = placeOf(state);
 
     const answers = state.questions.map((question) => this.#answer(question, state));
     for (const answer of answers) {
-      // Given before the page was loaded again, and not on the server yet.
+      // The answer was given before the page was loaded again, and is not on the server yet.
       if (this.#isPending(answer.question.id)) answer.show("waiting");
     }
     this.#questionnaire = new Questionnaire(answers);
@@ -94,7 +94,7 @@ export class QuestionPanel {
       return;
     }
 
-    // What stops it is said by the dock, right beneath.
+    // If this fails, the dock right beneath says why.
     await this.#finish(this.#place.segment);
     tell(this.#missing, "");
   }
@@ -111,13 +111,13 @@ export class QuestionPanel {
     field?.focus({ preventScroll: true });
   }
 
-  /** The surgeon has changed an answer: it is no longer said to be open. */
+  /** The surgeon has changed an answer. Clears the message about open questions once none is marked as open. */
   #settled() {
     if (!this.#questionnaire.marked) tell(this.#missing, "");
   }
 
   /**
-   * Whether an answer to `question` waits on this device.
+   * Whether an answer to `question` is waiting on this device to be sent.
    *
    * @param {string} question
    */
@@ -126,7 +126,7 @@ export class QuestionPanel {
   }
 
   /**
-   * Shows what was answered on another device meanwhile.
+   * Shows the answers that were given on another device meanwhile.
    *
    * @param {View} state
    */
@@ -140,7 +140,7 @@ export class QuestionPanel {
   }
 
   /**
-   * Shows how far the answer to `question` has got.
+   * Shows whether the answer to `question` is saved.
    *
    * @param {string} question
    * @param {import("./outbox.js").Change["state"]} reached

@@ -1,12 +1,11 @@
-// The protocol's questions, and how far the answer to each has got. Each answer goes to the outbox
-// the moment it is given. What stands on the page is what the server has, unless something newer is
-// on its way.
+// The protocol's questions, and whether the answer to each is saved. Each answer goes to the outbox the moment it is
+// given. The page shows the server's answer, unless a newer one is on its way there.
 
 /** @typedef {"saving" | "saved" | "waiting" | "refused" | "partly" | ""} Reached */
 /** @typedef {import("./drafts.js").Draft} Draft */
 
 /**
- * Sends an answer, or a part of one, which was written as the draft `from`.
+ * Sends an answer or a part of one, which was written as the draft `from`.
  *
  * @callback Give
  * @param {Api.Question} question
@@ -17,7 +16,7 @@
  */
 
 /**
- * What answers do with the rest of the page.
+ * What answers need from the rest of the page.
  *
  * @typedef {object} Context
  * @property {Give} give
@@ -50,8 +49,8 @@ const REACHED_WORDS = {
 };
 
 /**
- * What stands once `given` has come on top of `earlier`. A 0 among points leaves what was there, as
- * on the server.
+ * The answer that results when `given` comes after `earlier`. A 0 among points keeps the earlier point, as on the
+ * server.
  *
  * @param {Api.AnswerValue | undefined} earlier
  * @param {Api.AnswerValue} given
@@ -73,17 +72,17 @@ export function ordinal(number) {
   return `${number}${isTeen ? "th" : ending}`;
 }
 
-/** One question, and how far its answer has got. */
+/** One question, and whether its answer is saved. */
 class Answer {
   question;
-  /** How far the answer has got. @type {Reached} */
+  /** Whether the answer is saved; empty if there is none. @type {Reached} */
   reached = "";
-  /** The same in words. */
+  /** The same as text. */
   status = "";
-  /** Whether the surgeon was told that this is still to be answered. */
+  /** Whether this question is marked as still to be answered. */
   wanted = false;
   context;
-  /** Called after each change that the view did not cause. */
+  /** Called after each change that did not come from the form. */
   changed = () => {};
 
   /**
@@ -96,23 +95,27 @@ class Answer {
   }
 
   /**
-   * What the surgeon has begun and must still confirm, in words; null where nothing is. @returns
-   * {string | null}
+   * Text about an answer that the surgeon has begun and must still confirm; null if there is none.
+   *
+   * @returns {string | null}
    */
   get begun() {
     return null;
   }
 
   /**
-   * What is still to be answered of it, in words; null where nothing is. @returns {string | null}
+   * Text about the parts that are still to be answered; null if there are none.
+   *
+   * @returns {string | null}
    */
   get open() {
     return null;
   }
 
   /**
-   * Whether a part of it is still to be answered, where it has parts: by place. @returns
-   * {boolean[]}
+   * For each part of the question, whether it is marked as still to be answered. Empty if it has no parts.
+   *
+   * @returns {boolean[]}
    */
   get wantedParts() {
     return [];
@@ -130,7 +133,7 @@ class Answer {
   }
 
   /**
-   * Shows how far an answer has got.
+   * Shows whether an answer is saved.
    *
    * @param {Reached} reached
    * @param {string} [reason] why it was refused
@@ -161,12 +164,12 @@ class Answer {
     this.note(this.begun ?? NOT_ANSWERED);
   }
 
-  /** Takes the marks back. */
+  /** Removes the marks. */
   unwant() {
     this.wanted = false;
   }
 
-  /** Gives at once what would be given after a pause. */
+  /** Gives an answer at once that would otherwise be given after a pause. */
   giveNow() {}
 
   /**
@@ -181,7 +184,7 @@ class Answer {
   }
 
   /**
-   * Shows an answer that was given on another device; `busy` is whether the surgeon is at this one.
+   * Shows an answer that was given on another device. `busy` says whether the surgeon is working on this one.
    *
    * @param {Api.AnswerValue} value
    * @param {boolean} [busy]
@@ -191,7 +194,7 @@ class Answer {
   }
 
   /**
-   * Takes `value` over; whether that changes anything.
+   * Takes over `value`. Returns whether that changes anything.
    *
    * @param {Api.AnswerValue} _value
    * @param {boolean} _busy
@@ -201,12 +204,12 @@ class Answer {
   }
 }
 
-/** An answer in words. It is given when the surgeon pauses, or leaves the field. */
+/** An answer as text. It is given when the surgeon pauses or leaves the field. */
 export class TextAnswer extends Answer {
   text;
   #draft;
   #answered;
-  /** Not asked of the draft, which a full device does not keep. */
+  /** Whether there is a text to give. The draft cannot tell, because a full device does not keep it. */
   #written;
   #cancel = () => {};
 
@@ -300,7 +303,7 @@ export class ScaleAnswer extends Answer {
   }
 }
 
-/** A questionnaire of several items, each a point from 1; 0 where none is given. */
+/** A questionnaire of several items. Each is answered with a point, counted from 1; 0 if it is not answered. */
 class ItemsAnswer extends Answer {
   points;
   /** @type {boolean[]} */
@@ -342,7 +345,7 @@ class ItemsAnswer extends Answer {
   }
 
   /**
-   * Each item goes by itself, so that it takes back nothing that another device has given.
+   * Sends each item by itself, so that it does not undo what another device has answered.
    *
    * @param {number} item
    * @param {number} point
@@ -381,7 +384,10 @@ export class SusAnswer extends ItemsAnswer {
   }
 }
 
-/** The scales of a workload index, each a gradation from 1, and which of each pair of them was chosen, 1 or 2. */
+/**
+ * A workload index: for each scale a gradation, counted from 1, and for each pair of scales which one was chosen, 1 or
+ * 2.
+ */
 export class WorkloadAnswer extends ItemsAnswer {
   scales;
   pairs;
@@ -400,7 +406,7 @@ export class WorkloadAnswer extends ItemsAnswer {
   }
 }
 
-/** The place of each setting, from 1; settings may share one. */
+/** The place of each setting, counted from 1. Settings may share a place. */
 export class PlacesAnswer extends ItemsAnswer {
   /**
    * @param {Api.Question} question
@@ -413,8 +419,8 @@ export class PlacesAnswer extends ItemsAnswer {
 }
 
 /**
- * An order of the settings. It counts once it is confirmed: one tap on an arrow says nothing about
- * the other settings.
+ * A ranking of the settings. It counts only once it is confirmed, because one tap on an arrow says nothing about the
+ * other settings.
  */
 export class RankingAnswer extends Answer {
   order;
@@ -452,7 +458,7 @@ export class RankingAnswer extends Answer {
   }
 
   /**
-   * Moves the setting in place `from` to place `to`; returns its number.
+   * Moves the setting in place `from` to place `to`. Returns the setting's number.
    *
    * @param {number} from
    * @param {number} to
@@ -488,7 +494,7 @@ export class RankingAnswer extends Answer {
 
 /**
  * @param {Api.Question} question
- * @param {Api.AnswerValue | undefined} answered what the server has, or what is on its way there
+ * @param {Api.AnswerValue | undefined} answered the answer that the server has, or that is on its way there
  * @param {Context} context
  * @returns {AnyAnswer}
  */
@@ -527,7 +533,7 @@ export class Questionnaire {
     return this.answers.find((answer) => answer.question.id === question);
   }
 
-  /** Marks what is still to be answered, and returns it. */
+  /** Marks the questions that are still to be answered, and returns them. */
   check() {
     for (const answer of this.answers) answer.giveNow();
     const unanswered = this.answers.filter((answer) => answer.unanswered);

@@ -1,10 +1,10 @@
-// Whether this browser keeps what is said over a reload, and what to do where it does not.
+// Finds out whether this browser can store comments and answers over a reload, and says what to do if it cannot.
 
-/** Written and taken back at once, to see whether it can be. */
+/** Written and removed at once, to test whether the storage works. */
 const TRIAL = "parfocal.trial";
 
 /**
- * What to tell the surgeon of a browser that keeps nothing; empty where it keeps things.
+ * Advice for the surgeon if the browser cannot store anything; empty if it can.
  *
  * @param {import("../shared/storage.js").Store} store
  */
@@ -18,11 +18,11 @@ export function storageAdvice(store) {
   );
 }
 
-/** Asks the browser not to clear what it keeps when the device runs short of room. */
+/** Asks the browser not to clear its storage when the device runs out of space. */
 export async function keepStorage() {
   try {
     if (!(await navigator.storage?.persisted?.())) await navigator.storage?.persist?.();
   } catch {
-    // A browser that was not willing keeps things as long as it likes. The page says what is not saved yet.
+    // If the browser refuses, it may clear its storage at any time. The page says what is not saved yet.
   }
 }

@@ -1,12 +1,12 @@
-// Hold to talk: from the press to the end of the recording. Knows nothing of buttons and keys.
+// Hold to talk: from the press to the end of the recording. Does not deal with buttons and keys.
 
 import { clockText } from "../shared/text.js";
 import { MicrophoneTrouble } from "./microphone.js";
 
-/** A recording ends by itself after this time: a pedal may be held by mistake. */
+/** A recording ends by itself after this time, because a pedal may be held by mistake. */
 export const LIMIT_MS = 120_000;
 
-/** The surgeon is told this long before. */
+/** The surgeon is warned this long before the limit. */
 const TOLD_MS = 15_000;
 
 /** @typedef {import("./comments.js").Place} Place */
@@ -16,31 +16,31 @@ const TOLD_MS = 15_000;
  * @typedef {object} Surroundings
  * @property {import("./voice_outbox.js").VoiceOutbox} outbox
  * @property {(heard: import("./microphone.js").Heard) => Promise<import("./microphone.js").Recording>} record
- * @property {() => Place | null} here where something is said now; null outside a session
+ * @property {() => Place | null} here what is on screen now; null outside a session
  * @property {() => import("./origin.js").Stamp} stamp
  * @property {() => number} now milliseconds by the page's clock
- * @property {(run: () => void, ms: number) => () => void} later returns what cancels it
+ * @property {(run: () => void, ms: number) => () => void} later returns a function that cancels the call
  * @property {() => void} changed
  */
 
 /**
- * A press that has not come to its end.
+ * A press that has not ended yet.
  *
  * @typedef {object} Held
  * @property {Place} place
  * @property {import("./origin.js").Stamp} given
  * @property {boolean} released
  * @property {import("./microphone.js").Recording | null} recording
- * @property {string | null} comment its key, once something is recorded
+ * @property {string | null} comment the comment's key; null until the recording begins
  * @property {number} began when the recording began, by the page's clock
  * @property {number} pieces
  * @property {Ending | null} ending
- * @property {Promise<void>} pieced settles once every piece so far is in the outbox
- * @property {() => void} cancel the time limit
+ * @property {Promise<void>} pieced resolves once all pieces so far are in the outbox
+ * @property {() => void} cancel cancels the time limit
  */
 
 export class Talk {
-  /** What went wrong, or what to do otherwise, in a sentence. */
+  /** A sentence that says what went wrong or what to do differently; empty if all is well. */
   trouble = "";
 
   #around;
@@ -63,7 +63,7 @@ export class Talk {
     return this.#held?.recording?.level() ?? 0;
   }
 
-  /** What the button says. */
+  /** The button's label. */
   get label() {
     const held = this.#held;
     if (held === null) return "Hold to talk";
@@ -75,7 +75,7 @@ export class Talk {
     return `Recording ${clockText(gone / 1000)}`;
   }
 
-  /** The surgeon presses: whether a recording is to begin. */
+  /** The surgeon presses. Returns whether a recording is begun. */
   press() {
     const place = this.#around.here();
     if (this.#held !== null || place === null) return false;
@@ -101,7 +101,7 @@ export class Talk {
   }
 
   /**
-   * The surgeon lets go, or the page cannot know any more whether something is held.
+   * The surgeon releases the button, or the page can no longer notice whether it is held.
    *
    * @param {Ending} [ending]
    */
@@ -127,7 +127,7 @@ export class Talk {
       this.#close(held);
       return;
     }
-    // Let go before the microphone was open, as while the browser asks whether it may be used.
+    // The button was released before the microphone was open, for example while the browser asked for permission.
     if (held.released) this.#end(held, "released");
   }
 
@@ -146,7 +146,7 @@ export class Talk {
    */
   #piece(held, sound) {
     const { comment } = held;
-    // Nothing was to be recorded: the button was let go too early.
+    // The button was released before the recording began, so nothing is recorded.
     if (comment === null) return;
     held.pieces += 1;
     const piece = held.pieces;
@@ -187,12 +187,12 @@ export class Talk {
     held.cancel();
     if (ending === "limit") {
       this.trouble =
-        "The recording ended after two minutes. What you said is kept. Let go and press again to go on.";
+        "The recording ended after two minutes. What you said is kept. Let go, then press again to continue.";
     }
     if (ending === "left" && held.comment !== null) {
       this.trouble =
         "The recording ended because something else came in front of this page. " +
-        "What you said until then is kept. Press again to go on.";
+        "What you said until then is kept. Press again to continue.";
     }
     if (held.comment === null)
       this.trouble ||= "Nothing was recorded. Hold until it says “Recording”, then speak.";

@@ -6,7 +6,7 @@ import { whyNoMicrophone } from "./microphone.js";
 import { focusOn, isTalkKey } from "./talk_keys.js";
 
 /**
- * Draws `talk`, and passes on presses.
+ * Draws the state of `talk`, and passes presses on to it.
  *
  * @param {import("./talk.js").Talk} talk
  * @param {import("./voice_outbox.js").VoiceOutbox} outbox
@@ -52,7 +52,7 @@ export function talkButton(talk, outbox, allowed) {
   function drawStatus() {
     const { kind, text } = outbox.status;
     const status = byId("voice-state");
-    // A piece is on its way every second: that would flicker.
+    // A piece is sent every second, so the text would flicker.
     const speaking = talk.state === "recording" && kind !== "unsaved";
     setText(status, speaking ? "Saved as you speak." : text);
     status.classList.toggle("unsaved", kind === "unsaved");
@@ -69,25 +69,25 @@ export function talkButton(talk, outbox, allowed) {
 
   button.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    // Neither focus nor selection moves: a comment that is being typed stays where it is.
+    // Keeps focus and selection where they are, in case a comment is being typed.
     event.preventDefault();
     button.setPointerCapture(event.pointerId);
     press(`pointer ${event.pointerId}`);
   });
-  // Wherever the finger is by then.
+  // On the whole window: the finger may have left the button.
   for (const end of ["pointerup", "pointercancel"]) {
     addEventListener(end, (event) => {
       if (event instanceof PointerEvent) grip.release(`pointer ${event.pointerId}`);
     });
   }
-  // A long press is not a wish for a menu.
+  // A long press must not open a menu.
   button.addEventListener("contextmenu", (event) => event.preventDefault());
 
   addEventListener("keydown", (event) => {
     const onButton = document.activeElement === button && (event.key === " " || event.key === "Enter");
     if (!open || event.isComposing || !(onButton || isTalkKey(event, focusOn(document.activeElement))))
       return;
-    // It neither scrolls the page nor, held, presses again and again.
+    // The key must not scroll the page, nor press again and again while it is held.
     event.preventDefault();
     if (!event.repeat) press(`key ${event.code || event.key}`);
   });

@@ -1,17 +1,16 @@
-// The keys that talk while they are held: the space bar, and what pedals send.
+// The keys that record voice while they are held: the space bar, and the keys that pedals send.
 
-/** Keys that write nothing and that nothing else on the page uses: they talk wherever the focus is. */
+/** Keys that write nothing and that nothing else on the page uses. They work wherever the focus is. */
 const PEDAL_KEYS = ["F13", "F14", "F15", "F16", "F17", "F18", "F19", "F20", "F21", "F22", "F23", "F24"];
 
 /**
- * Where the focus is: in a field in which people write, on something that the space bar works, or
- * on neither.
+ * Where the focus is: in a field for text, on a control that the space bar operates, or on neither.
  *
  * @typedef {"field" | "control" | "page"} Focus
  */
 
 /**
- * Whether `key`, pressed where the focus is, talks.
+ * Whether `key` records voice, given where the focus is.
  *
  * @param {{ key: string, ctrlKey?: boolean, altKey?: boolean, metaKey?: boolean }} pressed
  * @param {Focus} focus
@@ -24,7 +23,7 @@ export function isTalkKey({ key, ctrlKey, altKey, metaKey }, focus) {
 }
 
 /**
- * What the focus is on.
+ * The kind of element that has the focus.
  *
  * @param {Element | null} element
  * @returns {Focus}

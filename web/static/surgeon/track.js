@@ -1,21 +1,21 @@
-// A line on which a place is marked: by touching it, by dragging, by the buttons beside it, or by keys. Nothing is
-// marked until the surgeon marks it.
+// A line on which a place can be marked: by touching it, by dragging, with the buttons beside it, or with keys. Nothing
+// is marked until the surgeon marks it.
 
 import { make } from "../shared/dom.js";
 
 /**
  * @typedef {object} Line
- * @property {string} label what is marked, for a screen reader
- * @property {string} low what the lower end means
- * @property {string} high what the upper end means
+ * @property {string} label the question, for a screen reader
+ * @property {string} low the meaning of the lower end
+ * @property {string} high the meaning of the upper end
  * @property {number} min
  * @property {number} max
  * @property {boolean} graded whether every value has a tick
- * @property {(value: number) => string} words a value for a screen reader
+ * @property {(value: number) => string} words a value as text for a screen reader
  */
 
 /**
- * The value at `fraction` of the line, 0 at its lower end and 1 at its upper.
+ * The value at `fraction` of the line: 0 is its lower end, 1 its upper end.
  *
  * @param {Pick<Line, "min" | "max">} line
  * @param {number} fraction
@@ -26,7 +26,7 @@ export function valueAt({ min, max }, fraction) {
 }
 
 /**
- * The value after `key` was pressed; null where the key moves nothing. A line without a mark begins in its middle.
+ * The value after `key` was pressed; null if the key moves nothing. A line without a mark starts in its middle.
  *
  * @param {Pick<Line, "min" | "max">} line
  * @param {number | null} value
@@ -44,16 +44,16 @@ export function valueAfter({ min, max }, value, key) {
 }
 
 /**
- * Draws a line; `mark` is called when the surgeon has marked a place.
+ * Draws a line. Calls `mark` when the surgeon has marked a place.
  *
  * @param {Line} line
  * @param {(value: number) => void} mark
  */
 export function drawTrack(line, mark) {
   const { min, max } = line;
-  /** What is marked. @type {number | null} */
+  /** The marked value; null if nothing is marked. @type {number | null} */
   let value = null;
-  /** Where the finger is while it drags. @type {number | null} */
+  /** The value under the finger while it drags. @type {number | null} */
   let dragged = null;
 
   const thumb = make("span", { className: "thumb", "aria-hidden": "true" });
@@ -137,7 +137,7 @@ export function drawTrack(line, mark) {
     mark(marked);
     draw();
   });
-  // The finger scrolls the page: nothing was meant.
+  // The finger scrolls the page, so no mark was meant.
   slider.addEventListener("pointercancel", () => {
     dragged = null;
     draw();

@@ -1,4 +1,4 @@
-// What the surgeon reads about the session.
+// The session's texts for the surgeon.
 
 import { clockText, counted } from "../shared/text.js";
 
@@ -16,7 +16,7 @@ export function headline(state) {
 }
 
 /**
- * What has become of each setting, in order.
+ * The state of each setting, in order; empty for a setting that is still to come.
  *
  * @param {View | null} state
  * @returns {("done" | "now" | "")[]}
@@ -33,7 +33,7 @@ export function steps(state) {
 
 /**
  * @param {View | null} state
- * @param {number | null} seconds left of the setting's time, where it has a limit
+ * @param {number | null} seconds left of the setting's time; null if it has no limit
  */
 export function timeLeft(state, seconds) {
   if (state?.phase !== "inspecting" || seconds === null) return "";
@@ -53,10 +53,10 @@ export function readyWords({ settings }) {
 }
 
 /**
- * Whether everything is saved, said only when it is so.
+ * Says what is not saved yet. It says that everything is saved only if that is true.
  *
- * @param {number} refused how much the server refused and this device keeps
- * @param {number} waiting how much is not saved yet
+ * @param {number} refused number of comments and answers that the server refused and this device keeps
+ * @param {number} waiting number of comments and answers that are not saved yet
  */
 export function savedWords(refused, waiting) {
   const unsaved = counted(refused, "comment or answer", "comments or answers");
@@ -69,7 +69,7 @@ export function savedWords(refused, waiting) {
 }
 
 /**
- * Where something is that the server does not have yet.
+ * Says where something is kept that the server does not have yet.
  *
  * @param {string} what such as `2 comments`
  * @param {boolean} durable whether this device keeps it over a reload

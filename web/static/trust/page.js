@@ -3,7 +3,7 @@
 import { byId, setText } from "../shared/dom.js";
 import { judge, kindOf, WORDS } from "./verdict.js";
 
-/** An answer that takes longer will not come. */
+/** The timeout of a request: a later answer is not expected. */
 const PATIENCE_MS = 10_000;
 
 const verdict = byId("check");
@@ -25,7 +25,7 @@ async function check() {
 
 byId("check-again").onclick = check;
 
-// The steps lead into the device's settings and back.
+// The steps lead into the device's settings and back to this page.
 document.addEventListener("visibilitychange", () => {
   if (!document.hidden) check();
 });

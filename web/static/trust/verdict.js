@@ -1,12 +1,13 @@
-// Whether this device trusts the server. Without the DOM.
+// Finds out whether this device trusts the server. Does not use the DOM.
 
 /** @typedef {"trusted" | "not-trusted" | "unreachable"} Verdict */
 
 /**
  * Asks the server over TLS. A browser refuses the answer of a server that it does not trust, and does not say why. So
- * where the answer fails, the same is asked as the page itself came: a server that answers there can be reached.
+ * if no answer comes, the same question is asked the way the page itself was loaded. If the server answers there, it is
+ * reachable but not trusted.
  *
- * @param {(address: string) => Promise<unknown>} ask fails where no answer comes
+ * @param {(address: string) => Promise<unknown>} ask rejects if no answer comes
  * @param {string} host host and port of the server
  * @returns {Promise<Verdict>}
  */
@@ -15,7 +16,7 @@ export async function judge(ask, host) {
     await ask(`https://${host}/trust/check`);
     return "trusted";
   } catch {
-    // Not trusted, or not there: the next question tells.
+    // Not trusted or not reachable: the next request shows which.
   }
 
   try {
@@ -27,10 +28,11 @@ export async function judge(ask, host) {
 }
 
 /**
- * The kind of device, for the steps to open first.
+ * The kind of device. It decides which steps are opened first.
  *
- * @param {string} agent what the browser says of itself
- * @param {number} touches how many fingers the screen tells apart: an iPad says that it is a Mac
+ * @param {string} agent the browser's user agent
+ * @param {number} touches how many fingers the screen can follow at once. An iPad says that it is a Mac, but follows
+ *   more than one.
  * @returns {"apple" | "android" | "windows" | "mac" | "linux"}
  */
 export function kindOf(agent, touches) {

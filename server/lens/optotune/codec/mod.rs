@@ -1,16 +1,15 @@
-//! The wire format of the Optotune Lens Driver 4/4i: requests, replies, checksums. Does no input or
-//! output.
+//! The wire format of the Optotune Lens Driver 4/4i: requests, replies, checksums. Does no input or output.
 //!
-//! A request is a payload and its CRC-16/ARC, low byte first; a reply is the same followed by `\r\n`. A
-//! reply may contain `\r\n`, so its request determines its length; its end does not show it. Integers
-//! are big-endian. Formats: Optotune, *Lens Driver 4 manual*.
+//! A request is a payload and its CRC-16/ARC, low byte first. A reply is the same followed by `\r\n`. The length of a
+//! reply follows from its request, because `\r\n` can also occur inside a reply. Integers are big-endian. Formats:
+//! Optotune, *Lens Driver 4 manual*.
 
 mod frame;
 
 use frame::{CHECKSUM, TRAILER, checked};
 pub use frame::{DeviceError, WireError, error_reply};
 
-/// Greeting; carries no checksum.
+/// The greeting. It has no checksum.
 pub const START: &[u8] = b"Start";
 /// Answer to [`START`].
 pub const READY: &[u8] = b"Ready\r\n";
@@ -25,7 +24,7 @@ pub enum Request {
     FirmwareVersion,
     /// Serial number of the lens.
     Serial,
-    /// Largest current.
+    /// The largest current.
     MaxCurrent,
     /// Go to a current, in counts of `mA * 4095 / largest current`. Gets no reply.
     SetCurrent(i16),
@@ -37,7 +36,7 @@ pub enum Request {
     FocalPowerMode,
     /// The mode of control.
     Mode,
-    /// Temperatures between which focal power is to be held, which sets the range of focal power.
+    /// Sets the temperatures between which focal power must be held. They determine the range of focal power.
     TemperatureLimits {
         /// Upper limit.
         high: i16,
@@ -57,33 +56,33 @@ pub enum Request {
 /// A reply of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reply {
-    /// `A` to `F`.
+    /// Letter of the firmware's type, `A` to `F`.
     FirmwareType(u8),
-    /// Major, minor, build, revision.
+    /// Firmware's version: major, minor, build, revision.
     FirmwareVersion(u8, u8, u16, u16),
     /// Serial number, usually ASCII.
     Serial([u8; 8]),
-    /// In 1/100 mA.
+    /// The largest current, in 1/100 mA.
     MaxCurrent(u16),
-    /// In counts.
+    /// The current, in counts.
     Current(i16),
-    /// Current is controlled from now on.
+    /// The driver controls current from now on.
     CurrentMode,
-    /// Focal power is controlled from now on.
+    /// The driver controls focal power from now on.
     FocalPowerMode(Limits),
-    /// 1 current, 2 sine, 3 triangle, 4 square, 5 focal power, 6 analog, 7 position.
+    /// Mode of control: 1 current, 2 sine, 3 triangle, 4 square, 5 focal power, 6 analog, 7 position.
     Mode(u8),
-    /// The limits are set.
+    /// The temperature limits are set.
     TemperatureLimits(Limits),
-    /// In the driver's own units.
+    /// The focal power set, in the driver's own units.
     FocalPower(i16),
-    /// In 1/16 °C.
+    /// Temperature of the lens, in 1/16 °C.
     Temperature(i16),
-    /// See [`super::status::Status`].
+    /// Status bits; see [`super::status::Status`].
     Status(u32),
 }
 
-/// Focal power that the lens can hold between the temperature limits, in the driver's own units.
+/// The range of focal power that the lens can hold between the temperature limits, in the driver's own units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// The eight status bits.
@@ -128,7 +127,7 @@ impl Request {
         }
     }
 
-    /// How the reply's payload begins, and its length in bytes; `None` for a request without a reply.
+    /// The beginning of the reply's payload, and the payload's length in bytes; `None` for a request without a reply.
     const fn reply_form(self) -> Option<(&'static [u8], usize)> {
         match self {
             Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
@@ -147,10 +146,10 @@ impl Request {
         }
     }
 
-    /// The reply to this request at the start of `bytes`, or `None` while bytes are missing.
+    /// Parses the reply to this request at the start of `bytes`; `None` while bytes are missing.
     ///
     /// # Errors
-    /// When the driver reports an error, or the bytes are not such a reply.
+    /// If the driver reports an error, or the bytes are not such a reply.
     pub fn reply(self, bytes: &[u8]) -> Result<Option<Reply>, WireError> {
         let Some((name, length)) = self.reply_form() else { return Err(WireError::Garbage) };
 
@@ -165,7 +164,7 @@ impl Request {
             return Err(error.into());
         }
 
-        // A reply of the right name and length whose checksum fails was damaged on the way.
+        // A reply with the right name and length but a wrong checksum was damaged on the line.
         match whole {
             None => Ok(None),
             Some(whole) if whole.starts_with(name) && whole.ends_with(b"\r\n") && checked(whole).is_none() => {
@@ -175,7 +174,7 @@ impl Request {
         }
     }
 
-    /// The values behind the name in a reply of the right length.
+    /// Decodes the values after the name, in a reply of the right length.
     fn decode(self, values: &[u8]) -> Option<Reply> {
         let word = |at: usize| values.get(at..at + 2)?.try_into().ok().map(u16::from_be_bytes);
         let signed = |at: usize| word(at).map(u16::cast_signed);
@@ -207,7 +206,7 @@ mod tests {
 
     use super::*;
 
-    /// The checksum bit by bit from its definition: reflected polynomial 0xA001, start 0.
+    /// The checksum, computed bit by bit from its definition: reflected polynomial 0xA001, start 0.
     fn bitwise(bytes: &[u8]) -> u16 {
         bytes.iter().fold(0, |crc, &byte| {
             (0..8).fold(crc ^ u16::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xA001 } else { crc >> 1 })
@@ -258,7 +257,7 @@ mod tests {
 
         for error in ["4531F3440D0A", "4501F3500D0A", "4E0D0A"] {
             assert_eq!(reply(Request::Status, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
-            // No longer than the reply that was waited for.
+            // Also for a request whose reply is no longer than the error reply.
             assert_eq!(reply(Request::FirmwareType, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
         }
     }

@@ -1,4 +1,4 @@
-//! Verification of the allocation that an unblinded export tells: against its other files, the commitment and the draw.
+//! Checks the allocation in an unblinded export against its other files, the commitment and the draw.
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -21,7 +21,7 @@ struct Told {
     schedule: Vec<PolicyName>,
 }
 
-/// The allocation that an export tells, or why it does not.
+/// The allocation in an export, or why it cannot be checked.
 fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, String> {
     if !export.has("allocation.json") {
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
@@ -67,7 +67,7 @@ fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, Strin
     }))
 }
 
-/// Whether seed, order and protocol are those committed to.
+/// Checks that seed, order and protocol are those committed to.
 pub(super) fn commitment(export: &ExportFiles) -> Outcome {
     let allocation = match allocation(export)? {
         Ok(allocation) => allocation,
@@ -81,7 +81,7 @@ pub(super) fn commitment(export: &ExportFiles) -> Outcome {
     }
 }
 
-/// Whether the seed leads to the order.
+/// Checks that the order is the one drawn from the seed.
 pub(super) fn schedule(export: &ExportFiles) -> Outcome {
     let allocation = match allocation(export)? {
         Ok(allocation) => allocation,
@@ -91,7 +91,7 @@ pub(super) fn schedule(export: &ExportFiles) -> Outcome {
     let protocol = Protocol::parse(&export.text("protocol.toml")?, "protocol.toml", &allocation.schedule)
         .map_err(|error| error.to_string())?;
 
-    // Also keeps a forged export from having all permutations of many policies drawn.
+    // Without this check, a forged export could make us draw all permutations of many policies.
     if allocation.algorithm.order() != protocol.order {
         return Err(format!("{} does not draw the order that protocol.toml asks for", allocation.algorithm));
     }

@@ -1,5 +1,5 @@
-//! Verification of the chain that an export tells: every row follows the row before, and the session's rows are those
-//! of the records in the tables.
+//! Checks the chain in an export: every row follows the row before, and the session's rows belong to the records in the
+//! tables.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -41,9 +41,7 @@ pub(super) fn chain(export: &ExportFiles, format: u64, expected: Option<&Head>) 
     ends_with_itself(export, last, walk.last())?;
     let unchained = steps.beyond(&walk);
     if unchained > 0 && export.session_cell("status")? != "under-way" {
-        return Err(format!(
-            "telemetry: {unchained} steps were inserted at the end: no row of the chain tells of them"
-        ));
+        return Err(format!("telemetry: {unchained} steps were inserted at the end: no row of the chain covers them"));
     }
     Ok(Verdict::Passed(walk.end()?))
 }
@@ -66,8 +64,8 @@ fn ends_with_itself(export: &ExportFiles, last: Option<Found>, head: &Head) -> R
     }
 }
 
-/// Where the columns of `CHAIN` stand in chain.csv, each if it has it. Each export tells the whole chain, and other
-/// sessions' rows by their hash alone.
+/// Positions of the columns of `CHAIN` in chain.csv; `None` for a column that is missing. Each export has the whole
+/// chain, but only the hashes of other sessions' rows.
 struct ChainColumns([Option<usize>; CHAIN.len()]);
 
 /// The columns of chain.csv that are read.
@@ -133,7 +131,7 @@ fn as_recorded(column: &str, cell: &str) -> String {
     column.map_or(cell, |column| column.read(cell)).to_owned()
 }
 
-/// The salts that an unblinded export adds.
+/// The salts that an unblinded export adds, by number of the row.
 fn salts(export: &ExportFiles) -> Result<BTreeMap<String, String>, String> {
     if !export.has("chain_salts.csv") {
         return Ok(BTreeMap::new());
@@ -167,7 +165,7 @@ fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, 
     let unblinding = allocation.get("unblinding_reason").and_then(Value::as_str);
 
     let mut found = BTreeMap::new();
-    // An export tells of no participant but by the session's code.
+    // Some kinds have no table in exports: of participants, an export has only the session's code.
     let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table && table.since() <= format);
     for kind in KINDS.iter().filter(told) {
         for mut row in rows(export, kind.table)? {
@@ -202,7 +200,7 @@ fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, 
                 sealed: (!withheld).then(|| all(kind.sealed)),
             };
             if found.insert((kind.name, key.clone()), record).is_some() {
-                return Err(format!("{}: {} {key} stands there twice", kind.table, kind.name));
+                return Err(format!("{}: {} {key} appears twice", kind.table, kind.name));
             }
         }
     }
@@ -212,15 +210,16 @@ fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, 
 /// The steps of telemetry of each segment, in order.
 struct Steps {
     open: BTreeMap<String, Netstrings>,
-    /// None in a blinded export.
+    /// `None` in a blinded export.
     sealed: Option<BTreeMap<String, Netstrings>>,
 }
 
-/// The cells of a segment's steps as they are hashed, one after another: an hour of a session has 200,000 steps.
+/// The cells of a segment's steps as they are hashed, one after another in one buffer, because an hour of a session has
+/// 200,000 steps.
 #[derive(Default)]
 struct Netstrings {
     bytes: Vec<u8>,
-    /// Where each step ends.
+    /// Where each step ends in `bytes`.
     ends: Vec<usize>,
 }
 
@@ -233,7 +232,7 @@ impl Netstrings {
         self.ends.push(self.bytes.len());
     }
 
-    /// The steps of `block` that are there: how many, and their bytes.
+    /// The steps of `block` that were found: how many, and their bytes.
     fn of(&self, block: &Block) -> (i64, &[u8]) {
         let count = self.ends.len();
         let first = usize::try_from(block.first - 1).unwrap_or(usize::MAX).min(count);
@@ -258,7 +257,7 @@ impl Steps {
         })
     }
 
-    /// Checks `block`: whether its sealed columns could be checked, too.
+    /// Checks `block`. Returns whether its sealed columns could be checked too.
     fn check(&self, block: &BlockToCheck) -> Result<bool, String> {
         let (steps, open) = hashed(&self.open, block, begin_open());
         let Some(sealed) = &self.sealed else {
@@ -273,7 +272,7 @@ impl Steps {
         Ok(true)
     }
 
-    /// Steps that no row tells of.
+    /// Number of steps that no row of the chain covers.
     fn beyond(&self, walk: &Walk) -> i64 {
         let tables = std::iter::once(&self.open).chain(&self.sealed);
         let beyond = tables.flatten().map(|(segment, steps)| steps.ends.len() as i64 - walk.steps(segment));
@@ -303,7 +302,7 @@ fn by_segment(
     export.each_row(file, |row| {
         let cell = |place: usize| row.get(place).unwrap_or_default();
         let segment = segments.get(cell(setting)).map(String::as_str).unwrap_or_default();
-        // An export has a handful of segments: their names are copied once each.
+        // An export has only a few segments, so each name is copied once.
         if !found.contains_key(segment) {
             found.insert(segment.to_owned(), Netstrings::default());
         }

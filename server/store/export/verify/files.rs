@@ -1,4 +1,4 @@
-//! The files of an export as they are read again. Errors name the file.
+//! Reads the files of an export. Errors name the file.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use crate::store::export::table::{FORMAT, Row};
 /// are read row by row each time and never kept.
 const LONG: [&str; 3] = [ChainRow::TABLE.name, TelemetryRow::TABLE.name, PolicyStepRow::TABLE.name];
 
-/// What reading a file gave, kept for all who ask for it.
+/// The results of reading files, by file name, kept for all checks.
 type Kept<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
 
 /// The files of an export. Its JSON files and its short tables are read once each, when they are first asked for,
@@ -27,20 +27,20 @@ pub struct ExportFiles {
     tables: Kept<Rows>,
 }
 
-/// A table that is kept.
+/// A table that is read once and kept.
 struct Rows {
     headers: StringRecord,
     rows: Vec<StringRecord>,
 }
 
 impl ExportFiles {
-    /// Those of the export in `folder`. Nothing is read yet.
+    /// The files of the export in `folder`. Nothing is read yet.
     #[must_use]
     pub fn of(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), documents: Kept::default(), tables: Kept::default() }
     }
 
-    /// Where they lie.
+    /// The folder of the export.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -51,15 +51,15 @@ impl ExportFiles {
         self.folder.join(file).exists()
     }
 
-    /// What stands in `file`.
+    /// The text of `file`.
     pub(super) fn text(&self, file: &str) -> Result<String, String> {
         std::fs::read_to_string(self.folder.join(file)).map_err(|error| format!("{file}: {error}"))
     }
 
-    /// A JSON file.
+    /// The content of the JSON file `file`.
     ///
     /// # Errors
-    /// A sentence that names the file, when it cannot be read.
+    /// If the file cannot be read. The text names the file.
     pub fn json(&self, file: &str) -> Result<Rc<Value>, String> {
         once(&self.documents, file, || {
             serde_json::from_str(&self.text(file)?).map_err(|error| format!("{file}: {error}"))
@@ -84,7 +84,7 @@ impl ExportFiles {
         }
     }
 
-    /// Hands each row of CSV file `file` to `take`, in order, until that has something against one.
+    /// Passes each row of CSV file `file` to `take`, in order, until `take` returns an error.
     pub(super) fn each_row(
         &self,
         file: &str,
@@ -102,7 +102,7 @@ impl ExportFiles {
         Ok(())
     }
 
-    /// The place of `column` among the columns of CSV file `file`.
+    /// The place of `column` among the columns of CSV file `file`, from 0.
     pub(super) fn place(&self, file: &str, column: &str) -> Result<usize, String> {
         place_among(&self.headers(file)?, file, column)
     }
@@ -110,7 +110,7 @@ impl ExportFiles {
     /// The cells of a column of a CSV file.
     ///
     /// # Errors
-    /// A sentence that names the file, when it cannot be read or has no such column.
+    /// If the file cannot be read or has no such column. The text names the file.
     pub fn cells(&self, file: &str, column: &str) -> Result<Vec<String>, String> {
         let place = self.place(file, column)?;
         let mut cells = Vec::new();
@@ -121,7 +121,7 @@ impl ExportFiles {
         Ok(cells)
     }
 
-    /// What the export tells of its session in `column`.
+    /// The session's cell in `column` of sessions.csv.
     pub(super) fn session_cell(&self, column: &str) -> Result<String, String> {
         let cells = self.cells("sessions.csv", column)?;
         cells.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
@@ -141,7 +141,7 @@ impl ExportFiles {
     }
 }
 
-/// What `kept` has of `file`, which `read` reads where it has nothing yet.
+/// The result for `file` from `kept`. If it has none yet, calls `read` and keeps the result.
 fn once<T>(kept: &Kept<T>, file: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
     if let Some(known) = kept.borrow().get(file) {
         return known.clone();
@@ -151,7 +151,7 @@ fn once<T>(kept: &Kept<T>, file: &str, read: impl FnOnce() -> Result<T, String>)
     found
 }
 
-/// The place of `column` among the `headers` of CSV file `file`.
+/// The place of `column` among the `headers` of CSV file `file`, from 0.
 pub(super) fn place_among(headers: &StringRecord, file: &str, column: &str) -> Result<usize, String> {
     let place = headers.iter().position(|name| name == column);
     place.ok_or_else(|| format!("{file} has no column {column}"))

@@ -1,5 +1,5 @@
-//! Verification of what an export tells of its session's study: the definition, the protocol and, once the study is
-//! unblinded, the commitment to all orders and this session's place in them.
+//! Checks the study in an export: the definition, the protocol and, once the study is unblinded, the commitment to all
+//! orders and this session's place in them.
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -12,7 +12,7 @@ use crate::trial::allocation::Seed;
 use crate::trial::protocol::Protocol;
 use crate::trial::study::lists::{List, commitment, in_words};
 
-/// What of a definition can be checked without the other protocols of the study.
+/// The parts of a definition that can be checked without the other protocols of the study.
 #[derive(Deserialize)]
 struct Outline {
     name: String,
@@ -31,17 +31,17 @@ struct OutlineSite {
     name: String,
 }
 
-/// Where the session stands in its study.
+/// The session's place in its study.
 struct Place {
     site: String,
     protocol: String,
     number: String,
 }
 
-/// Checks the study that the export tells of.
+/// Checks the study in the export.
 pub(super) fn study(export: &ExportFiles) -> Outcome {
     let outside = || Ok(Verdict::Passed("the session is outside any study".to_owned()));
-    // Earlier versions knew no studies.
+    // Earlier versions had no studies.
     if export.format()? < StudySessionRow::TABLE.since() {
         return outside();
     }
@@ -93,7 +93,7 @@ fn check_definition(export: &ExportFiles, study: &str, place: &Place) -> Result<
     Ok(())
 }
 
-/// The orders of the whole study, where the export tells them.
+/// The orders of the whole study; `None` if the export withholds them.
 fn statement(export: &ExportFiles) -> Result<Option<String>, String> {
     if !export.has("allocation.json") {
         return Ok(None);
@@ -101,7 +101,8 @@ fn statement(export: &ExportFiles) -> Result<Option<String>, String> {
     Ok(export.json("allocation.json")?["study_statement"].as_str().map(str::to_owned))
 }
 
-/// Checks that the session has the order of its place, and that the seed leads to the list that it is in.
+/// Checks that the session has the order of its place, and that the list with this place is the one drawn from the
+/// seed.
 fn check_order(export: &ExportFiles, statement: &str, place: &Place) -> Result<(), String> {
     let seed = statement.lines().find_map(|line| Seed::from_hex(line.strip_prefix("seed ")?));
     let seed = seed.ok_or("allocation.json: the study's orders have no seed")?;

@@ -1,18 +1,18 @@
-//! How a check came out.
+//! The verdict of a check.
 
 use serde::Serialize;
 
-/// How a check came out.
+/// The verdict of a check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "verdict", content = "detail", rename_all = "kebab-case")]
 pub enum Verdict {
-    /// As it should be; says what was found.
+    /// Everything is as it should be. Says what was found.
     Passed(String),
-    /// Not as it should be; says where.
+    /// Something is wrong. Says what and where.
     Failed(String),
-    /// It cannot be checked; says why.
+    /// It cannot be checked. Says why.
     NotChecked(String),
 }
 
-/// A check that could be made to its end, or what was wrong.
+/// The verdict of a check, or what is wrong, in words.
 pub type Outcome = Result<Verdict, String>;

@@ -1,5 +1,5 @@
-//! Verification of the recordings in an export: each file is its pieces one after another, by their hashes, which are
-//! the chain's.
+//! Checks the recordings in an export: each file consists of its pieces, one after another, with the hashes that the
+//! chain has.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::store::export::voice::{FOLDER, file_name};
 use crate::store::voice::erased_words;
 use crate::trial::voice::MediaType;
 
-/// What the tables tell of a piece.
+/// A piece, as the tables describe it.
 struct Piece {
     place: u32,
     bytes: usize,
@@ -57,7 +57,7 @@ pub(super) fn voice(export: &ExportFiles) -> Outcome {
     Ok(Verdict::Passed(format!("{checked} pieces of recordings are as they were sent{}", erased_words(gone))))
 }
 
-/// The pieces of each comment by their places.
+/// The pieces of each comment, in order.
 fn pieces(export: &ExportFiles) -> Result<BTreeMap<String, Vec<Piece>>, String> {
     let column = |name| export.cells("voice_pieces.csv", name);
     let comments = column("comment")?;
@@ -98,7 +98,7 @@ fn same_comments(
         return Err("voice.csv: its rows are not the voice comments of comments.csv".to_owned());
     }
     match pieces.keys().find(|comment| !recordings.contains(comment)) {
-        Some(comment) => Err(format!("voice_pieces.csv: comment {comment} is no voice comment")),
+        Some(comment) => Err(format!("voice_pieces.csv: comment {comment} is not a voice comment")),
         None => Ok(()),
     }
 }
