@@ -10,8 +10,8 @@ use jiff::Timestamp;
 use serde::Serialize;
 use tempfile::NamedTempFile;
 
-use super::database::lock;
 use super::export::verify::{Check, Verdict};
+use super::lock::FolderLock;
 use super::schema::DATABASE;
 use super::verify::checks;
 use super::{Access, Head, Reader, Recorder, StoreError};
@@ -138,7 +138,7 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
 /// If a server uses the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
     DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
-    let _lock = lock(folder)?;
+    let _lock = FolderLock::of(folder)?;
     let database = folder.join(DATABASE);
 
     let copy = temporary_beside(&database)?;

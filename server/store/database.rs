@@ -1,8 +1,8 @@
 //! The database of a data folder, opened for writing by one process.
 
 use std::collections::BTreeMap;
-use std::fs::{DirBuilder, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Read, Write};
+use std::fs::DirBuilder;
+use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,14 +19,12 @@ use crate::clock::Moment;
 use crate::files::make_private;
 
 use super::counts::Counts;
+use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
 use super::values::{begin, nanoseconds};
 use super::writes::{Turn, Writes, Written};
 use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
-
-/// Name of the lock in the data folder.
-const LOCK: &str = "parfocal.lock";
 
 /// A start of the server, and what it ran with.
 #[derive(Debug, Clone)]
@@ -72,7 +70,7 @@ pub(super) struct Inner {
     pub(super) telemetry_counts: Counts,
     pub(super) writes: Writes,
     /// Released when dropped, or by the kernel however the process ends.
-    _lock: File,
+    _lock: FolderLock,
 }
 
 impl Store {
@@ -85,7 +83,7 @@ impl Store {
         let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
         made.map_err(|error| StoreError::folder(folder, &error))?;
 
-        let lock = lock(folder)?;
+        let lock = FolderLock::of(folder)?;
         keep_private(folder);
 
         let file = folder.join(DATABASE);
@@ -324,26 +322,4 @@ fn keep_private(folder: &Path) {
             _ => {}
         }
     }
-}
-
-/// Locks `folder` for this process, until the returned file is dropped.
-pub(super) fn lock(folder: &Path) -> Result<File, StoreError> {
-    let path: PathBuf = folder.join(LOCK);
-    let failed = |error: std::io::Error| StoreError::folder(folder, &error);
-    let mut file =
-        OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-
-    match file.try_lock() {
-        Ok(()) => {}
-        Err(TryLockError::WouldBlock) => {
-            let mut holder = String::new();
-            let _ = file.read_to_string(&mut holder);
-            return Err(StoreError::InUse { folder: folder.to_owned(), process: holder.trim().to_owned() });
-        }
-        Err(TryLockError::Error(error)) => return Err(failed(error)),
-    }
-
-    // The process id is only for the message above. The kernel holds the lock.
-    file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
-    Ok(file)
 }

@@ -18,6 +18,7 @@ mod erasures;
 mod error;
 pub mod export;
 mod export_rows;
+mod lock;
 mod motion;
 mod motions;
 mod reader;

@@ -246,7 +246,7 @@ async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_
     trial.conductor.holding(told(TABLET_A, 0)).await.unwrap();
     trial.conductor.holding(told(TABLET_B, 1)).await.unwrap();
     let refused = unblind(&trial, session, false).await.unwrap_err().to_string();
-    assert!(refused.contains("1 surgeon's device has not said"), "{refused}");
+    assert!(refused.contains("1 surgeon's device has not reported"), "{refused}");
     trial.conductor.holding(told(TABLET_B, 0)).await.unwrap();
     unblind(&trial, session, false).await.unwrap();
 

@@ -1,6 +1,5 @@
 //! The book of studies: written by the server, or by a command while no server runs.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +8,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteSy
 
 use super::writing::{change_study, insert_study};
 use super::{NewStudy, StudyChange};
-use crate::store::database::lock;
+use crate::store::lock::FolderLock;
 use crate::store::schema::DATABASE;
 use crate::store::values::drop_if_failed;
 use crate::store::{Reader, Store, StoreError};
@@ -27,7 +26,7 @@ enum Way {
     /// Within the server.
     Server(Store),
     /// From the command line. The lock keeps servers out, so that no server decides on data that is being changed.
-    CommandLine { pool: SqlitePool, _lock: Arc<File> },
+    CommandLine { pool: SqlitePool, _lock: Arc<FolderLock> },
 }
 
 impl StudyBook {
@@ -47,7 +46,7 @@ impl StudyBook {
             return Err(StoreError::Missing(file));
         }
 
-        let lock = Arc::new(lock(folder)?);
+        let lock = Arc::new(FolderLock::of(folder)?);
         let reader = Reader::open(folder).await?;
         let options = SqliteConnectOptions::new()
             .filename(&file)
