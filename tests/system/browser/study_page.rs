@@ -73,7 +73,7 @@ async fn a_session(operator: &Browser) {
 
     operator.click("#new-session [type=submit]").await;
     operator.sees("#phase", "Ready to start").await;
-    operator.sees("#link-session", "to this session alone").await;
+    operator.sees("#link-session", "opens only this session").await;
     until("the link to this session", || async { operator.value("#surgeon-link").await != shared }).await;
     shoot(operator, "operator-13-link").await;
     operator.click_labelled("#session-actions", "Abort").await;

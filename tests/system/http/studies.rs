@@ -283,7 +283,7 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
         "{said}"
     );
     let (done, said) = study(&new, data.path());
-    assert!(!done && said.contains("there is a study 'scope-2026' already"), "{said}");
+    assert!(!done && said.contains("there is already a study 'scope-2026'"), "{said}");
 
     let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
     assert!(!done && said.contains("make accounts first, with `parfocal account add NAME --role lead`"), "{said}");
