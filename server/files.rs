@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_there_is_replaced_and_nothing_is_left_beside_it() {
+    fn an_existing_file_is_replaced_and_nothing_is_left_beside_it() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("results.json");
         for text in ["first", "second"] {

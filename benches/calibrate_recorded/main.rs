@@ -8,7 +8,7 @@ use std::sync::Arc;
 use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::evaluation::{Outcome, evaluate};
 use parfocal::scans::benchmark::SEED;
-use parfocal::scans::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+use parfocal::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
 use parfocal::simulation::phantom::{Haste, Trajectory};
 
 /// The paper's robotic column: policy and mean absolute error.
@@ -34,7 +34,7 @@ fn scan(seed: u64, haste: Haste, poses: usize) -> Arc<RecordedScan> {
 }
 
 fn report(scans: Vec<Arc<RecordedScan>>, haste: Haste) {
-    let set = Recorded { scans, between: Between::Nearest };
+    let set = Recorded { scans, between: Interpolation::Nearest };
     let policies = PAPER.map(|(name, _)| PolicyName::new(name));
     let outcomes = evaluate(&Registry::standard(), &policies, &set, &|_| ()).unwrap();
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();

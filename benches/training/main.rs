@@ -14,7 +14,7 @@ use parfocal::scans::pictures::{Split, varied};
 use parfocal::scans::scenery::Scenery;
 use parfocal::scans::variety::Variety;
 use parfocal::training::dqn::DqnTrainer;
-use parfocal::training::dqn::replay::{Replay, Seen, Transition};
+use parfocal::training::dqn::replay::{CompactView, Replay, Transition};
 use parfocal::training::environment::Environment;
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::trainer::Trainer;
@@ -83,7 +83,7 @@ fn trainings(clips: &[Arc<Clip>]) {
 fn memory() {
     const FRAMES: usize = 2_500_000;
     let mut replay = Replay::new(FRAMES, 8);
-    let seen = Seen::patch(&Patch([7.0; PATCH_SIDE * PATCH_SIDE]));
+    let seen = CompactView::patch(&Patch([7.0; PATCH_SIDE * PATCH_SIDE]));
     for index in 0..FRAMES {
         replay.push(index % 8, &seen, Transition::default());
     }

@@ -12,11 +12,11 @@ use crate::trial::event::EventKind;
 use crate::trial::phase::SessionStatus;
 use crate::trial::protocol::Protocol;
 use crate::trial::question::{AnswerValue, Question, QuestionKind};
-use crate::trial::remark::Said;
+use crate::trial::remark::CommentContent;
 use crate::trial::study::places::Enrolled;
 
 /// A session that counts, with its contribution to the analysis.
-pub struct Gathered {
+pub struct GatheredSession {
     /// The session.
     pub session: SessionId,
     /// The surgeon's code, corrected if it was.
@@ -48,7 +48,7 @@ pub async fn gather(
     clocks: &RunClocks,
     protocol: &Protocol,
     session: &Enrolled,
-) -> Result<(AnalysedSession, Option<Gathered>), StoreError> {
+) -> Result<(AnalysedSession, Option<GatheredSession>), StoreError> {
     let line = |surgeon: Option<String>, counts: bool, remark: Option<String>| AnalysedSession {
         session: session.session,
         surgeon,
@@ -87,7 +87,7 @@ fn unblinded_before(stored: &StoredSession) -> bool {
 struct Gathering<'a> {
     protocol: &'a Protocol,
     segments: Vec<SegmentId>,
-    gathered: Gathered,
+    gathered: GatheredSession,
 }
 
 impl<'a> Gathering<'a> {
@@ -109,10 +109,19 @@ impl<'a> Gathering<'a> {
         words.push(SettingWords { session, setting: None, policy: None, words: Vec::new() });
 
         let segments = stored.made.segments.iter().map(|(segment, _)| *segment).collect();
-        Self { protocol, segments, gathered: Gathered { session, surgeon, settings, whole: BTreeMap::new(), words } }
+        Self {
+            protocol,
+            segments,
+            gathered: GatheredSession { session, surgeon, settings, whole: BTreeMap::new(), words },
+        }
     }
 
-    async fn read(mut self, reader: &Reader, clocks: &RunClocks, corrections: &Latest) -> Result<Gathered, StoreError> {
+    async fn read(
+        mut self,
+        reader: &Reader,
+        clocks: &RunClocks,
+        corrections: &Latest,
+    ) -> Result<GatheredSession, StoreError> {
         let session = self.gathered.session;
         let erased: BTreeSet<(Erasable, String)> = reader
             .erasures(session)
@@ -127,12 +136,12 @@ impl<'a> Gathering<'a> {
 
         for (_, comment) in reader.comments(session).await? {
             let typed = corrections.note(Subject::Comment, &comment.key);
-            let is_typed = comment.said == Said::Voice && typed.is_some();
+            let is_typed = comment.said == CommentContent::Voice && typed.is_some();
             let text = match comment.said {
-                Said::Text(text) | Said::Quick(text) => text,
-                Said::Mark => "Marked a moment".to_owned(),
+                CommentContent::Text(text) | CommentContent::Quick(text) => text,
+                CommentContent::Mark => "Marked a moment".to_owned(),
                 // A voice comment can be read once it is transcribed.
-                Said::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
+                CommentContent::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
             };
             // The sound may be erased while its transcript is kept.
             let erased = !is_typed && erased.contains(&(Erasable::Comment, comment.key.to_string()));

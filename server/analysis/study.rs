@@ -6,7 +6,7 @@ use futures_util::{StreamExt, TryStreamExt, stream};
 
 use super::comparison::compare;
 use super::error::AnalysisError;
-use super::gathering::{Gathered, gather};
+use super::gathering::{GatheredSession, gather};
 use super::outcomes::{FOCAL_ERROR, IN_FOCUS, Observation, Outcome, asked, asked_of_session, driven};
 use super::report::{AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SurgeonWords, Value, WholeSessions};
 use super::statistics::summary;
@@ -79,20 +79,20 @@ async fn gather_all(
     clocks: &RunClocks,
     protocol: &Protocol,
     sessions: Vec<&Enrolled>,
-) -> Result<(Vec<AnalysedSession>, Vec<Gathered>), AnalysisError> {
+) -> Result<(Vec<AnalysedSession>, Vec<GatheredSession>), AnalysisError> {
     let mut reading = Vec::new();
     for session in sessions {
         reading.push(gather(reader, clocks, protocol, session));
     }
     let read: Vec<_> = stream::iter(reading).buffered(AT_A_TIME).try_collect().await?;
-    let (lines, gathered): (Vec<_>, Vec<Option<Gathered>>) = read.into_iter().unzip();
+    let (lines, gathered): (Vec<_>, Vec<Option<GatheredSession>>) = read.into_iter().unzip();
     Ok((lines, gathered.into_iter().flatten().collect()))
 }
 
 fn analyse_protocol(
     protocol: &Protocol,
     sessions: Vec<AnalysedSession>,
-    gathered: &[Gathered],
+    gathered: &[GatheredSession],
     seed: u64,
 ) -> ProtocolAnalysis {
     let policies: Vec<String> = protocol.policies.iter().map(|policy| policy.as_str().to_owned()).collect();
@@ -128,8 +128,8 @@ fn analyse_protocol(
     }
 }
 
-fn observations(gathered: &[Gathered], outcome: &str) -> Vec<Observation> {
-    let of_session = |session: &Gathered| {
+fn observations(gathered: &[GatheredSession], outcome: &str) -> Vec<Observation> {
+    let of_session = |session: &GatheredSession| {
         let observation = |(setting, number): (&super::gathering::GatheredSetting, usize)| Observation {
             session: session.session,
             surgeon: session.surgeon.clone(),
@@ -155,12 +155,12 @@ fn value(one: &Observation, outcome: &str) -> Value {
     }
 }
 
-fn whole(outcome: Outcome, gathered: &[Gathered]) -> WholeSessions {
+fn whole(outcome: Outcome, gathered: &[GatheredSession]) -> WholeSessions {
     let values: Vec<f64> = gathered.iter().filter_map(|session| session.whole.get(&outcome.outcome).copied()).collect();
     WholeSessions { missing: gathered.len() - values.len(), summary: summary(&values), outcome }
 }
 
-fn words(gathered: &[Gathered]) -> Vec<SurgeonWords> {
+fn words(gathered: &[GatheredSession]) -> Vec<SurgeonWords> {
     let mut surgeons: BTreeMap<&str, Vec<SettingWords>> = BTreeMap::new();
     for session in gathered {
         surgeons.entry(&session.surgeon).or_default().extend(session.words.iter().cloned());
@@ -184,7 +184,7 @@ fn notes() -> Vec<String> {
     .to_vec()
 }
 
-fn protocol_notes(sessions: &[AnalysedSession], gathered: &[Gathered], measured: &[Outcome]) -> Vec<String> {
+fn protocol_notes(sessions: &[AnalysedSession], gathered: &[GatheredSession], measured: &[Outcome]) -> Vec<String> {
     let mut notes = Vec::new();
     let left_out = sessions.len() - gathered.len();
     notes.push(format!("{} made, {} count, {left_out} left out.", counted(sessions.len(), "session"), gathered.len()));

@@ -167,7 +167,7 @@ fn simulated_studies_have_the_figures_that_scipy_has() {
 }
 
 #[test]
-fn an_effect_is_told_where_there_is_one_and_not_where_there_is_none() {
+fn an_effect_is_found_if_there_is_one_and_not_otherwise() {
     let [none, large] = studies().try_into().ok().unwrap();
     let found = compare(rating(), &none.policies, &observations(&none), 7);
     assert!(found.difference.said.starts_with("No difference between the policies was shown"), "{found:?}");

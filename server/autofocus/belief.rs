@@ -39,13 +39,13 @@ pub struct Trace {
     last: Option<Box<Frame>>,
     /// The focal power last asked for.
     asked: Option<f32>,
-    stand: Stand,
+    stand: SharpnessSinceMove,
     sharpness: SharpnessMemory,
 }
 
 /// The sharpness of the picture since the lens last moved.
 #[derive(Debug, Clone, Copy, Default)]
-struct Stand {
+struct SharpnessSinceMove {
     /// Frames since the lens last moved.
     frames: u32,
     /// The logarithm of the mean gradient magnitude, smoothed over a few frames.
@@ -54,7 +54,7 @@ struct Stand {
     sharpest: f32,
 }
 
-impl Stand {
+impl SharpnessSinceMove {
     /// Weight of a new frame in the smoothed sharpness.
     const FRESH: f32 = 0.3;
     /// Frames for which the lens may stand still while the picture gets worse: one second at the 25 frames per second
@@ -439,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_absent_is_nothing_and_what_is_there_is_told_scale_by_scale() {
+    fn an_absent_patch_gives_zeros_and_a_present_one_its_values_scale_by_scale() {
         let stripes = |width: usize| Patch(std::array::from_fn(|i| if i % (2 * width) < width { 90.0 } else { 160.0 }));
         let fine = stripes(2);
         let coarse = stripes(8);
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn how_fast_the_optic_blurs_is_told_where_it_is_known() {
+    fn the_blur_rate_is_an_input_if_it_is_known() {
         let patch = Patch(std::array::from_fn(|i| if i % 4 < 2 { 90.0 } else { 160.0 }));
         let view = View { patch, wider: [None; 2] };
         let unknown = Trace::default().input(&view, 0.5);

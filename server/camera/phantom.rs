@@ -11,7 +11,7 @@ use crate::simulation::phantom::{Hand, Phantom, Pose, SENSOR_HEIGHT, SENSOR_WIDT
 
 /// What the phantom's camera looks at, and how it is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Before {
+pub enum PhantomScene {
     /// The brain, and the camera in a hand.
     Hand,
     /// The brain, and the camera in a clamp.
@@ -22,7 +22,7 @@ pub enum Before {
     Cap,
 }
 
-impl Before {
+impl PhantomScene {
     /// The scene that `name` stands for in `phantom:name`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
@@ -52,19 +52,19 @@ pub struct PhantomCamera {
     pace: Pace,
     pool: MosaicPool,
     start: Moment,
-    before: Before,
+    before: PhantomScene,
 }
 
 impl PhantomCamera {
     /// The phantom of the settings' seed, with the camera in a hand.
     #[must_use]
     pub fn new(settings: CameraSettings) -> Self {
-        Self::looking(Before::Hand, settings)
+        Self::looking(PhantomScene::Hand, settings)
     }
 
     /// The phantom of the settings' seed, with the scene `before`.
     #[must_use]
-    pub fn looking(before: Before, settings: CameraSettings) -> Self {
+    pub fn looking(before: PhantomScene, settings: CameraSettings) -> Self {
         let phantom = Phantom::new(settings.seed);
         let start = settings.clock.now();
         Self {
@@ -84,13 +84,13 @@ impl PhantomCamera {
     /// shows the brain.
     fn expose(&mut self, number: u64, looked: Moment, samples: &mut [u16]) -> Option<Truth> {
         let pose = match self.before {
-            Before::Hand => self.hand.pose_at(looked.since(self.start)),
-            Before::Clamp => CLAMPED,
-            Before::WhiteTile => {
+            PhantomScene::Hand => self.hand.pose_at(looked.since(self.start)),
+            PhantomScene::Clamp => CLAMPED,
+            PhantomScene::WhiteTile => {
                 self.phantom.expose_tile(WHITE, samples);
                 return None;
             }
-            Before::Cap => {
+            PhantomScene::Cap => {
                 self.phantom.expose_tile(0.0, samples);
                 return None;
             }
@@ -99,7 +99,7 @@ impl PhantomCamera {
         let exposed = self.settings.optics.focal_power_at(looked);
         self.phantom.expose(&pose, exposed, samples);
 
-        if self.before == Before::Hand || number <= EXPOSURE_FOUND {
+        if self.before == PhantomScene::Hand || number <= EXPOSURE_FOUND {
             self.phantom.adjust_exposure(samples);
         }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::phantom::{Before, PhantomCamera};
+use super::phantom::{PhantomCamera, PhantomScene};
 use super::{Camera, CameraError, CameraSettings, footage, recorded, replay};
 use crate::recording::CALIBRATION;
 
@@ -15,8 +15,8 @@ use crate::recording::CALIBRATION;
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     match spec.split_once(':') {
         None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
-        Some(("phantom", name)) if Before::named(name).is_some() => {
-            Ok(Box::new(PhantomCamera::looking(Before::named(name).unwrap_or(Before::Hand), settings)))
+        Some(("phantom", name)) if PhantomScene::named(name).is_some() => {
+            Ok(Box::new(PhantomCamera::looking(PhantomScene::named(name).unwrap_or(PhantomScene::Hand), settings)))
         }
         Some(("footage", path)) if !path.is_empty() => match footage::open(Path::new(path), settings) {
             Ok(camera) => Ok(Box::new(camera)),

@@ -32,19 +32,19 @@ enum Action {
     /// Change what a person may do.
     Role(ChangeRole),
     /// Replace a passphrase, and end all sign-ins of the account. Asks for it, or reads it from standard input.
-    Passphrase(Named),
+    Passphrase(NamedAccount),
     /// Stop a person from signing in, and end all sign-ins of the account.
-    Disable(Named),
+    Disable(NamedAccount),
     /// Let a person sign in again.
-    Enable(Named),
+    Enable(NamedAccount),
     /// End all sign-ins of an account.
-    SignOut(Named),
+    SignOut(NamedAccount),
 }
 
 #[derive(Debug, Args)]
 struct Add {
     #[command(flatten)]
-    named: Named,
+    named: NamedAccount,
     /// What the person may do.
     #[arg(long, value_name = "ROLE", value_parser = role)]
     role: AccountRole,
@@ -56,14 +56,14 @@ struct Add {
 #[derive(Debug, Args)]
 struct ChangeRole {
     #[command(flatten)]
-    named: Named,
+    named: NamedAccount,
     /// lead, operator, researcher or monitor.
     #[arg(value_parser = role)]
     role: AccountRole,
 }
 
 #[derive(Debug, Args)]
-struct Named {
+struct NamedAccount {
     /// Name of the account: lower-case letters, digits, dots and dashes.
     #[arg(value_parser = name)]
     account: AccountName,
@@ -143,7 +143,7 @@ async fn list(list: &List) -> Result<(), Failure> {
     print(&text)
 }
 
-async fn change(named: &Named, change: &AccountChange) -> Result<(), Failure> {
+async fn change(named: &NamedAccount, change: &AccountChange) -> Result<(), Failure> {
     let accounts = open(&named.folder.data_dir).await?;
     accounts.change(&named.account, change, None).await?;
 
@@ -157,7 +157,7 @@ async fn change(named: &Named, change: &AccountChange) -> Result<(), Failure> {
     finish(&accounts, &done).await
 }
 
-async fn replace_passphrase(named: &Named) -> Result<(), Failure> {
+async fn replace_passphrase(named: &NamedAccount) -> Result<(), Failure> {
     let accounts = open(&named.folder.data_dir).await?;
     accounts.replace_passphrase(&named.account, ask()?, None).await?;
     finish(&accounts, &format!("account {} has another passphrase; all its sign-ins have ended", named.account)).await
@@ -199,7 +199,7 @@ fn line(prompt: &str) -> Result<String, Failure> {
     let mut line = String::new();
     if stdin.is_terminal() {
         // Hide the input before prompting, so that text typed ahead is not shown either.
-        let hidden = Hidden::begin()?;
+        let hidden = HiddenInput::begin()?;
         tell(format_args!("{prompt}"));
         let read = stdin.lock().read_line(&mut line);
         drop(hidden);
@@ -212,11 +212,11 @@ fn line(prompt: &str) -> Result<String, Failure> {
 }
 
 /// Hides what is typed on the terminal, until it is dropped.
-struct Hidden {
+struct HiddenInput {
     before: Termios,
 }
 
-impl Hidden {
+impl HiddenInput {
     fn begin() -> Result<Self, Failure> {
         let before = tcgetattr(std::io::stdin())?;
         let mut silent = before.clone();
@@ -226,7 +226,7 @@ impl Hidden {
     }
 }
 
-impl Drop for Hidden {
+impl Drop for HiddenInput {
     fn drop(&mut self) {
         let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &self.before);
     }

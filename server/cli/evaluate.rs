@@ -15,14 +15,14 @@ use crate::camera::recorded::ScanFolder;
 use crate::evaluation::evaluate;
 use crate::evaluation::report::Subject;
 use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::evaluation::stacks::{FIRST_SEED, SEEDS, Told, evaluate_stacks};
+use crate::evaluation::stacks::{BlurKnowledge, FIRST_SEED, SEEDS, evaluate_stacks};
 use crate::files::replace;
 use crate::notices::tell;
 use crate::scans::ScanSet;
 use crate::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
 use crate::scans::detail::{warning, without_detail};
 use crate::scans::footage;
-use crate::scans::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+use crate::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
 use crate::scans::simulated::Scene;
 use crate::scans::stack::source::StackSource;
 use crate::simulation::phantom::Trajectory;
@@ -37,7 +37,7 @@ pub struct Arguments {
     scans: String,
     /// What a recorded scan shows between two of its focal powers.
     #[arg(long, value_enum, default_value_t)]
-    between: Between,
+    between: Interpolation,
     /// Evaluate on a photographed focal stack instead: a folder of pictures of one still scene in order of focus.
     /// `DIR:K` makes K of its planes the range 0 to 1, by default two fifths of them. Each stack runs at two scales and
     /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
@@ -253,9 +253,9 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
     let told = match arguments.blur {
-        None => Told::Nothing,
-        Some(Blur::Rate(rate)) => Told::Rate(rate),
-        Some(Blur::Measured) => Told::Measured,
+        None => BlurKnowledge::Nothing,
+        Some(Blur::Rate(rate)) => BlurKnowledge::Rate(rate),
+        Some(Blur::Measured) => BlurKnowledge::Measured,
     };
 
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
@@ -301,7 +301,7 @@ struct Scans {
     seed: u64,
     /// Number of scans in all parts.
     count: usize,
-    between: Option<Between>,
+    between: Option<Interpolation>,
 }
 
 fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {

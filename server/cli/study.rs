@@ -20,7 +20,7 @@ use crate::clock::SystemClock;
 use crate::conductor::{Studies, StudyDetail};
 use crate::package::{self, Source};
 use crate::store::{Reader, StoreError, StoredStudy};
-use crate::trial::study::signature::{Signature, Way};
+use crate::trial::study::signature::{Channel, Signature};
 use crate::trial::study::state::Change;
 
 /// Arguments of `parfocal study`.
@@ -33,7 +33,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Plan a study from a definition; docs/study.md explains its keys.
-    New(New),
+    New(NewArguments),
     /// Allow new sessions. The first time, draw the orders and print the commitment to them.
     Open(Move),
     /// Allow no more new sessions.
@@ -49,7 +49,7 @@ enum Action {
 }
 
 #[derive(Debug, Args)]
-struct New {
+struct NewArguments {
     /// The definition: a TOML file.
     definition: PathBuf,
     /// A site that this database runs; may be repeated; all sites of the definition by default.
@@ -140,21 +140,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })?
 }
 
-async fn plan(new: &New) -> Result<(), Failure> {
+async fn plan(new: &NewArguments) -> Result<(), Failure> {
     let file = new.definition.display().to_string();
     let definition =
         std::fs::read_to_string(&new.definition).map_err(|error| format!("cannot read {file}: {error}"))?;
 
     let studies = open(&new.signed.data_dir, new.protocols.as_deref()).await?;
     let signature = new.signed.signature()?;
-    let planned = studies.plan(Way::CommandLine, &definition, &file, &new.sites, signature).await?;
+    let planned = studies.plan(Channel::CommandLine, &definition, &file, &new.sites, signature).await?;
     tell(&studies, planned.as_str()).await
 }
 
 async fn change(study: &str, change: Change, signed: &Signed) -> Result<(), Failure> {
     let studies = open(&signed.data_dir, None).await?;
     let mut random = ChaCha12Rng::try_from_rng(&mut SysRng)?;
-    studies.change(Way::CommandLine, study, change, signed.signature()?, None, &mut random).await?;
+    studies.change(Channel::CommandLine, study, change, signed.signature()?, None, &mut random).await?;
     tell(&studies, study).await
 }
 

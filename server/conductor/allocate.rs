@@ -20,7 +20,7 @@ use crate::trial::study::places::next_place;
 use crate::trial::study::refusal::StudyRefusal;
 
 /// The protocol and the place in an order that a new session gets.
-struct Drawn {
+struct DrawnOrder {
     protocol: Protocol,
     /// The seed of the session's set.
     seed: Seed,
@@ -50,7 +50,7 @@ impl Shared {
             None => self.draw_outside(protocol, pen).await?,
         };
 
-        let Drawn { protocol, seed, index, enrolment } = drawn;
+        let DrawnOrder { protocol, seed, index, enrolment } = drawn;
         let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
         let made = self.make(participant, &protocol, seed, index, random);
         let Stamp { at, wall } = made.stamp;
@@ -68,7 +68,7 @@ impl Shared {
     }
 
     /// An order for a session outside any study, by the installed protocol.
-    async fn draw_outside(&self, protocol: &str, pen: &mut Pen) -> Result<Drawn, ConductError> {
+    async fn draw_outside(&self, protocol: &str, pen: &mut Pen) -> Result<DrawnOrder, ConductError> {
         let protocol = self.library.get(protocol).cloned().ok_or_else(|| {
             let name: String = protocol.chars().take(40).collect();
             ConductError::NotFound(format!("there is no protocol '{name}'; there are: {}", self.library.names()))
@@ -77,7 +77,7 @@ impl Shared {
 
         let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
         let (seed, index) = self.draw_place(&protocol, random).await?;
-        Ok(Drawn { protocol, seed, index, enrolment: None })
+        Ok(DrawnOrder { protocol, seed, index, enrolment: None })
     }
 
     /// The next place in the list of a study's site, by the protocol as it was when the study was planned.
@@ -86,7 +86,7 @@ impl Shared {
         StudySite { study, site }: StudySite,
         protocol: &str,
         participant: &str,
-    ) -> Result<Drawn, ConductError> {
+    ) -> Result<DrawnOrder, ConductError> {
         let stored = self.studies.stored(&study).await?;
         stored.state().check_takes_sessions()?;
 
@@ -111,7 +111,7 @@ impl Shared {
             protocol: protocol.name.clone(),
             place,
         };
-        Ok(Drawn { protocol: protocol.clone(), seed: drawn.seed, index: drawn.index, enrolment: Some(enrolment) })
+        Ok(DrawnOrder { protocol: protocol.clone(), seed: drawn.seed, index: drawn.index, enrolment: Some(enrolment) })
     }
 
     async fn check_participant(&self, code: &str) -> Result<(), ConductError> {

@@ -11,7 +11,7 @@ use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
 
 /// A correction that was decided on, as it is stored.
-struct Decided {
+struct DecidedCorrection {
     subject: Subject,
     record: String,
     field: Field,
@@ -47,7 +47,7 @@ impl Shared {
         }
 
         let latest = Latest::of(&self.store.reader().corrections(session).await?);
-        let Decided { subject, record, field, old, new } = match new.change {
+        let DecidedCorrection { subject, record, field, old, new } = match new.change {
             FieldChange::Participant { old, new } => self.participant(&course, &latest, old, new).await?,
             FieldChange::Value { record, old, new } => self.value(&course, &latest, record, &old, &new).await?,
             FieldChange::Note { record, old, new } => self.note(&course, &latest, record, &old, &new).await?,
@@ -65,14 +65,20 @@ impl Shared {
         latest: &Latest,
         old: String,
         new: String,
-    ) -> Result<Decided, ConductError> {
+    ) -> Result<DecidedCorrection, ConductError> {
         let session = course.session();
         let known = self.store.reader().participants().await?;
         let current = latest.participant(session).unwrap_or(&course.made.participant);
         let codes = known.iter().map(|participant| participant.code.as_str());
         correction::check_participant(current, &old, &new, codes)?;
 
-        Ok(Decided { subject: Subject::Session, record: session.to_string(), field: Field::Participant, old, new })
+        Ok(DecidedCorrection {
+            subject: Subject::Session,
+            record: session.to_string(),
+            field: Field::Participant,
+            old,
+            new,
+        })
     }
 
     async fn value(
@@ -82,7 +88,7 @@ impl Shared {
         record: IdempotencyKey,
         old: &AnswerValue,
         new: &AnswerValue,
-    ) -> Result<Decided, ConductError> {
+    ) -> Result<DecidedCorrection, ConductError> {
         let answers = self.store.reader().answers(course.session()).await?;
         let standings = standings(&answers, &self.run_clock.clocks);
         let found = answers.iter().zip(&standings).find(|((_, answer), _)| answer.key == record);
@@ -102,7 +108,13 @@ impl Shared {
         correction::check_value(&answer, old, new, &course.protocol, settings)?;
 
         let record = record.to_string();
-        Ok(Decided { subject: Subject::Answer, record, field: Field::Value, old: json(old)?, new: json(new)? })
+        Ok(DecidedCorrection {
+            subject: Subject::Answer,
+            record,
+            field: Field::Value,
+            old: json(old)?,
+            new: json(new)?,
+        })
     }
 
     async fn note(
@@ -112,14 +124,14 @@ impl Shared {
         record: IdempotencyKey,
         old: &str,
         new: &str,
-    ) -> Result<Decided, ConductError> {
+    ) -> Result<DecidedCorrection, ConductError> {
         let subject = self.subject_of(course.session(), record).await?;
         let old = old.trim();
         let new = new.trim();
         correction::check_note(latest.note(subject, &record).unwrap_or_default(), old, new)?;
 
         let record = record.to_string();
-        Ok(Decided { subject, record, field: Field::Note, old: old.to_owned(), new: new.to_owned() })
+        Ok(DecidedCorrection { subject, record, field: Field::Note, old: old.to_owned(), new: new.to_owned() })
     }
 
     /// Whether the record with this key is an answer or a comment of `session`.

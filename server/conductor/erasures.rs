@@ -12,7 +12,7 @@ use crate::trial::erasure::{self, Erasable, NewErasure};
 use crate::trial::event::EventKind;
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
-use crate::trial::remark::Said;
+use crate::trial::remark::CommentContent;
 use crate::trial::study::event::StudyEventKind;
 
 impl Conductor {
@@ -63,7 +63,7 @@ impl Shared {
     pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let comments = reader.comments(session).await?.into_iter();
-        let comments = comments.filter(|(_, comment)| comment.said != Said::Mark);
+        let comments = comments.filter(|(_, comment)| comment.said != CommentContent::Mark);
         let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
         let answers = reader.answers(session).await?.into_iter();
         let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));

@@ -3,7 +3,7 @@
 use super::course::Course;
 use super::{ConductError, Shared};
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{Answer, Comment, Kept, Stamp};
+use crate::store::{Answer, Comment, KeepOutcome, Stamp};
 use crate::trial::acceptance;
 use crate::trial::grace::Grace;
 use crate::trial::refusal::Refusal;
@@ -14,13 +14,13 @@ impl Shared {
         acceptance::check_comment(&new.said)?;
 
         let _pen = self.pen.lock().await;
-        let known = |course: &mut Course| Known {
+        let known = |course: &mut Course| SessionFacts {
             segments: course.state.plan().segments.clone(),
             grace: course.grace,
             voice: course.protocol.voice,
         };
         let current = self.live().course_of(new.session).map(known);
-        let Known { segments, grace, voice } = match current {
+        let SessionFacts { segments, grace, voice } = match current {
             Some(current) => current,
             None => self.of_earlier(new.session).await?,
         };
@@ -43,7 +43,7 @@ impl Shared {
 
         let kept = self.store.keep_comment(&comment).await?;
         let mut live = self.live();
-        if kept == Kept::New
+        if kept == KeepOutcome::New
             && let Some(course) = live.course_of(comment.session)
         {
             course.heard(comment);
@@ -74,7 +74,7 @@ impl Shared {
         let answer = self.stamped(new, grace);
         let kept = self.store.keep_answer(&answer).await?;
         let mut live = self.live();
-        if kept == Kept::New
+        if kept == KeepOutcome::New
             && let Some(course) = live.course_of(answer.session)
         {
             let given = answer.given(self.run_clock.run, &self.run_clock.clocks);
@@ -87,7 +87,7 @@ impl Shared {
 
     /// Stores an answer to a session whose questions cannot be read.
     async fn keep_unasked(&self, new: NewAnswer) -> Result<(), ConductError> {
-        let Known { segments, grace, .. } = self.of_earlier(new.session).await?;
+        let SessionFacts { segments, grace, .. } = self.of_earlier(new.session).await?;
         acceptance::check_unasked(&new, &segments)?;
         unless_taken(self.store.keep_answer(&self.stamped(new, grace)).await?)
     }
@@ -110,13 +110,13 @@ impl Shared {
 
     /// What is known of an earlier session, even if its protocol can no longer be read, so that a late comment on it is
     /// stored.
-    async fn of_earlier(&self, session: SessionId) -> Result<Known, ConductError> {
+    async fn of_earlier(&self, session: SessionId) -> Result<SessionFacts, ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.run_clock.clocks);
         // If the protocol cannot be read, accept voice, so that nothing that was said is lost.
         let voice = stored.protocol().map_or(true, |protocol| protocol.voice);
         let segments = stored.made.segments.into_iter().map(|(segment, _)| segment).collect();
-        Ok(Known { segments, grace, voice })
+        Ok(SessionFacts { segments, grace, voice })
     }
 
     pub(super) fn stamp(&self) -> Stamp {
@@ -125,7 +125,7 @@ impl Shared {
 }
 
 /// What a decision about a comment needs to know of its session.
-struct Known {
+struct SessionFacts {
     segments: Vec<SegmentId>,
     grace: Grace,
     /// Whether the session accepts spoken comments.
@@ -136,10 +136,10 @@ fn check(course: &Course, new: &NewAnswer) -> Result<(), Refusal> {
     acceptance::check_answer(new, &course.protocol, &course.state)
 }
 
-fn unless_taken(kept: Kept) -> Result<(), ConductError> {
+fn unless_taken(kept: KeepOutcome) -> Result<(), ConductError> {
     match kept {
-        Kept::New | Kept::Before => Ok(()),
-        Kept::KeyTaken => Err(taken()),
+        KeepOutcome::New | KeepOutcome::Before => Ok(()),
+        KeepOutcome::KeyTaken => Err(taken()),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::trial::role::Role;
 use crate::trial::study::definition::{Definition, StudyName};
 use crate::trial::study::event::{StudyEvent, StudyEventKind};
 use crate::trial::study::lists::Lists;
-use crate::trial::study::signature::{Signature, Way};
+use crate::trial::study::signature::{Channel, Signature};
 use crate::trial::study::stage::Stage;
 use crate::trial::study::state::{Change, StudyCircumstances, check_way};
 
@@ -63,7 +63,7 @@ impl Studies {
     /// If the definition is malformed, a study of that name exists, or it has no such site.
     pub async fn plan(
         &self,
-        way: Way,
+        way: Channel,
         definition: &str,
         file: &str,
         sites: &[String],
@@ -95,7 +95,7 @@ impl Studies {
     /// If there is no such study, the rules refuse the change, or the disk failed.
     pub async fn change(
         &self,
-        way: Way,
+        way: Channel,
         name: &str,
         change: Change,
         signature: Signature,
@@ -161,7 +161,7 @@ impl Studies {
 
         let event = StudyEvent {
             number: study.state().events + 1,
-            way: Way::Role(unblinding.by),
+            way: Channel::Role(unblinding.by),
             signature: signature.clone(),
             wall: unblinding.wall,
             kind: StudyEventKind::SessionUnblinded { session },

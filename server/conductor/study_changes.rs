@@ -6,7 +6,7 @@ use super::{ConductError, Conductor};
 use crate::ids::SessionId;
 use crate::trial::role::Role;
 use crate::trial::study::definition::StudyName;
-use crate::trial::study::signature::{Signature, Way};
+use crate::trial::study::signature::{Channel, Signature};
 use crate::trial::study::state::Change;
 
 impl Conductor {
@@ -42,7 +42,7 @@ impl Conductor {
     ) -> Result<StudyName, ConductError> {
         self.to_the_end(move |shared| async move {
             let _pen = shared.pen.lock().await;
-            shared.studies.plan(Way::Role(by), &definition, "the definition", &sites, signature).await
+            shared.studies.plan(Channel::Role(by), &definition, "the definition", &sites, signature).await
         })
         .await
     }
@@ -64,7 +64,7 @@ impl Conductor {
             shared.record_stops(&mut pen).await?;
             let on_screens = shared.live().course.as_ref().map(Course::session);
             let random = &mut pen.random;
-            shared.studies.change(Way::Role(by), &name, change, signature, on_screens, random).await
+            shared.studies.change(Channel::Role(by), &name, change, signature, on_screens, random).await
         })
         .await
     }

@@ -18,7 +18,7 @@ use crate::trial::event::{Event, EventKind};
 use crate::trial::permission;
 use crate::trial::protocol::Record;
 use crate::trial::question::AnswerValue;
-use crate::trial::remark::Said;
+use crate::trial::remark::CommentContent;
 use crate::trial::role::Role;
 use crate::trial::standing::Standing;
 use crate::trial::voice::Ending;
@@ -97,7 +97,7 @@ pub struct TimelineComment {
     pub late: bool,
     /// The content of the comment; empty if it was erased.
     #[serde(flatten)]
-    pub said: Said,
+    pub said: CommentContent,
     /// A researcher's note on the comment; for a voice comment, its transcript.
     pub note: Option<String>,
     /// The recording of a voice comment; none for other comments.
@@ -175,7 +175,8 @@ impl Conductor {
             key: comment.key,
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
             erased: erased(&erasures, Erasable::Comment, &comment.key),
-            voice: (comment.said == Said::Voice).then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
+            voice: (comment.said == CommentContent::Voice)
+                .then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
             at: comment.stamp.wall,
             seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),

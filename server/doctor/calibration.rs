@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn its_age_is_told() {
+    fn the_age_is_reported() {
         assert!(verdict(Some("2026-03-01")).1.ends_with("It is 10 days old."));
         assert_eq!(verdict(Some("2026-03-01")).0, Verdict::Well);
         assert_eq!(verdict(Some("2026-03-11")).0, Verdict::Well);

@@ -39,7 +39,7 @@ mod tests {
     use crate::doctor::Verdict;
 
     #[test]
-    fn a_certificate_is_told_of_a_month_before_its_end_and_refused_after_it() {
+    fn a_certificate_is_reported_a_month_before_its_end_and_wrong_after_it() {
         let until: Timestamp = "2026-07-01T12:00:00Z".parse().unwrap();
         let at = |now: &str| certificate(until, false, now.parse().unwrap());
         assert_eq!(at("2026-06-01T11:00:00Z").verdict, Verdict::Well);

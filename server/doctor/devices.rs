@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_is_away_is_wrong_and_one_that_is_not_real_is_told() {
+    fn an_absent_device_is_wrong_and_a_simulated_one_is_reported() {
         assert_eq!(lens_in_use(&lens_health(false, false, false), None).verdict, Verdict::Wrong);
         assert_eq!(lens_in_use(&lens_health(true, true, false), None).verdict, Verdict::Advice);
         assert_eq!(lens_in_use(&lens_health(true, false, true), None).verdict, Verdict::Advice);

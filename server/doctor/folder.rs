@@ -89,7 +89,7 @@ mod tests {
     use crate::doctor::finding::Verdict;
 
     #[test]
-    fn a_folder_that_others_can_read_is_told() {
+    fn a_folder_that_others_can_read_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         set_permissions(folder.path(), Permissions::from_mode(0o755)).unwrap();
         assert_eq!(access(folder.path()).verdict, Verdict::Advice);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_folder_is_wrong_and_what_is_missing_is_told() {
+    fn a_file_is_not_a_folder_and_a_missing_folder_is_reported() {
         let file = tempfile::NamedTempFile::new().unwrap();
         assert_eq!(access(file.path()).verdict, Verdict::Wrong);
         let folder = tempfile::tempdir().unwrap();

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn small_packets_and_slow_cables_are_told() {
+    fn small_packets_and_slow_cables_are_reported() {
         let verdict = |folder: &tempfile::TempDir| Link::read(folder.path()).unwrap().finding().verdict;
         assert_eq!(verdict(&interface("9000\n", "1000\n", "up\n")), Verdict::Well);
         assert_eq!(verdict(&interface("1500\n", "1000\n", "up\n")), Verdict::Advice);

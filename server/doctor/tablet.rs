@@ -90,14 +90,14 @@ mod tests {
     }
 
     #[test]
-    fn browsers_are_told_by_name() {
+    fn browsers_are_recognised_by_name() {
         assert_eq!(browser(IPAD), "Safari on an iPad or a Mac");
         assert_eq!(browser(ANDROID), "Chrome on Android");
         assert_eq!(browser("curl/8.5.0"), "a browser");
     }
 
     #[test]
-    fn a_tablet_that_is_away_asleep_or_slow_is_told() {
+    fn a_tablet_that_is_away_asleep_or_slow_is_reported() {
         let of = |open: &[Tablet]| tablets(open).into_iter().map(|finding| finding.verdict).collect::<Vec<_>>();
         assert_eq!(of(&[]), [Verdict::Advice]);
         assert_eq!(of(&[tablet(true, true)]), [Verdict::Well]);

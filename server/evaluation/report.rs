@@ -14,7 +14,7 @@ use crate::autofocus::{IN_FOCUS, PolicyName};
 use crate::files::replace;
 use crate::plot::{Axis, Plot};
 use crate::scans::detail::warning;
-use crate::scans::recorded::Between;
+use crate::scans::recorded::Interpolation;
 
 /// What was evaluated.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct Subject {
     pub footage: Vec<String>,
     /// What a recorded scan shows between two of its focal powers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub between: Option<Between>,
+    pub between: Option<Interpolation>,
     /// Folder of weights that replace those that ship, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights_folder: Option<String>,
@@ -177,8 +177,8 @@ impl Report {
 
         text.push_str(match self.subject.between {
             None => "",
-            Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
-            Some(Between::Interpolated) => {
+            Some(Interpolation::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
+            Some(Interpolation::Interpolated) => {
                 " A frame shows a mix of the pictures recorded at the two nearest focal powers."
             }
         });

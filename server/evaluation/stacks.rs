@@ -37,7 +37,7 @@ struct Item {
 
 /// Which blur rate of the optic the policies get.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Told {
+pub enum BlurKnowledge {
     /// No rate.
     Nothing,
     /// This rate, for every stack.
@@ -47,16 +47,16 @@ pub enum Told {
 }
 
 /// Makes [`SEEDS`] courses over `source` at each scale.
-fn items(source: &StackSource, first_seed: u64, told: Told) -> Result<Vec<Item>, UnfitStack> {
+fn items(source: &StackSource, first_seed: u64, told: BlurKnowledge) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
         let blur = match told {
-            Told::Nothing => None,
-            Told::Rate(rate) => Some(rate),
-            Told::Measured => scaled.blur_rate(),
+            BlurKnowledge::Nothing => None,
+            BlurKnowledge::Rate(rate) => Some(rate),
+            BlurKnowledge::Measured => scaled.blur_rate(),
         };
         Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur })
     };
@@ -124,7 +124,7 @@ pub fn evaluate_stacks(
     policies: &[PolicyName],
     sources: &[StackSource],
     seed: u64,
-    told: Told,
+    told: BlurKnowledge,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();

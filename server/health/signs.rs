@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_restart_does_not_mend_is_no_failure() {
+    fn a_problem_that_a_restart_does_not_fix_is_not_a_failure() {
         let degraded = [
             (Signs { camera_works: false, ..well() }, Code::CameraSilent),
             (Signs { lens_works: false, ..well() }, Code::LensGone),

@@ -33,12 +33,12 @@ struct Shared {
     status: watch::Receiver<Arc<ControlStatus>>,
     session: watch::Receiver<Option<Arc<OperatorView>>>,
     store: Store,
-    looked: Mutex<Looked>,
+    looked: Mutex<CheckResults>,
 }
 
 /// Results of the periodic checks.
 #[derive(Default)]
-struct Looked {
+struct CheckResults {
     disk: DiskSign,
     /// Telemetry records lost since the start. `lost_at` is when the number last rose.
     lost: u64,
@@ -129,7 +129,7 @@ impl Shared {
         }
     }
 
-    fn looked(&self) -> std::sync::MutexGuard<'_, Looked> {
+    fn looked(&self) -> std::sync::MutexGuard<'_, CheckResults> {
         self.looked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -13,7 +13,7 @@ use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::now;
-use super::people::{From, SignedIn, confirmed_lead, lead};
+use super::people::{PeerAddress, SignedIn, confirmed_lead, lead};
 use super::researcher::local;
 use super::roles::Researcher;
 use super::security::Nonce;
@@ -104,7 +104,7 @@ struct NewAccount {
 async fn make(
     by: Researcher,
     State(app): State<AppState>,
-    From(peer): From,
+    PeerAddress(peer): PeerAddress,
     JsonBody(new): JsonBody<NewAccount>,
 ) -> Result<Json<Account>, Error> {
     let lead = confirmed_lead(&app, &by, Some(&new.passphrase), peer).await?;
@@ -159,7 +159,7 @@ async fn change(
     by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
-    From(peer): From,
+    PeerAddress(peer): PeerAddress,
     JsonBody(wanted): JsonBody<ChangeAccount>,
 ) -> Result<Json<Vec<AccountLine>>, Error> {
     let lead = confirmed_lead(&app, &by, Some(&wanted.passphrase), peer).await?;

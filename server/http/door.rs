@@ -31,7 +31,7 @@ pub(super) enum Door {
 }
 
 /// A connection that is ready for requests.
-pub(super) struct Opened {
+pub(super) struct ReadyConnection {
     pub(super) line: Box<dyn Line>,
     /// Whether both ends have agreed on HTTP/2; otherwise it is HTTP/1.
     pub(super) http2: bool,
@@ -42,25 +42,29 @@ pub(super) struct Opened {
 impl Door {
     /// Finds out which protocol `stream` speaks, and does the handshake. There is no time limit here. Encryption
     /// buffers at most `buffer` bytes.
-    pub(super) async fn open(self, stream: TcpStream, place: Arc<Place>, buffer: usize) -> io::Result<Opened> {
+    pub(super) async fn open(self, stream: TcpStream, place: Arc<Place>, buffer: usize) -> io::Result<ReadyConnection> {
         let (tls, pages, plain) = match self {
             Self::Plain { pages } => {
-                return Ok(Opened { line: Box::new(Placed { stream, _place: place }), http2: false, pages });
+                return Ok(ReadyConnection {
+                    line: Box::new(PlacedConnection { stream, _place: place }),
+                    http2: false,
+                    pages,
+                });
             }
             Self::Encrypted { tls, pages, plain } => (tls, pages, plain),
         };
 
         let mut first = [0];
         let is_handshake = stream.peek(&mut first).await? == 1 && first[0] == HANDSHAKE;
-        let placed = Placed { stream, _place: place };
+        let placed = PlacedConnection { stream, _place: place };
         if !is_handshake {
-            return Ok(Opened { line: Box::new(placed), http2: false, pages: plain });
+            return Ok(ReadyConnection { line: Box::new(placed), http2: false, pages: plain });
         }
 
         // A picture that waits in this buffer would be seen late.
         let stream = tls.accept_with(placed, |connection| connection.set_buffer_limit(Some(buffer))).await?;
         let http2 = stream.get_ref().1.alpn_protocol() == Some(HTTP2);
-        Ok(Opened { line: Box::new(stream), http2, pages })
+        Ok(ReadyConnection { line: Box::new(stream), http2, pages })
     }
 }
 
@@ -70,24 +74,24 @@ pub(super) trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
 
 /// A connection with its place. It keeps the place when it becomes a WebSocket.
-struct Placed {
+struct PlacedConnection {
     stream: TcpStream,
     _place: Arc<Place>,
 }
 
-impl Placed {
+impl PlacedConnection {
     fn stream(self: Pin<&mut Self>) -> Pin<&mut TcpStream> {
         Pin::new(&mut self.get_mut().stream)
     }
 }
 
-impl AsyncRead for Placed {
+impl AsyncRead for PlacedConnection {
     fn poll_read(self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         self.stream().poll_read(cx, buffer)
     }
 }
 
-impl AsyncWrite for Placed {
+impl AsyncWrite for PlacedConnection {
     fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         self.stream().poll_write(cx, bytes)
     }

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_lead_is_told_to_lock_and_unblind() {
+    fn only_a_lead_is_asked_to_lock_and_unblind() {
         for stage in [Stage::Closed, Stage::Locked] {
             assert_ne!(on_study(stage, true), on_study(stage, false));
         }

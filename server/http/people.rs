@@ -41,9 +41,9 @@ impl<S: Sync> FromRequestParts<S> for SignedIn {
 }
 
 /// The address that a request came from.
-pub(super) struct From(pub(super) IpAddr);
+pub(super) struct PeerAddress(pub(super) IpAddr);
 
-impl<S: Sync> FromRequestParts<S> for From {
+impl<S: Sync> FromRequestParts<S> for PeerAddress {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {

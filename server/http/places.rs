@@ -34,10 +34,10 @@ const MEMBERS: Room = Room { host: 128, all: 512 };
 
 /// All places.
 #[derive(Clone, Default)]
-pub struct Places(Arc<Mutex<Taken>>);
+pub struct Places(Arc<Mutex<TakenPlaces>>);
 
 #[derive(Default)]
-struct Taken {
+struct TakenPlaces {
     /// By number, so the oldest comes first.
     connections: BTreeMap<u64, Connection>,
     next: u64,
@@ -58,7 +58,7 @@ pub struct Place {
 
 /// Error: there is no place left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Full;
+pub struct NoPlaceLeft;
 
 impl Places {
     /// Gives a connection from `address` a stranger's place. The receiver fails when the connection must give way.
@@ -78,12 +78,12 @@ impl Places {
         (Place { number, places: self.clone() }, give_way)
     }
 
-    fn taken(&self) -> MutexGuard<'_, Taken> {
+    fn taken(&self) -> MutexGuard<'_, TakenPlaces> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Taken {
+impl TakenPlaces {
     fn count(&self, member: bool, host: Option<IpAddr>) -> usize {
         let counts = |there: &&Connection| there.member == member && host.is_none_or(|host| there.host == host);
         self.connections.values().filter(counts).count()
@@ -109,7 +109,7 @@ impl Place {
     ///
     /// # Errors
     /// If members have no place left.
-    pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), Full> {
+    pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), NoPlaceLeft> {
         if self.is_members() || !signed_in && !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
             return Ok(());
         }
@@ -120,11 +120,11 @@ impl Place {
         self.places.taken().connections.get(&self.number).is_some_and(|there| there.member)
     }
 
-    fn make_members(&self) -> Result<(), Full> {
+    fn make_members(&self) -> Result<(), NoPlaceLeft> {
         let mut taken = self.places.taken();
         let Some(there) = taken.connections.get(&self.number) else {
             // It has just given way.
-            return Err(Full);
+            return Err(NoPlaceLeft);
         };
 
         if there.member {
@@ -132,7 +132,7 @@ impl Place {
         }
 
         if taken.count(true, Some(there.host)) >= MEMBERS.host || taken.count(true, None) >= MEMBERS.all {
-            return Err(Full);
+            return Err(NoPlaceLeft);
         }
 
         if let Some(there) = taken.connections.get_mut(&self.number) {
@@ -200,7 +200,7 @@ mod tests {
 
         let _members: Vec<_> = (0..MEMBERS.host).map(member).collect();
         let (one_more, _stay) = places.take(HOST);
-        assert_eq!(one_more.make_members(), Err(Full));
+        assert_eq!(one_more.make_members(), Err(NoPlaceLeft));
         let (elsewhere, _stay_too) = places.take("198.51.100.7".parse().unwrap());
         assert_eq!(elsewhere.make_members(), Ok(()));
     }

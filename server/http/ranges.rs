@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 
 /// The part that a request asks for.
 #[derive(Debug, PartialEq, Eq)]
-enum Wanted {
+enum RequestedRange {
     /// All of it. Also used for forms that a server may ignore, such as several ranges.
     Whole,
     /// These bytes.
@@ -26,30 +26,30 @@ pub(super) fn answer(headers: &HeaderMap, whole: Vec<u8>) -> Response {
     let accepts = (ACCEPT_RANGES, "bytes".to_owned());
 
     match wanted(asked, length) {
-        Wanted::Whole => ([accepts], whole).into_response(),
-        Wanted::Part(part) => {
+        RequestedRange::Whole => ([accepts], whole).into_response(),
+        RequestedRange::Part(part) => {
             let told = format!("bytes {}-{}/{length}", part.start, part.end - 1);
             (StatusCode::PARTIAL_CONTENT, [accepts, (CONTENT_RANGE, told)], whole.slice(part)).into_response()
         }
-        Wanted::Beyond => {
+        RequestedRange::Beyond => {
             let told = format!("bytes */{length}");
             (StatusCode::RANGE_NOT_SATISFIABLE, [accepts, (CONTENT_RANGE, told)]).into_response()
         }
     }
 }
 
-fn wanted(asked: Option<&str>, length: usize) -> Wanted {
+fn wanted(asked: Option<&str>, length: usize) -> RequestedRange {
     let range = asked.and_then(|asked| asked.strip_prefix("bytes=")).and_then(|range| range.split_once('-'));
-    let Some((first, last)) = range else { return Wanted::Whole };
+    let Some((first, last)) = range else { return RequestedRange::Whole };
 
     let part = match (first.parse::<usize>(), last.parse::<usize>()) {
         (Ok(first), Ok(last)) if first <= last => first..last.saturating_add(1).min(length),
         (Ok(first), Err(_)) if last.is_empty() => first..length,
         // The last `count` bytes, or all if there are fewer.
         (Err(_), Ok(count)) if first.is_empty() => length.saturating_sub(count)..length,
-        _ => return Wanted::Whole,
+        _ => return RequestedRange::Whole,
     };
-    if part.is_empty() { Wanted::Beyond } else { Wanted::Part(part) }
+    if part.is_empty() { RequestedRange::Beyond } else { RequestedRange::Part(part) }
 }
 
 #[cfg(test)]
@@ -59,17 +59,17 @@ mod tests {
     #[test]
     fn a_range_is_read_as_the_standard_says() {
         let asked = |text: &str| wanted(Some(text), 1000);
-        assert_eq!(wanted(None, 1000), Wanted::Whole);
-        assert_eq!(asked("bytes=0-"), Wanted::Part(0..1000));
-        assert_eq!(asked("bytes=0-499"), Wanted::Part(0..500));
-        assert_eq!(asked("bytes=500-999"), Wanted::Part(500..1000));
-        assert_eq!(asked("bytes=900-5000"), Wanted::Part(900..1000));
-        assert_eq!(asked("bytes=-500"), Wanted::Part(500..1000));
-        assert_eq!(asked("bytes=-5000"), Wanted::Part(0..1000));
-        assert_eq!(asked("bytes=1000-"), Wanted::Beyond);
-        assert_eq!(asked("bytes=-0"), Wanted::Beyond);
+        assert_eq!(wanted(None, 1000), RequestedRange::Whole);
+        assert_eq!(asked("bytes=0-"), RequestedRange::Part(0..1000));
+        assert_eq!(asked("bytes=0-499"), RequestedRange::Part(0..500));
+        assert_eq!(asked("bytes=500-999"), RequestedRange::Part(500..1000));
+        assert_eq!(asked("bytes=900-5000"), RequestedRange::Part(900..1000));
+        assert_eq!(asked("bytes=-500"), RequestedRange::Part(500..1000));
+        assert_eq!(asked("bytes=-5000"), RequestedRange::Part(0..1000));
+        assert_eq!(asked("bytes=1000-"), RequestedRange::Beyond);
+        assert_eq!(asked("bytes=-0"), RequestedRange::Beyond);
         for other in ["", "bytes=", "bytes=-", "bytes=5-4", "bytes=0-1,5-6", "lines=0-1", "bytes=a-b"] {
-            assert_eq!(asked(other), Wanted::Whole, "{other}");
+            assert_eq!(asked(other), RequestedRange::Whole, "{other}");
         }
     }
 }

@@ -15,7 +15,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::people::{Acting, From, SignedIn, confirmed_lead};
+use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::{Researcher, Roles};
 use super::security::Nonce;
 use super::{AppState, now};
@@ -333,7 +333,7 @@ async fn unblind(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
-    From(peer): From,
+    PeerAddress(peer): PeerAddress,
     JsonBody(Unblind { reason, despite_outstanding, passphrase }): JsonBody<Unblind>,
 ) -> Result<StatusCode, Error> {
     if app.conductor.study_of(id).await?.is_some() {

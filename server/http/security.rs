@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loopback_names_are_told_from_others() {
+    fn loopback_names_are_recognised() {
         for ours in ["localhost", "LocalHost:8080", "127.0.0.1:8080", "127.1.2.3", "[::1]:8080", "[::1]"] {
             assert!(is_loopback_name(ours), "{ours}");
         }

@@ -14,7 +14,7 @@ use super::AppState;
 use super::credentials::{ACCOUNT_COOKIE, set_cookie};
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::people::{From, SignedIn};
+use super::people::{PeerAddress, SignedIn};
 use super::roles::home;
 use super::security::Nonce;
 use crate::accounts::{AccountError, Passphrase};
@@ -95,7 +95,7 @@ struct SignedInAs {
     (status = 507, description = "The disk failed", body = ErrorBody)))]
 async fn sign_in(
     State(app): State<AppState>,
-    From(peer): From,
+    PeerAddress(peer): PeerAddress,
     JsonBody(wanted): JsonBody<SignIn>,
 ) -> Result<Response, Error> {
     let chosen = wanted.new_passphrase.as_deref().map(Passphrase::new).transpose().map_err(AccountError::from)?;
@@ -142,7 +142,7 @@ mod tests {
     use super::is_own_path;
 
     #[test]
-    fn only_a_path_of_this_server_is_gone_on_to() {
+    fn a_sign_in_leads_only_to_a_path_of_this_server() {
         assert!(is_own_path("/researcher/studies/scope-2026"));
         for elsewhere in
             ["", "researcher", "//evil.example", "https://evil.example", "/\\evil.example", "/\t/evil.example"]

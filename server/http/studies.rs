@@ -10,7 +10,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::people::{Acting, From, SignedIn, confirmed_lead};
+use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::Researcher;
 use super::security::Nonce;
 use super::{AppState, now};
@@ -246,7 +246,7 @@ async fn change_study(
     by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
-    From(peer): From,
+    PeerAddress(peer): PeerAddress,
     JsonBody(wanted): JsonBody<ChangeStudy>,
 ) -> Result<Json<StudyDetail>, Error> {
     let account = match wanted.change {

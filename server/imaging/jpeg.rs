@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_is_none_is_an_error() {
+    fn an_invalid_picture_is_an_error() {
         let mut encoder = JpegEncoder::new(80).unwrap();
         assert!(matches!(encoder.encode_ycc(&YccImage::default()), Err(JpegError::BadPicture { .. })));
         assert!(matches!(encoder.encode(&RgbImage::default()), Err(JpegError::BadPicture { .. })));

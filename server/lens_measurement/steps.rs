@@ -60,7 +60,7 @@ pub fn measure(
     plan: Plan,
     pause: &dyn Fn(Duration),
 ) -> Result<Measurement, MeasurementError> {
-    let mut stand = Stand { lens, view, plan };
+    let mut stand = TestBench { lens, view, plan };
     let flank = stand.flank()?;
     let (low, high) = flank.ends();
 
@@ -88,13 +88,13 @@ pub fn measure(
 }
 
 /// The lens and the camera that are measured.
-struct Stand<'a> {
+struct TestBench<'a> {
     lens: &'a mut dyn Lens,
     view: &'a mut View,
     plan: Plan,
 }
 
-impl Stand<'_> {
+impl TestBench<'_> {
     /// Measures sharpness over focal power, up and down, and finds its steepest side.
     fn flank(&mut self) -> Result<Flank, MeasurementError> {
         let powers: Vec<f64> = (0..self.plan.stops.max(3)).map(f64::from).collect();

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trembling_circle_is_told_once_and_a_moved_one_again() {
+    fn a_trembling_circle_is_reported_once_and_a_moved_one_again() {
         let mut watch = AreaWatch::default();
         assert_eq!(watch.see(area(256.0, 120.0)), Some(area(256.0, 120.0)));
         assert_eq!(watch.see(area(257.5, 119.0)), None);
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrong_circle_is_no_news_but_two_that_agree_are() {
+    fn one_wrong_circle_is_ignored_but_two_that_agree_are_not() {
         let mut watch = AreaWatch::default();
         watch.see(area(256.0, 120.0));
         assert_eq!(watch.see(area(290.0, 120.0)), None);
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn one_dark_picture_is_no_news_but_ten_are() {
+    fn one_dark_picture_is_ignored_but_ten_are_not() {
         let mut watch = AreaWatch::default();
         assert_eq!(watch.see(None), None);
         watch.see(area(256.0, 120.0));

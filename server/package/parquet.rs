@@ -23,13 +23,13 @@ const GROUP: usize = 16_384;
 pub struct ParquetFile {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
-    columns: Vec<Gathered>,
+    columns: Vec<ColumnCells>,
     /// Number of rows gathered for the next row group.
     rows: usize,
 }
 
 /// The cells of a column, gathered for the next row group.
-struct Gathered {
+struct ColumnCells {
     column: Column,
     values: Values,
     /// Definition level of each row: 1, or 0 if the cell is empty.
@@ -58,7 +58,7 @@ impl ParquetFile {
         let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties));
         let writer = writer.map_err(PackageError::unwritable(path))?;
 
-        let columns = table.columns().copied().map(Gathered::new).collect();
+        let columns = table.columns().copied().map(ColumnCells::new).collect();
         Ok(Self { path: path.to_owned(), writer, columns, rows: 0 })
     }
 
@@ -105,7 +105,7 @@ impl ParquetFile {
     }
 }
 
-impl Gathered {
+impl ColumnCells {
     fn new(column: Column) -> Self {
         let values = match column.kind {
             Type::String => Values::Texts(Vec::new()),

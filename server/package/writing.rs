@@ -101,7 +101,7 @@ fn fill(
     sessions: Sessions,
     left_out: &[LeftOut],
     folder: &Path,
-    told: Told,
+    told: StepsCallback,
 ) -> Result<(), PackageError> {
     let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
     let steps = Steps::new(sources, sessions, &tables, told);
@@ -124,17 +124,17 @@ fn fill(
 }
 
 /// Called with the number of steps done and the number of all steps.
-type Told<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
+type StepsCallback<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
 
 /// Counts the steps of joining from several threads: one for each copied export, one for each table (one per export for
 /// a long table), and one for the checksums.
 struct Steps<'a> {
     all: usize,
-    done: Mutex<(usize, Told<'a>)>,
+    done: Mutex<(usize, StepsCallback<'a>)>,
 }
 
 impl<'a> Steps<'a> {
-    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], told: Told<'a>) -> Self {
+    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], told: StepsCallback<'a>) -> Self {
         let copied = if sessions == Sessions::Copied { sources.len() } else { 0 };
         let joined = tables.iter().map(|table| if table.long { sources.len() } else { 1 });
         let all = copied + joined.sum::<usize>() + 1;

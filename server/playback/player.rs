@@ -14,7 +14,7 @@ use super::projector::{Projector, Slide};
 use crate::conductor::{Conductor, Played};
 use crate::ids::SessionId;
 use crate::imaging::Size;
-use crate::recording::{AnyRecording, FOLDER, Found, Kind, RecordingError, belonging, of_session};
+use crate::recording::{AnyRecording, FOLDER, FoundRecording, Kind, RecordingError, belonging, of_session};
 use crate::trial::protocol::Record;
 use crate::trial::role::Role;
 
@@ -121,7 +121,7 @@ impl Player {
 }
 
 /// Describes the recordings that were found, and their problems.
-fn told(found: Vec<Found>, played: &Played) -> SessionRecordings {
+fn told(found: Vec<FoundRecording>, played: &Played) -> SessionRecordings {
     let mut told = SessionRecordings { recordings: Vec::new(), problems: Vec::new() };
     if found.is_empty() && played.asked != Record::None {
         told.problems.push(format!(

@@ -28,11 +28,11 @@ pub(super) struct Slide {
     pub size: Size,
 }
 
-type Made = Result<Bytes, PlaybackError>;
+type PictureResult = Result<Bytes, PlaybackError>;
 
 /// A handle of the thread that makes pictures. The thread ends when the handle is dropped.
 pub(super) struct Projector {
-    slides: mpsc::Sender<(Slide, oneshot::Sender<Made>)>,
+    slides: mpsc::Sender<(Slide, oneshot::Sender<PictureResult>)>,
 }
 
 impl Projector {
@@ -47,14 +47,14 @@ impl Projector {
     }
 
     /// The picture of `slide` as a JPEG. If the future is dropped before the picture's turn, it is not made.
-    pub async fn picture(&self, slide: Slide) -> Made {
+    pub async fn picture(&self, slide: Slide) -> PictureResult {
         let (reply, made) = oneshot::channel();
         self.slides.send((slide, reply)).await.map_err(|_| PlaybackError::Ending)?;
         made.await.map_err(|_| PlaybackError::Ending)?
     }
 }
 
-fn run(mut waiting: mpsc::Receiver<(Slide, oneshot::Sender<Made>)>) {
+fn run(mut waiting: mpsc::Receiver<(Slide, oneshot::Sender<PictureResult>)>) {
     priority::lower_further();
     let mut open: Vec<Open> = Vec::new();
 
@@ -74,7 +74,7 @@ struct Open {
     studio: Option<Studio>,
 }
 
-fn make(open: &mut Vec<Open>, slide: &Slide) -> Made {
+fn make(open: &mut Vec<Open>, slide: &Slide) -> PictureResult {
     let place = open.iter().position(|open| open.folder() == slide.folder);
     let mut found = match place {
         Some(place) => open.remove(place),
@@ -108,7 +108,7 @@ impl Open {
         self.recording.folder()
     }
 
-    fn picture(&mut self, slide: &Slide) -> Made {
+    fn picture(&mut self, slide: &Slide) -> PictureResult {
         match (&self.recording, &mut self.studio) {
             (AnyRecording::View(recording), _) => recording.picture(slide.number).map(Bytes::from).map_err(unreadable),
             (AnyRecording::Mosaic(recording), Some(studio)) => studio.picture(recording, slide),
@@ -136,7 +136,7 @@ impl Studio {
         Ok(Self { developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
     }
 
-    fn picture(&mut self, recording: &Recording, slide: &Slide) -> Made {
+    fn picture(&mut self, recording: &Recording, slide: &Slide) -> PictureResult {
         let mosaic = recording.frame(slide.number).map_err(unreadable)?;
         self.developer.develop(&mosaic, slide.size, &mut self.rgb, &mut self.gray);
         self.encoder.encode(&self.rgb).map_err(|error| PlaybackError::Unreadable(error.to_string()))

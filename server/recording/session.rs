@@ -141,14 +141,14 @@ impl AnyRecording {
 }
 
 /// A recording found for a session: its name, and the recording if it could be opened.
-pub type Found = (String, Result<AnyRecording, RecordingError>);
+pub type FoundRecording = (String, Result<AnyRecording, RecordingError>);
 
 /// The recordings of `session` in the folder `recordings`, by name. A recording belongs to a session if its description
 /// says so, or if it is named after the session. Empty if the folder does not exist.
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<Found>, RecordingError> {
+pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<FoundRecording>, RecordingError> {
     let entries = match fs::read_dir(recordings) {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),

@@ -17,7 +17,7 @@ const LEAST_PLANES: f64 = 5.0;
 
 /// Limits within which photographed stacks are drawn.
 #[derive(Debug, Clone, Copy)]
-pub struct Manner {
+pub struct PhotographyLimits {
     /// Least noise, in gray levels.
     pub least_noise: f32,
     /// Share of stacks whose pictures are not aligned.
@@ -46,7 +46,7 @@ pub struct Photography {
 
 impl Photography {
     /// Draws one within the limits of `manner`.
-    pub fn draw(manner: Manner, most_blur: f32, rng: &mut impl Rng) -> Self {
+    pub fn draw(manner: PhotographyLimits, most_blur: f32, rng: &mut impl Rng) -> Self {
         let noise = rng.random_range(manner.least_noise..3.5);
         let flicker = if rng.random_bool(0.5) { rng.random_range(0.0f32..0.03) } else { 0.0 };
         let spacing = rng.random_range(0.3f32..2.0);
@@ -86,7 +86,7 @@ impl Photography {
     }
 
     /// If scans follow what is in view, the distance from one picture to the next in pixels of blur. Else `None`.
-    pub fn followed(&self, manner: Manner, rng: &mut impl Rng) -> Option<f64> {
+    pub fn followed(&self, manner: PhotographyLimits, rng: &mut impl Rng) -> Option<f64> {
         happens(manner.followed, rng).then(|| f64::from(self.spacing))
     }
 }

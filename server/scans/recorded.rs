@@ -32,7 +32,7 @@ const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 /// What is shown between two recorded focal powers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum Between {
+pub enum Interpolation {
     /// The picture taken at the nearest focal power.
     #[default]
     Nearest,
@@ -196,7 +196,7 @@ impl RecordedScan {
 
     /// What is seen at pose `index` through a lens at `focal_power`; beyond the last pose, at the last.
     #[must_use]
-    pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> View {
+    pub fn see(&self, index: usize, focal_power: FocalPower, between: Interpolation) -> View {
         let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]).into() };
         let above = self.powers.partition_point(|&power| power <= focal_power).clamp(1, self.powers.len() - 1);
         let low = self.powers[above - 1];
@@ -205,14 +205,14 @@ impl RecordedScan {
         let nearest = if part < 0.5 { above - 1 } else { above };
 
         let patch = match between {
-            Between::Nearest => as_patch(&pose.patches[nearest]),
-            Between::Interpolated => mixed(&pose.patches[above - 1], &pose.patches[above], part),
+            Interpolation::Nearest => as_patch(&pose.patches[nearest]),
+            Interpolation::Interpolated => mixed(&pose.patches[above - 1], &pose.patches[above], part),
         };
 
         let coarse = |position: usize, index: usize| pose.wider.get(position)?[index].as_ref();
         let wider = |index: usize| match between {
-            Between::Nearest => Some(coarse(nearest, index)?.patch()),
-            Between::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
+            Interpolation::Nearest => Some(coarse(nearest, index)?.patch()),
+            Interpolation::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
         };
 
         View { patch, wider: std::array::from_fn(wider) }
@@ -295,7 +295,7 @@ fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
 #[derive(Debug, Clone)]
 pub struct Playing {
     scan: Arc<RecordedScan>,
-    between: Between,
+    between: Interpolation,
     pose: usize,
 }
 
@@ -319,7 +319,7 @@ pub struct Recorded {
     /// The scans, each of at least one pose.
     pub scans: Vec<Arc<RecordedScan>>,
     /// What is shown between two focal powers.
-    pub between: Between,
+    pub between: Interpolation,
 }
 
 impl ScanSet for Recorded {
@@ -362,8 +362,8 @@ mod tests {
             (0.9, 200.0, 180.0),
             (1.0, 200.0, 200.0),
         ] {
-            assert_eq!(seen(power, Between::Nearest), nearest, "{power}");
-            assert_eq!(seen(power, Between::Interpolated), mixed, "{power}");
+            assert_eq!(seen(power, Interpolation::Nearest), nearest, "{power}");
+            assert_eq!(seen(power, Interpolation::Interpolated), mixed, "{power}");
         }
     }
 
@@ -380,7 +380,7 @@ mod tests {
             let data = &picture(seed).data;
             [block_means(&data[32 * 128 + 32..], 128, Scale::Two), block_means(data, 128, Scale::Four)]
         });
-        for (power, between, share) in [(0.3, Between::Nearest, 0.0), (0.25, Between::Interpolated, 0.25)] {
+        for (power, between, share) in [(0.3, Interpolation::Nearest, 0.0), (0.25, Interpolation::Interpolated, 0.25)] {
             let seen = scan.see(0, FocalPower::nearest(power), between);
             for (index, patch) in seen.wider.into_iter().enumerate() {
                 let [low, high] = expected.each_ref().map(|patches| &patches[index]);

@@ -11,7 +11,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::photography::{Manner, Photography};
+use super::photography::{Photography, PhotographyLimits};
 use super::pictures::{Split, sharp_phantom_of};
 use super::planes::{PlaneStack, PlanesError};
 use crate::imaging::GrayImage;
@@ -48,7 +48,7 @@ pub struct Style {
     /// Share of scenes that are photographed at few positions.
     photographed: f64,
     /// How those are photographed.
-    manner: Manner,
+    manner: PhotographyLimits,
 }
 
 impl Style {
@@ -60,7 +60,7 @@ impl Style {
         slopes: f64::INFINITY,
         steps: 0.6,
         photographed: 0.45,
-        manner: Manner { least_noise: 0.0, misplaced: 0.6, grainy: 0.4, followed: 0.4 },
+        manner: PhotographyLimits { least_noise: 0.0, misplaced: 0.6, grainy: 0.4, followed: 0.4 },
     };
 
     /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range.
@@ -72,11 +72,12 @@ impl Style {
         slopes: 1.3,
         steps: 1.0,
         photographed: 0.9,
-        manner: Manner { least_noise: 1.0, misplaced: 0.0, grainy: 0.0, followed: 0.0 },
+        manner: PhotographyLimits { least_noise: 1.0, misplaced: 0.0, grainy: 0.0, followed: 0.0 },
     };
 
     /// The same, photographed less carefully: to train on.
-    const DEEP_TO_TRAIN: Self = Self { manner: Manner { least_noise: 1.0, ..Self::VARIED.manner }, ..Self::DEEP };
+    const DEEP_TO_TRAIN: Self =
+        Self { manner: PhotographyLimits { least_noise: 1.0, ..Self::VARIED.manner }, ..Self::DEEP };
 }
 
 /// A focal stack to scan in training, and how steeply it may blur.
@@ -140,7 +141,7 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     let photography = rng.random_bool(style.photographed).then(|| Photography::draw(style.manner, MOST_BLUR, &mut rng));
 
     let ground = Layer::new(&ground, spots);
-    let above = above.map(|Above { colour, cover, height }| {
+    let above = above.map(|RaisedStructures { colour, cover, height }| {
         // Gray levels are already multiplied by the cover, so what the things do not cover does not shine through their
         // blur.
         (Layer::new(&colour, spots), Layer::new(&cover, spots), height)
@@ -257,7 +258,7 @@ fn add_steps(field: &mut Canvas, rng: &mut impl Rng) {
 }
 
 /// Things that stand above the ground at one height: vessels, blocks.
-struct Above {
+struct RaisedStructures {
     /// Their gray levels times their cover.
     colour: GrayImage,
     /// How much of each pixel they cover, 0..=255.
@@ -265,7 +266,7 @@ struct Above {
     height: f32,
 }
 
-fn things_above(seed: u64, relief: f32, softness: f64, rng: &mut impl Rng) -> Above {
+fn things_above(seed: u64, relief: f32, softness: f64, rng: &mut impl Rng) -> RaisedStructures {
     let mut mask = Canvas::blank(SIDE);
 
     if rng.random_bool(0.6) {
@@ -284,7 +285,7 @@ fn things_above(seed: u64, relief: f32, softness: f64, rng: &mut impl Rng) -> Ab
     let cover = mask.data.iter().map(|cover| 255.0 * cover).collect();
 
     let soft = |data| gaussian_blur(&GrayImage { width: SIDE, height: SIDE, data }, softness);
-    Above { colour: soft(colour), cover: soft(cover), height: relief * rng.random_range(0.2f32..1.0) }
+    RaisedStructures { colour: soft(colour), cover: soft(cover), height: relief * rng.random_range(0.2f32..1.0) }
 }
 
 /// The spots on the near and on the far side of focus.

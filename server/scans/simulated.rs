@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
 use super::reach::{Following, Optics, Reach, corner, whole};
-use super::recorded::{Between, RecordedScan};
+use super::recorded::{Interpolation, RecordedScan};
 use super::relief::{Distance, StackScene};
 use crate::autofocus::BlurRate;
 use crate::imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
@@ -322,7 +322,7 @@ impl Scan {
 
     /// What is seen of a recorded scan.
     fn look_at_recorded(&self, scan: &RecordedScan, focal_power: FocalPower) -> View {
-        scan.see(scan.pose_at(self.time), focal_power, Between::Interpolated)
+        scan.see(scan.pose_at(self.time), focal_power, Interpolation::Interpolated)
     }
 
     /// Where in a focal stack the patch lies, and the position of the focal plane.

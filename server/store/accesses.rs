@@ -81,7 +81,7 @@ impl Access {
 /// Records accesses to a database, in that database.
 #[derive(Clone)]
 pub struct Recorder {
-    way: Way,
+    way: Backend,
     /// The data folder.
     folder: PathBuf,
     reader: Reader,
@@ -93,7 +93,7 @@ pub struct Recorder {
 }
 
 #[derive(Clone)]
-enum Way {
+enum Backend {
     /// Within the server.
     Server(Store),
     /// From the command line, whether or not a server runs.
@@ -107,7 +107,7 @@ impl Recorder {
         let folder = store.inner.folder.clone();
         let Actor { role, account } = by;
         Self {
-            way: Way::Server(store.clone()),
+            way: Backend::Server(store.clone()),
             folder,
             reader: store.reader().clone(),
             role: Some(role),
@@ -135,7 +135,7 @@ impl Recorder {
             .synchronous(SqliteSynchronous::Full);
         let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
         let folder = file.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(Self { way: Way::CommandLine(pool), folder, reader, role: None, account: None, clock })
+        Ok(Self { way: Backend::CommandLine(pool), folder, reader, role: None, account: None, clock })
     }
 
     /// The data folder.
@@ -156,8 +156,8 @@ impl Recorder {
     /// If the disk or database fails.
     pub async fn record(&self, access: &Access) -> Result<Head, StoreError> {
         let (pool, run, _turn) = match &self.way {
-            Way::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
-            Way::CommandLine(pool) => (pool, None, None),
+            Backend::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
+            Backend::CommandLine(pool) => (pool, None, None),
         };
 
         let mut connection = pool.acquire().await?;
@@ -168,7 +168,7 @@ impl Recorder {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Way::CommandLine(pool) = &self.way {
+        if let Backend::CommandLine(pool) = &self.way {
             self.reader.close().await;
             pool.close().await;
         }

@@ -23,7 +23,7 @@ use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
 use super::values::{begin, nanoseconds};
-use super::writes::{Turn, Writes, Written};
+use super::writes::{Turn, WriteKind, Writes};
 use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.
@@ -171,12 +171,12 @@ impl Store {
 
     /// Waits for the turn to write records.
     pub(super) async fn turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, Written::Records)
+        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Records)
     }
 
     /// Waits for the turn to write telemetry.
     pub(super) async fn telemetry_turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, Written::Telemetry)
+        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Telemetry)
     }
 
     /// Records that a device started or stopped working.

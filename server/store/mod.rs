@@ -51,7 +51,7 @@ pub use erasures::{Erasure, StoredErasure};
 pub use error::StoreError;
 pub use motion::Motion;
 pub use reader::Reader;
-pub use remarks::Kept;
+pub use remarks::KeepOutcome;
 pub use rows::*;
 pub use schema::MIGRATOR;
 pub use sessions::{NewSession, StoredSession};

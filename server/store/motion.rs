@@ -44,7 +44,7 @@ pub type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<Motion>>>>;
 
 /// A setting's figures so far.
 #[derive(Default)]
-pub struct Watched {
+pub struct RunningFigures {
     pub motion: Motion,
     /// Run, end of the exposure and focal power of the frame before; `None` if the loop was held then.
     before: Option<(i64, i64, f64)>,
@@ -52,7 +52,7 @@ pub struct Watched {
     moved: f64,
 }
 
-impl Watched {
+impl RunningFigures {
     pub fn take(&mut self, &(run, exposed_ns, asked, measured, optimal, held): &Row) {
         if held {
             self.before = None;

@@ -4,7 +4,7 @@ use std::sync::PoisonError;
 
 use futures_util::TryStreamExt;
 
-use super::motion::{Motion, Row, Watched};
+use super::motion::{Motion, Row, RunningFigures};
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 
@@ -46,7 +46,7 @@ impl Reader {
             .bind(segment)
             .fetch(self.pool());
 
-            let mut watched = Watched::default();
+            let mut watched = RunningFigures::default();
             while let Some(row) = rows.try_next().await? {
                 watched.take(&row);
             }

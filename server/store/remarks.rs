@@ -8,11 +8,11 @@ use super::values::{begin, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::trial::question::AnswerValue;
-use crate::trial::remark::{Holding, Origin, Said, WaitClock};
+use crate::trial::remark::{CommentContent, Holding, Origin, WaitClock};
 
 /// The outcome of keeping a comment or an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kept {
+pub enum KeepOutcome {
     /// It is on disk now.
     New,
     /// It was on disk already, because it was sent before.
@@ -26,7 +26,7 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
+    pub async fn keep_comment(&self, comment: &Comment) -> Result<KeepOutcome, StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_comment(&mut connection, self.inner.run, comment).await;
@@ -38,7 +38,7 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
+    pub async fn keep_answer(&self, answer: &Answer) -> Result<KeepOutcome, StoreError> {
         let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_answer(&mut connection, self.inner.run, answer).await;
@@ -69,7 +69,11 @@ impl Store {
     }
 }
 
-async fn insert_comment(connection: &mut SqliteConnection, run: i64, comment: &Comment) -> Result<Kept, StoreError> {
+async fn insert_comment(
+    connection: &mut SqliteConnection,
+    run: i64,
+    comment: &Comment,
+) -> Result<KeepOutcome, StoreError> {
     let wall = comment.stamp.wall.to_string();
     let (kind, text) = said_columns(&comment.said);
 
@@ -101,7 +105,7 @@ async fn insert_comment(connection: &mut SqliteConnection, run: i64, comment: &C
     if done.rows_affected() == 1 {
         chain::append(&mut transaction, "comment", &comment.key.to_string(), &wall).await?;
         transaction.commit().await?;
-        return Ok(Kept::New);
+        return Ok(KeepOutcome::New);
     }
 
     // Sent again, or another comment under the same key?
@@ -112,10 +116,14 @@ async fn insert_comment(connection: &mut SqliteConnection, run: i64, comment: &C
 
     let same = parsed::<SessionId>(&row, "session")? == comment.session
         && (said(&row)? == comment.said || is_erased(&mut transaction, "comment", &comment.key).await?);
-    Ok(if same { Kept::Before } else { Kept::KeyTaken })
+    Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
 }
 
-async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Answer) -> Result<Kept, StoreError> {
+async fn insert_answer(
+    connection: &mut SqliteConnection,
+    run: i64,
+    answer: &Answer,
+) -> Result<KeepOutcome, StoreError> {
     let wall = answer.stamp.wall.to_string();
     let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
@@ -145,7 +153,7 @@ async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Ans
     if done.rows_affected() == 1 {
         chain::append(&mut transaction, "answer", &answer.key.to_string(), &wall).await?;
         transaction.commit().await?;
-        return Ok(Kept::New);
+        return Ok(KeepOutcome::New);
     }
 
     // Sent again, or another answer under the same key?
@@ -159,7 +167,7 @@ async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Ans
         && segment(&row)? == answer.segment
         && row.try_get::<String, _>("question")? == answer.question
         && (kept == value || is_erased(&mut transaction, "answer", &answer.key).await?);
-    Ok(if same { Kept::Before } else { Kept::KeyTaken })
+    Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
 }
 
 /// Whether the words of the comment or answer with this key were erased. If a tablet sends them again, the server
@@ -284,26 +292,26 @@ fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {
     text.map(|_| parsed(row, "segment")).transpose()
 }
 
-fn said(row: &SqliteRow) -> Result<Said, StoreError> {
+fn said(row: &SqliteRow) -> Result<CommentContent, StoreError> {
     let kind: String = row.try_get("kind")?;
     let text: Option<String> = row.try_get("text")?;
     match (kind.as_str(), text) {
-        ("text", Some(text)) => Ok(Said::Text(text)),
-        ("quick", Some(text)) => Ok(Said::Quick(text)),
-        ("mark", None) => Ok(Said::Mark),
+        ("text", Some(text)) => Ok(CommentContent::Text(text)),
+        ("quick", Some(text)) => Ok(CommentContent::Quick(text)),
+        ("mark", None) => Ok(CommentContent::Mark),
         // An erasure leaves an empty text.
-        ("voice", None) => Ok(Said::Voice),
-        ("voice", Some(text)) if text.is_empty() => Ok(Said::Voice),
+        ("voice", None) => Ok(CommentContent::Voice),
+        ("voice", Some(text)) if text.is_empty() => Ok(CommentContent::Voice),
         _ => Err(StoreError::Damaged(format!("comment of kind '{kind}'"))),
     }
 }
 
 /// A comment's kind and text, as in the database and in exports.
-pub(super) fn said_columns(said: &Said) -> (&'static str, Option<&str>) {
+pub(super) fn said_columns(said: &CommentContent) -> (&'static str, Option<&str>) {
     match said {
-        Said::Text(text) => ("text", Some(text)),
-        Said::Quick(text) => ("quick", Some(text)),
-        Said::Mark => ("mark", None),
-        Said::Voice => ("voice", None),
+        CommentContent::Text(text) => ("text", Some(text)),
+        CommentContent::Quick(text) => ("quick", Some(text)),
+        CommentContent::Mark => ("mark", None),
+        CommentContent::Voice => ("voice", None),
     }
 }

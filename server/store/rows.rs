@@ -11,8 +11,8 @@ use crate::clock::Moment;
 use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
-use crate::trial::remark::{Origin, Said};
-use crate::trial::standing::{Given, Standing, by_question};
+use crate::trial::remark::{CommentContent, Origin};
+use crate::trial::standing::{GivenAnswer, Standing, by_question};
 
 /// When something was recorded, by both clocks of the server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub struct Comment {
     /// When it was kept.
     pub stamp: Stamp,
     /// What was said.
-    pub said: Said,
+    pub said: CommentContent,
 }
 
 /// An answer kept, or to be kept.
@@ -71,8 +71,8 @@ impl Answer {
     /// The answer in the form in which the answers to a question are compared. `run` is the run that kept it, and
     /// `clocks` has the clocks of that run.
     #[must_use]
-    pub fn given(&self, run: i64, clocks: &RunClocks) -> Given {
-        Given {
+    pub fn given(&self, run: i64, clocks: &RunClocks) -> GivenAnswer {
+        GivenAnswer {
             device: self.origin.device,
             sequence: self.origin.sequence,
             at: clocks.said(run, self.stamp.at, &self.origin),

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
-use super::chain::check::{BlockToCheck, Found, FoundRow, Walk};
+use super::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
 use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
 use super::schema::DATABASE;
@@ -126,7 +126,7 @@ fn found(row: &SqliteRow) -> Result<FoundRow, StoreError> {
     Ok(FoundRow {
         number: row.try_get::<i64, _>("number")?.to_string(),
         previous: Some(text("previous")?),
-        entry: Found::Whole(entry, row.try_get("sealed_salt")?),
+        entry: FoundEntry::Whole(entry, row.try_get("sealed_salt")?),
         hash: text("hash")?,
     })
 }

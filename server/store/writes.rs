@@ -23,7 +23,7 @@ pub type WriteTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 
 /// What is written in a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Written {
+pub(super) enum WriteKind {
     /// What people said and did, and what the chain needs.
     Records,
     /// A batch of the control loop's steps.
@@ -103,7 +103,7 @@ impl Writes {
     }
 
     /// Begins a turn of writing. `guard` is the right to write.
-    pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, what: Written) -> Turn<'a> {
+    pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, what: WriteKind) -> Turn<'a> {
         self.under_way.set(self.now());
         Turn { writes: self, what, began: Instant::now(), _guard: guard }
     }
@@ -117,7 +117,7 @@ impl Writes {
 #[derive(Debug)]
 pub(super) struct Turn<'a> {
     writes: &'a Writes,
-    what: Written,
+    what: WriteKind,
     began: Instant,
     _guard: MutexGuard<'a, ()>,
 }
@@ -133,8 +133,8 @@ impl Turn<'_> {
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
         let times = match self.what {
-            Written::Records => &self.writes.records,
-            Written::Telemetry => &self.writes.telemetry,
+            WriteKind::Records => &self.writes.records,
+            WriteKind::Telemetry => &self.writes.telemetry,
         };
         times.observe(self.began.elapsed().as_secs_f64());
         self.writes.under_way.clear();
@@ -206,7 +206,7 @@ mod tests {
     async fn a_write_is_under_way_until_its_turn_ends() {
         let writes = Writes::default();
         let right = Mutex::new(());
-        let turn = writes.begin(right.lock().await, Written::Records);
+        let turn = writes.begin(right.lock().await, WriteKind::Records);
         assert!(writes.under_way_for().is_some());
         drop(turn);
         assert_eq!(writes.under_way_for(), None);

@@ -41,12 +41,12 @@ struct Latest {
 enum Stage {
     Running(Progress),
     Failed(String),
-    Ready(Made),
+    Ready(FinishedExport),
 }
 
 /// A finished export. Its folder is removed when the last clone is dropped.
 #[derive(Clone)]
-pub struct Made {
+pub struct FinishedExport {
     /// Whether the export contains the policies.
     pub unblinded: bool,
     /// Folder of the package.
@@ -115,7 +115,7 @@ impl StudyExports {
     ///
     /// # Errors
     /// If the database failed.
-    pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<Made>, StoreError> {
+    pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<FinishedExport>, StoreError> {
         self.give_up_outdated(reader, study).await?;
         Ok(self.lock().get(study).and_then(Latest::made))
     }
@@ -174,7 +174,7 @@ impl StudyExports {
 
 impl Latest {
     /// The export, if it is finished.
-    fn made(&self) -> Option<Made> {
+    fn made(&self) -> Option<FinishedExport> {
         match &self.stage {
             Stage::Ready(made) => Some(made.clone()),
             Stage::Running(_) | Stage::Failed(_) => None,
@@ -216,7 +216,7 @@ impl Job {
         forget(self.exports.take(&self.study, self.number));
     }
 
-    async fn make(&self, recorder: &Recorder) -> Result<Made, StudyExportError> {
+    async fn make(&self, recorder: &Recorder) -> Result<FinishedExport, StudyExportError> {
         let folder = &self.exports.folder;
         let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
         std::fs::create_dir_all(folder).map_err(unwritable)?;
@@ -235,7 +235,7 @@ impl Job {
 
         let room = Arc::new(room);
         let sessions = summary.sessions;
-        Ok(Made { unblinded: self.unblinded, folder: package, sessions, taken_back, _room: room })
+        Ok(FinishedExport { unblinded: self.unblinded, folder: package, sessions, taken_back, _room: room })
     }
 
     fn stands_at(&self, stage: Stage) {

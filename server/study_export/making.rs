@@ -42,7 +42,7 @@ pub struct Progress {
 }
 
 /// A callback that is given the progress of an export.
-pub type Told = Arc<dyn Fn(Progress) + Send + Sync>;
+pub type ProgressCallback = Arc<dyn Fn(Progress) + Send + Sync>;
 
 /// Exports the study `study` as a package into the folder `out`. The folder must be new or empty, and appears complete
 /// or not at all. Each session's export is recorded in the database as an export of its own.
@@ -55,7 +55,7 @@ pub async fn export_study(
     study: &str,
     unblinded: bool,
     out: &Path,
-    told: Told,
+    told: ProgressCallback,
 ) -> Result<Summary, StudyExportError> {
     let (sessions, left_out) = sessions_of(recorder.reader(), study, unblinded).await?;
     let making = Making { recorder: recorder.clone(), sessions, left_out, unblinded, out: out.to_owned(), told };
@@ -118,7 +118,7 @@ struct Making {
     left_out: Vec<LeftOut>,
     unblinded: bool,
     out: PathBuf,
-    told: Told,
+    told: ProgressCallback,
 }
 
 impl Making {

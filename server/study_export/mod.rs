@@ -5,6 +5,6 @@ mod background;
 mod error;
 mod making;
 
-pub use self::background::{Made, StudyExportState, StudyExports};
+pub use self::background::{FinishedExport, StudyExportState, StudyExports};
 pub use self::error::StudyExportError;
 pub use self::making::{Progress, check, export_study};

@@ -36,7 +36,7 @@ const WARN_EVERY: Duration = Duration::from_hours(24);
 pub struct Certificates {
     source: Source,
     provider: Arc<CryptoProvider>,
-    shown: ArcSwap<Shown>,
+    shown: ArcSwap<CurrentCertificate>,
 }
 
 /// Where certificates come from.
@@ -48,7 +48,7 @@ enum Source {
 }
 
 /// The certificate that the server shows now.
-struct Shown {
+struct CurrentCertificate {
     key: Arc<CertifiedKey>,
     facts: Facts,
     /// Names that a local certificate was requested for.
@@ -78,7 +78,7 @@ impl Certificates {
         let contents = files.read()?;
         let (key, facts) = files.check(&contents, &provider, now)?;
 
-        let shown = Shown { key, facts, wanted: Names::default() };
+        let shown = CurrentCertificate { key, facts, wanted: Names::default() };
         let source = Source::Given { files, last: Mutex::new(contents) };
         Ok(Self { source, provider, shown: ArcSwap::from_pointee(shown) })
     }
@@ -152,7 +152,7 @@ impl Certificates {
                 let checked = files.check(&contents, &self.provider, now);
                 *last = contents;
                 let (key, facts) = checked?;
-                self.shown.store(Arc::new(Shown { key, facts, wanted: Names::default() }));
+                self.shown.store(Arc::new(CurrentCertificate { key, facts, wanted: Names::default() }));
                 tracing::info!("the renewed certificate in {} is in use", files.certificate.display());
                 Ok(true)
             }
@@ -172,7 +172,7 @@ impl Certificates {
     }
 }
 
-impl Shown {
+impl CurrentCertificate {
     fn ends_soon(&self, now: Timestamp) -> bool {
         now.saturating_add(BEFORE_THE_END).unwrap_or(now) >= self.facts.until
     }
@@ -190,7 +190,12 @@ impl ResolvesServerCert for Certificates {
     }
 }
 
-fn signed(authority: &Authority, names: Names, provider: &CryptoProvider, now: Timestamp) -> Result<Shown, TlsError> {
+fn signed(
+    authority: &Authority,
+    names: Names,
+    provider: &CryptoProvider,
+    now: Timestamp,
+) -> Result<CurrentCertificate, TlsError> {
     let left_out = authority.not_permitted(&names);
     if !left_out.is_empty() {
         tracing::warn!(
@@ -203,7 +208,7 @@ fn signed(authority: &Authority, names: Names, provider: &CryptoProvider, now: T
 
     let signed = authority.sign(&names, now)?;
     let key = CertifiedKey::from_der(vec![signed.certificate], signed.key, provider)?;
-    Ok(Shown { key: Arc::new(key), facts: signed.facts, wanted: names })
+    Ok(CurrentCertificate { key: Arc::new(key), facts: signed.facts, wanted: names })
 }
 
 /// Keeps the certificate up to date while the server runs. A failure is logged and tried again; it never stops the

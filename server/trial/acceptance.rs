@@ -5,7 +5,7 @@ use super::answers;
 use super::protocol::Protocol;
 use super::question::AnswerValue;
 use super::refusal::Refusal;
-use super::remark::{NewAnswer, Said};
+use super::remark::{CommentContent, NewAnswer};
 use super::session::SessionState;
 use crate::ids::SegmentId;
 
@@ -13,8 +13,8 @@ use crate::ids::SegmentId;
 ///
 /// # Errors
 /// If a text is empty or too long.
-pub fn check_comment(said: &Said) -> Result<(), Refusal> {
-    let (Said::Text(text) | Said::Quick(text)) = said else { return Ok(()) };
+pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
+    let (CommentContent::Text(text) | CommentContent::Quick(text)) = said else { return Ok(()) };
     if text.trim().is_empty() {
         return Err(Refusal::Invalid("the comment is empty".to_owned()));
     }
@@ -26,8 +26,8 @@ pub fn check_comment(said: &Said) -> Result<(), Refusal> {
 ///
 /// # Errors
 /// If the comment is spoken and the session does not ask for voice.
-pub fn check_spoken(said: &Said, voice: bool) -> Result<(), Refusal> {
-    if *said == Said::Voice && !voice {
+pub fn check_spoken(said: &CommentContent, voice: bool) -> Result<(), Refusal> {
+    if *said == CommentContent::Voice && !voice {
         return Err(Refusal::conflict("this trial does not record voice; type the comment"));
     }
     Ok(())
@@ -75,15 +75,15 @@ mod tests {
 
     #[test]
     fn voice_is_taken_only_where_the_protocol_asks_for_it() {
-        assert_eq!(check_spoken(&Said::Voice, true), Ok(()));
-        assert_eq!(check_spoken(&Said::Mark, false), Ok(()));
-        assert!(matches!(check_spoken(&Said::Voice, false), Err(Refusal::Conflict(_))));
+        assert_eq!(check_spoken(&CommentContent::Voice, true), Ok(()));
+        assert_eq!(check_spoken(&CommentContent::Mark, false), Ok(()));
+        assert!(matches!(check_spoken(&CommentContent::Voice, false), Err(Refusal::Conflict(_))));
     }
 
     #[test]
     fn a_comment_must_say_something_and_no_more_than_fits() {
-        assert_eq!(check_comment(&Said::Text("sharp".to_owned())), Ok(()));
-        let refused = |text: &str| check_comment(&Said::Text(text.to_owned())).unwrap_err();
+        assert_eq!(check_comment(&CommentContent::Text("sharp".to_owned())), Ok(()));
+        let refused = |text: &str| check_comment(&CommentContent::Text(text.to_owned())).unwrap_err();
         assert_eq!(refused(" \n"), Refusal::Invalid("the comment is empty".to_owned()));
         assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Invalid(_)));
     }

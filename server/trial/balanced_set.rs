@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_is_told_once_every_session_of_the_set_is_unblinded() {
+    fn the_seed_is_revealed_once_every_session_of_the_set_is_unblinded() {
         assert!(!set([unblinded(completed(1, 0)), completed(2, 1)]).may_tell_seed());
         assert!(!set([unblinded(completed(1, 0)), aborted(2, 1)]).may_tell_seed(), "an aborted session counts too");
         assert!(set([unblinded(completed(1, 0)), unblinded(completed(2, 1))]).may_tell_seed());

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_corrected_meanwhile_or_stands_there_already_is_not_corrected() {
+    fn a_stale_or_unchanged_value_is_not_corrected() {
         let known = ["S-01", "S-02"];
         let meanwhile = check_participant("S-02", "S-01", "S-02", known);
         assert!(matches!(meanwhile, Err(Refusal::Conflict(text)) if text.contains("in the meantime")));

@@ -25,7 +25,7 @@ pub struct NewComment {
     pub origin: Origin,
     /// Content of the comment.
     #[serde(flatten)]
-    pub said: Said,
+    pub said: CommentContent,
 }
 
 /// Device and time of a comment or answer, as the surgeon's page reports them.
@@ -89,7 +89,7 @@ impl WaitClock {
 /// The content of a comment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", content = "text", rename_all = "kebab-case")]
-pub enum Said {
+pub enum CommentContent {
     /// A typed text.
     Text(String),
     /// One of the protocol's quick comments.

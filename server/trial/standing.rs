@@ -10,7 +10,7 @@ use crate::ids::DeviceId;
 
 /// An answer, with its origin and its time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Given {
+pub struct GivenAnswer {
     /// Device on which the answer was given; none if its page did not say.
     pub device: Option<DeviceId>,
     /// Number that grows with every comment or answer on that device; none if its page did not say.
@@ -38,7 +38,7 @@ pub struct Standing {
 
 /// The standing of each of `answers`. All must be answers to the same question, in the order of their arrival.
 #[must_use]
-pub fn standings(answers: &[Given]) -> Vec<Standing> {
+pub fn standings(answers: &[GivenAnswer]) -> Vec<Standing> {
     let order = in_order(answers);
 
     let mut standings: Vec<Standing> = answers
@@ -68,15 +68,15 @@ pub fn standings(answers: &[Given]) -> Vec<Standing> {
 
 /// The standing of each of `answers`. Each comes with its question; they are in the order of their arrival.
 #[must_use]
-pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, Given)>) -> Vec<Standing> {
-    let mut questions: BTreeMap<Q, (Vec<usize>, Vec<Given>)> = BTreeMap::new();
+pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) -> Vec<Standing> {
+    let mut questions: BTreeMap<Q, (Vec<usize>, Vec<GivenAnswer>)> = BTreeMap::new();
     for (place, (question, given)) in answers.into_iter().enumerate() {
         let (places, all) = questions.entry(question).or_default();
         places.push(place);
         all.push(given);
     }
 
-    let of_question = |(places, all): (Vec<usize>, Vec<Given>)| places.into_iter().zip(standings(&all));
+    let of_question = |(places, all): (Vec<usize>, Vec<GivenAnswer>)| places.into_iter().zip(standings(&all));
     let mut found: Vec<(usize, Standing)> = questions.into_values().flat_map(of_question).collect();
     found.sort_by_key(|(place, _)| *place);
     found.into_iter().map(|(_, standing)| standing).collect()
@@ -85,17 +85,17 @@ pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, Given)>) -> Vec
 /// The combined answer that counts. `answers` must all answer the same question, in the order of their arrival. None if
 /// no answer counts.
 #[must_use]
-pub fn counted(answers: &[Given]) -> Option<AnswerValue> {
+pub fn counted(answers: &[GivenAnswer]) -> Option<AnswerValue> {
     standings(answers).into_iter().find(|standing| standing.counts).map(|standing| standing.value)
 }
 
 /// The indices of `answers`, sorted by the order in which the answers were given.
-fn in_order(answers: &[Given]) -> Vec<usize> {
+fn in_order(answers: &[GivenAnswer]) -> Vec<usize> {
     let mut at: Vec<Timestamp> = answers.iter().map(|given| given.at).collect();
 
     // The order on one device is certain. Times are not: a wait may have been measured by a clock that was set in the
     // meantime.
-    let place_on_device = |(place, given): (usize, &Given)| Some((given.device?, given.sequence?, place));
+    let place_on_device = |(place, given): (usize, &GivenAnswer)| Some((given.device?, given.sequence?, place));
     let mut on_devices: Vec<_> = answers.iter().enumerate().filter_map(place_on_device).collect();
     on_devices.sort_unstable();
     for pair in on_devices.windows(2) {
@@ -111,7 +111,7 @@ fn in_order(answers: &[Given]) -> Vec<usize> {
 }
 
 /// The indices of each device's last answer, if the last answer of another device differs from it.
-fn disagreeing(answers: &[Given], order: &[usize]) -> Vec<usize> {
+fn disagreeing(answers: &[GivenAnswer], order: &[usize]) -> Vec<usize> {
     let mut last_words: BTreeMap<DeviceId, (usize, AnswerValue)> = BTreeMap::new();
     for &place in order {
         let Some(device) = answers[place].device else { continue };
@@ -143,8 +143,8 @@ mod tests {
 
     use super::*;
 
-    fn given(device: u128, sequence: i64, second: u64, point: u8) -> Given {
-        Given {
+    fn given(device: u128, sequence: i64, second: u64, point: u8) -> GivenAnswer {
+        GivenAnswer {
             device: Some(DeviceId(Uuid::from_u128(device))),
             sequence: Some(sequence),
             at: Timestamp::UNIX_EPOCH + Duration::from_secs(second),
@@ -153,7 +153,7 @@ mod tests {
         }
     }
 
-    fn counts(answers: &[Given]) -> Option<AnswerValue> {
+    fn counts(answers: &[GivenAnswer]) -> Option<AnswerValue> {
         counted(answers)
     }
 
@@ -182,8 +182,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_late_never_counts_and_is_told_as_it_was_given() {
-        let late = Given { late: true, ..given(1, 9, 500, 1) };
+    fn a_late_answer_never_counts_and_is_shown_as_it_was_given() {
+        let late = GivenAnswer { late: true, ..given(1, 9, 500, 1) };
         let answers = [given(1, 8, 40, 5), late.clone()];
         assert_eq!(counts(&answers), Some(AnswerValue::Point(5)));
         assert_eq!(standings(&answers)[1].value, AnswerValue::Point(1));
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn items_of_a_questionnaire_given_on_two_devices_add_up_in_the_order_given() {
-        let items = |device, second, items: [u8; 3]| Given {
+        let items = |device, second, items: [u8; 3]| GivenAnswer {
             value: AnswerValue::Points(items.to_vec()),
             ..given(device, i64::try_from(second).unwrap(), second, 0)
         };
@@ -210,7 +210,7 @@ mod tests {
         fn the_order_of_arrival_changes_nothing(
             answers in prop::collection::vec((1_u128..4, 0_u64..50, 1_u8..6), 1..8), turn in 0_usize..8,
         ) {
-            let all: Vec<Given> = answers
+            let all: Vec<GivenAnswer> = answers
                 .iter()
                 .zip(0..)
                 .map(|((device, second, point), sequence)| given(*device, sequence, *second, *point))

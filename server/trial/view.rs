@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use super::consent::Consent;
 use super::phase::Phase;
 use super::question::{AnswerValue, Question};
-use super::remark::Said;
+use super::remark::CommentContent;
 use super::role::Role;
 use crate::ids::{SegmentId, SessionId};
 
@@ -91,7 +91,7 @@ pub struct CommentLine {
     pub setting: Option<usize>,
     /// Content of the comment.
     #[serde(flatten)]
-    pub said: Said,
+    pub said: CommentContent,
 }
 
 /// An event in words.

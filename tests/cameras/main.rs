@@ -211,7 +211,7 @@ fn refusal(spec: &str) -> String {
 }
 
 #[test]
-fn a_mosaic_is_no_footage() {
+fn a_mosaic_is_not_footage() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mosaic.png");
     image::ImageBuffer::from_pixel(2048, 1088, image::Luma([400_u16])).save(&file).unwrap();

@@ -173,7 +173,7 @@ fn a_hanging_policy_does_not_keep_the_loop_from_ending() {
 }
 
 #[test]
-fn a_camera_that_fails_is_told_and_comes_back() {
+fn a_camera_that_fails_is_reported_and_comes_back() {
     for failure in [Shot::Failure, Shot::Panic] {
         let mut stage = Stage::new(16);
         stage.handle.send(drive("scripted", None));

@@ -13,7 +13,7 @@ use parfocal::study_export::export_study;
 use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
 use parfocal::trial::protocol::Protocol;
-use parfocal::trial::remark::Said;
+use parfocal::trial::remark::CommentContent;
 use parfocal::trial::role::Role;
 use parfocal::trial::study::signature::Signature;
 use parfocal::trial::study::state::Change;
@@ -198,7 +198,7 @@ async fn session(trial: &mut Trial, participant: &str) {
     trial.surgeon(Action::Acknowledge { segment }).await;
     trial.say("=1+1 looks \"sharp\",\nin the middle").await;
     let mut aloud = trial.comment("");
-    aloud.said = Said::Voice;
+    aloud.said = CommentContent::Voice;
     trial.conductor.comment(aloud.clone()).await.unwrap();
     for (piece, ended, audio) in
         [(1, None, b"\x1a\x45\xdf\xa3 sound".to_vec()), (2, Some(Ending::Released), Vec::new())]

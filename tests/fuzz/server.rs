@@ -21,7 +21,7 @@ use parfocal::study_export::StudyExports;
 use parfocal::tls::Certificates;
 use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
-use parfocal::trial::remark::Said;
+use parfocal::trial::remark::CommentContent;
 use tempfile::TempDir;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
@@ -375,7 +375,7 @@ async fn begin(folder: &TempDir) -> (Trial, Names) {
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
     let mut comment = trial.comment("");
-    comment.said = Said::Voice;
+    comment.said = CommentContent::Voice;
     trial.conductor.comment(comment.clone()).await.unwrap();
     (trial, Names { session, segment, comment: comment.key })
 }

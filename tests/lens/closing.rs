@@ -156,7 +156,7 @@ fn server(emulator: &Emulator, data: &std::path::Path) -> Child {
 }
 
 #[test]
-fn a_server_lets_the_lens_go_on_every_signal() {
+fn a_server_releases_the_lens_on_every_signal() {
     for signal in SIGNALS {
         let emulator = emulator(quick());
         let data = tempfile::tempdir().unwrap();

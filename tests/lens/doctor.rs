@@ -52,7 +52,7 @@ fn a_lens_without_its_head_and_a_file_for_a_folder_must_be_put_right() {
 }
 
 #[test]
-fn a_database_that_is_none_must_be_put_right() {
+fn a_file_that_is_not_a_database_must_be_fixed() {
     let data = tempfile::tempdir().unwrap();
     std::fs::write(data.path().join("parfocal.db"), "not a database").unwrap();
     let (content, findings, errors) = doctor(data.path(), &[]);
@@ -78,7 +78,7 @@ fn people_read_a_line_a_finding_and_what_to_do() {
 }
 
 #[test]
-fn a_calibrations_age_is_told_and_one_that_cannot_be_read_must_be_put_right() {
+fn a_calibrations_age_is_reported_and_an_unreadable_one_must_be_fixed() {
     let data = tempfile::tempdir().unwrap();
     let file = data.path().join("calibration.toml");
     std::fs::write(&file, "unit = \"0815\"\nversion = \"2\"\ndate = \"2020-01-01\"\n").unwrap();

@@ -10,7 +10,7 @@ use parfocal::lens::{FocalPower, LensError};
 use super::{emulator, last_command, open, power, quick, refused, until};
 
 #[test]
-fn unplugged_and_plugged_in_again_it_goes_on_where_it_was() {
+fn unplugged_and_plugged_in_again_it_continues_where_it_was() {
     let mut emulator = emulator(quick());
     let mut lens = open(&emulator, "").unwrap();
     lens.set(power(0.25)).unwrap();
@@ -71,7 +71,7 @@ fn every_fault_of_the_line_is_noticed_in_words_and_heals() {
 }
 
 #[test]
-fn a_focal_power_that_can_never_be_read_is_noticed_and_nothing_old_is_told_for_it() {
+fn a_focal_power_that_cannot_be_read_is_noticed_and_no_old_value_is_reported() {
     let emulator = emulator(quick());
     let mut lens = open(&emulator, "").unwrap();
     lens.set(power(0.25)).unwrap();
@@ -124,7 +124,7 @@ fn a_lens_pulled_from_its_driver_is_said_and_comes_back() {
 }
 
 #[test]
-fn what_is_no_lens_driver_is_refused_with_the_reason() {
+fn a_device_that_is_not_a_lens_driver_is_refused_with_the_reason() {
     let emulator = emulator(quick());
     emulator.set_fault(Fault::Stranger);
     assert!(refused(open(&emulator, "")).contains("not as an Optotune Lens Driver 4: is this the right port?"));
@@ -173,7 +173,7 @@ fn two_processes_do_not_share_a_port() {
 }
 
 #[test]
-fn who_may_not_open_the_port_is_told_the_group() {
+fn a_user_who_may_not_open_the_port_learns_the_group() {
     const NOBODY: u32 = 65_534;
     const DIALOUT: u32 = 20;
     let emulator = emulator(quick());

@@ -74,7 +74,7 @@ fn a_cut_or_missing_file_names_its_frames() {
 }
 
 #[test]
-fn what_is_no_recording_of_this_version_is_said_to_be_so() {
+fn a_folder_that_is_not_a_recording_of_this_version_is_named_as_such() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 2);
     let description = recording.join("zarr.json");

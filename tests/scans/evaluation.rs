@@ -47,7 +47,7 @@ fn a_full_disk_leaves_no_half_of_a_result() {
 }
 
 #[test]
-fn a_standard_output_that_takes_nothing_is_told() {
+fn a_full_standard_output_is_reported() {
     for arguments in [["--policies", "fixed"].as_slice(), &["--policies", "fixed", "--json"]] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let output = evaluate(arguments).stdout(full).output().unwrap();
@@ -60,7 +60,7 @@ fn a_standard_output_that_takes_nothing_is_told() {
 }
 
 #[test]
-fn numbers_of_scans_that_cannot_be_meant_are_wrong_usage() {
+fn impossible_numbers_of_scans_are_wrong_usage() {
     for count in ["0", "10001", "100000000000000000", "18446744073709551615"] {
         let output = parfocal(&["evaluate", "--policies", "fixed", "--count", count]);
         assert_eq!(output.status.code(), Some(2), "{count}");
@@ -71,7 +71,7 @@ fn numbers_of_scans_that_cannot_be_meant_are_wrong_usage() {
 }
 
 #[test]
-fn a_policy_that_cannot_run_is_told_before_anything_is_played() {
+fn a_policy_that_cannot_run_is_reported_before_anything_is_played() {
     // The missing footage would be the next error.
     for (policies, told) in [
         ("fixed,nonsense", "there is no policy 'nonsense'"),
@@ -153,7 +153,7 @@ fn a_large_still_picture_is_focused_on_as_well_as_a_small_one() {
 }
 
 #[test]
-fn footage_without_anything_to_focus_on_is_refused_and_a_part_without_is_told() {
+fn footage_without_detail_is_refused_and_a_part_without_detail_is_reported() {
     let folder = TempDir::new().unwrap();
     let wall = folder.path().join("1-wall.png");
     let gravel_picture = folder.path().join("2-gravel.png");

@@ -56,7 +56,7 @@ fn a_focal_stack_becomes_a_scan_that_policies_can_be_evaluated_on() {
 }
 
 #[test]
-fn policies_are_evaluated_on_a_stack_and_told_how_fast_its_optic_blurs() {
+fn policies_are_evaluated_on_a_stack_and_get_its_blur_rate() {
     let folder = TempDir::new().unwrap();
     let pictures = folder.path().join("pictures");
     stack(&pictures, &[]);
@@ -92,7 +92,7 @@ fn policies_are_evaluated_on_a_stack_and_told_how_fast_its_optic_blurs() {
 }
 
 #[test]
-fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
+fn pictures_that_are_not_a_focal_stack_are_refused_before_anything_is_written() {
     let folder = TempDir::new().unwrap();
     let pictures = folder.path().join("pictures");
     let out = folder.path().join("scan");

@@ -128,7 +128,7 @@ fn until_stored(out: &Path, poses: usize, child: &mut Child) {
 }
 
 #[test]
-fn killed_or_stopped_a_recording_goes_on_to_the_same_scan() {
+fn a_killed_or_stopped_recording_continues_to_the_same_scan() {
     let folder = TempDir::new().unwrap();
     let whole = recorded(&folder, 6);
     let out = folder.path().join("parts");

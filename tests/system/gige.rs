@@ -138,7 +138,7 @@ fn frames_with_lost_packets_are_counted_and_skipped() {
 }
 
 #[test]
-fn frames_that_never_come_whole_are_told_with_what_to_do() {
+fn frames_that_never_come_whole_are_reported_with_advice() {
     let Some(_fake) = Fake::start(&["-r", "500"]) else { return };
     let camera = open("?format=Mono8&width=512&height=512&packet=1400", 25.0).unwrap();
     until("it is told", || camera.health().message.contains("parts missing: larger packets"));

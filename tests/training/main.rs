@@ -173,7 +173,7 @@ fn trainings_are_compared_by_what_their_folders_hold() {
 }
 
 #[test]
-fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
+fn a_training_continues_on_the_footage_that_it_was_begun_with() {
     let folder = tempfile::tempdir().unwrap();
     let first = picture(folder.path(), "first.png", 80);
     let other = picture(folder.path(), "other.png", 90);

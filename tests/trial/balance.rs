@@ -67,7 +67,7 @@ async fn an_aborted_session_gives_its_place_back() {
 }
 
 #[tokio::test]
-async fn unblinding_closes_the_set_and_its_seed_is_told_when_all_of_it_are_unblinded() {
+async fn unblinding_closes_the_set_and_its_seed_is_revealed_when_all_are_unblinded() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
     let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;

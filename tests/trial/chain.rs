@@ -465,7 +465,7 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
 
 /// A column name that is not valid UTF-8 made the database's driver panic, and verification wait forever.
 #[tokio::test]
-async fn a_column_named_by_what_is_no_text_is_refused_whoever_opens_the_database() {
+async fn a_column_whose_name_is_not_text_is_refused_at_every_opening() {
     let folder = tempfile::tempdir().unwrap();
     a_database(folder.path()).await;
     let file = folder.path().join("parfocal.db");

@@ -66,7 +66,7 @@ async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
 }
 
 #[tokio::test]
-async fn a_withdrawn_session_is_in_no_export_but_its_place_is_told_and_the_chain_stays_whole() {
+async fn a_withdrawn_session_is_in_no_export_but_its_place_is_listed_and_the_chain_stays_whole() {
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, session) = with_session(folder.path()).await;
     trial.unblind(session).await;

@@ -110,7 +110,7 @@ async fn a_correction_stands_beside_the_original_on_the_page_and_in_the_export()
 }
 
 #[tokio::test]
-async fn what_makes_no_sense_is_not_corrected() {
+async fn invalid_corrections_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(folder.path()).await;
     let (sharpness, seven) = answer(&trial, session, "sharpness").await;

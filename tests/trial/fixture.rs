@@ -17,7 +17,7 @@ use parfocal::trial::account::{Account, AccountName, AccountRole};
 use parfocal::trial::action::Action;
 use parfocal::trial::phase::Phase;
 use parfocal::trial::question::{AnswerValue, QuestionKind};
-use parfocal::trial::remark::{NewAnswer, NewComment, Origin, Said};
+use parfocal::trial::remark::{CommentContent, NewAnswer, NewComment, Origin};
 use parfocal::trial::role::Role;
 use parfocal::trial::view::{OperatorView, SurgeonView};
 use rand::{Rng, SeedableRng};
@@ -149,7 +149,7 @@ impl Trial {
             frame: Some(1234),
             run: Some(self.store.run()),
             origin: Origin { client_millis: Some(1_772_355_600_000), ..Origin::default() },
-            said: Said::Text(text.to_owned()),
+            said: CommentContent::Text(text.to_owned()),
         }
     }
 

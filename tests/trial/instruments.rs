@@ -144,7 +144,7 @@ async fn every_instrument_is_answered_and_scored() {
 }
 
 #[tokio::test]
-async fn what_no_instrument_takes_is_refused_and_said_why() {
+async fn answers_that_no_instrument_takes_are_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = with_instruments(folder.path()).await;
     begin(&trial).await;

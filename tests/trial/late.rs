@@ -64,7 +64,7 @@ async fn unblind(trial: &Trial, session: SessionId, despite_outstanding: bool) -
 }
 
 #[tokio::test]
-async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
+async fn the_latest_answer_counts_and_devices_that_disagree_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, session) = at_questions(folder.path()).await;
     trial.wait(60 * SECOND).await;
@@ -255,7 +255,7 @@ async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_
 }
 
 #[tokio::test]
-async fn an_emergency_unblinding_does_not_wait_and_the_sessions_answers_go_on_to_count_until_its_end() {
+async fn an_emergency_unblinding_does_not_wait_and_answers_count_until_the_sessions_end() {
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, session) = at_questions(folder.path()).await;
     unblind(&trial, session, false).await.unwrap();

@@ -6,7 +6,7 @@ use parfocal::conductor::ConductError;
 use parfocal::trial::action::Action;
 use parfocal::trial::phase::Phase;
 use parfocal::trial::question::{AnswerValue, QuestionKind};
-use parfocal::trial::remark::{NewAnswer, Origin, Said};
+use parfocal::trial::remark::{CommentContent, NewAnswer, Origin};
 use parfocal::trial::role::Role;
 
 use crate::fixture::Trial;
@@ -84,7 +84,7 @@ async fn a_comment_sent_twice_is_one_and_a_key_used_for_another_is_refused() {
     assert_eq!(trial.view().comments, 1);
 
     let mut other = comment;
-    other.said = Said::Text("another".to_owned());
+    other.said = CommentContent::Text("another".to_owned());
     assert!(matches!(trial.conductor.comment(other).await, Err(ConductError::Conflict(_))));
 
     assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 1);
@@ -170,7 +170,7 @@ async fn emoji_are_kept_whole_and_a_megabyte_is_refused_with_the_limit() {
     let emoji = "👩🏽‍⚕️🔬 ≠ 🧠\u{202e}\0 Ünïcödé";
     trial.say(emoji).await;
     let kept = trial.store.reader().comments(session).await.unwrap();
-    assert_eq!(kept[0].1.said, Said::Text(emoji.to_owned()));
+    assert_eq!(kept[0].1.said, CommentContent::Text(emoji.to_owned()));
 
     let megabyte = trial.comment(&"x".repeat(1_000_000));
     let refused = trial.conductor.comment(megabyte).await.unwrap_err();

@@ -84,7 +84,7 @@ async fn the_researcher_learns_the_policies_at_unblinding_and_not_before() {
 }
 
 #[tokio::test]
-async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in_between() {
+async fn the_control_loop_gets_each_policy_from_the_same_start_and_holds_in_between() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.whole_session("paper").await;
@@ -126,7 +126,7 @@ async fn a_setting_ends_at_its_limit_and_prompts_come_and_go() {
 }
 
 #[tokio::test]
-async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_second() {
+async fn a_restarted_server_continues_at_the_same_place_and_loses_at_most_a_second() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.begin("paper").await;

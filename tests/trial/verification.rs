@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::exports::{failed, json, with_session};
 
 #[tokio::test]
-async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
+async fn an_export_is_verified_and_changes_in_it_are_found() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;
@@ -70,7 +70,7 @@ fn reversed(text: &str, columns: usize) -> String {
 }
 
 #[tokio::test]
-async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
+async fn forgeries_are_found_even_with_new_checksums() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;

@@ -13,7 +13,7 @@ use parfocal::store::verify_database;
 use parfocal::trial::action::Action;
 use parfocal::trial::correction::{FieldChange, NewCorrection};
 use parfocal::trial::erasure::{Erasable, NewErasure};
-use parfocal::trial::remark::Said;
+use parfocal::trial::remark::CommentContent;
 use parfocal::trial::role::Role;
 use parfocal::trial::voice::{Ending, LARGEST_PIECE, LARGEST_RECORDING, NewPiece};
 use sha2::{Digest, Sha256};
@@ -36,7 +36,7 @@ async fn start(folder: &Path) -> Trial {
 /// Lets the surgeon begin to speak, and returns the comment's key.
 async fn begin_to_speak(trial: &mut Trial) -> IdempotencyKey {
     let mut comment = trial.comment("");
-    comment.said = Said::Voice;
+    comment.said = CommentContent::Voice;
     trial.conductor.comment(comment.clone()).await.unwrap();
     comment.key
 }
@@ -123,12 +123,12 @@ async fn pieces_are_kept_once_in_whatever_order_they_come_and_after_the_end_and_
 }
 
 #[tokio::test]
-async fn what_is_no_piece_of_this_recording_is_refused_and_changes_nothing() {
+async fn a_piece_of_another_recording_is_refused_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = start(folder.path()).await;
     let silent = trial.begin("practice").await;
     let mut aloud = trial.comment("");
-    aloud.said = Said::Voice;
+    aloud.said = CommentContent::Voice;
     let refused = trial.conductor.comment(aloud).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("does not record voice")), "{refused}");
     end(&trial, silent).await;
@@ -369,7 +369,7 @@ async fn voice_is_erased_by_itself_once_the_protocols_time_is_over_and_not_durin
     let spoken = timeline.comments.iter().find(|line| line.key == comment).unwrap();
     assert!(spoken.erased.is_some());
     assert_eq!(spoken.note.as_deref(), Some("it wanders"), "what was typed out stays");
-    assert!(timeline.comments.iter().any(|line| line.said == Said::Text("typed".to_owned())));
+    assert!(timeline.comments.iter().any(|line| line.said == CommentContent::Text("typed".to_owned())));
 
     let detail = trial.conductor.session_detail(session).await.unwrap();
     let line = detail.log.iter().find(|line| line.text.contains("erased")).unwrap();

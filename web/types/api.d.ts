@@ -1439,8 +1439,28 @@ export interface components {
          * @enum {string}
          */
         Code: "camera-silent" | "lens-gone" | "lens-warns" | "disk-nearly-full" | "disk-silent" | "database-troubled" | "database-unwritable" | "events-unrecorded" | "telemetry-lost" | "loop-stalled";
+        /** @description The content of a comment. */
+        CommentContent: {
+            /** @enum {string} */
+            kind: "text";
+            /** @description A typed text. */
+            text: string;
+        } | {
+            /** @enum {string} */
+            kind: "quick";
+            /** @description One of the protocol's quick comments. */
+            text: string;
+        } | {
+            /** @enum {string} */
+            kind: "mark";
+            text?: never;
+        } | {
+            /** @enum {string} */
+            kind: "voice";
+            text?: never;
+        };
         /** @description A comment, as it is shown. */
-        CommentLine: components["schemas"]["Said"] & {
+        CommentLine: components["schemas"]["CommentContent"] & {
             /** @description Time of the comment, by the server's wall clock. */
             at: string;
             /** @description Number of the setting, from 1; none outside settings. */
@@ -1762,7 +1782,7 @@ export interface components {
             value: components["schemas"]["AnswerValue"];
         };
         /** @description A comment as a surgeon's browser sends it. */
-        NewComment: components["schemas"]["Origin"] & components["schemas"]["Said"] & {
+        NewComment: components["schemas"]["Origin"] & components["schemas"]["CommentContent"] & {
             /**
              * Format: int64
              * @description Number of the frame that was on the screen.
@@ -2182,26 +2202,6 @@ export interface components {
          * @enum {string}
          */
         Role: "surgeon" | "operator" | "researcher" | "system";
-        /** @description The content of a comment. */
-        Said: {
-            /** @enum {string} */
-            kind: "text";
-            /** @description A typed text. */
-            text: string;
-        } | {
-            /** @enum {string} */
-            kind: "quick";
-            /** @description One of the protocol's quick comments. */
-            text: string;
-        } | {
-            /** @enum {string} */
-            kind: "mark";
-            text?: never;
-        } | {
-            /** @enum {string} */
-            kind: "voice";
-            text?: never;
-        };
         /** @description A scale of a questionnaire. */
         Scale: {
             /** @description Meaning of the upper end. */
@@ -2659,7 +2659,7 @@ export interface components {
             settings: components["schemas"]["SettingSpan"][];
         };
         /** @description A comment on the timeline. */
-        TimelineComment: components["schemas"]["Said"] & {
+        TimelineComment: components["schemas"]["CommentContent"] & {
             /** @description When it was stored, by the server's wall clock. */
             at: string;
             /** @description When its words were erased, by the server's wall clock; none if they were not. */

@@ -30,7 +30,6 @@ declare global {
     type Question = Schemas["Question"];
     type RecordingCourse = Schemas["RecordingCourse"];
     type RecordingStatus = Schemas["RecordingStatus"];
-    type Said = Schemas["Said"];
     type Scale = Schemas["Scale"];
     type SessionDetail = Schemas["SessionDetail"];
     type SetAside = Schemas["SetAside"];

@@ -106,7 +106,7 @@ impl Drop for GigeCamera {
 
 /// A camera that can be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundCamera {
     /// Identity, by which it can be opened.
     pub id: String,
     /// Maker and model.
@@ -117,13 +117,13 @@ pub struct Found {
 
 /// Every camera that answers, on every network interface and USB port. Takes about a second.
 #[must_use]
-pub fn list() -> Vec<Found> {
+pub fn list() -> Vec<FoundCamera> {
     static ARAVIS: OnceLock<Option<std::sync::Mutex<Aravis>>> = OnceLock::new();
     let aravis = ARAVIS.get_or_init(|| Aravis::initialize().ok().map(std::sync::Mutex::new));
     let Some(aravis) = aravis else { return Vec::new() };
     let devices = aravis.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_device_list();
 
-    let found = devices.into_iter().map(|device| Found {
+    let found = devices.into_iter().map(|device| FoundCamera {
         id: device.id.to_string_lossy().into_owned(),
         model: format!("{} {}", device.vendor.to_string_lossy(), device.model.to_string_lossy()),
         address: device.address.to_string_lossy().into_owned(),
@@ -137,6 +137,6 @@ fn listing() -> String {
         return "no camera answers: check power, cable and the network interface's address".into();
     }
 
-    let one = |found: &Found| format!("gige:{} ({} at {})", found.id, found.model, found.address);
+    let one = |found: &FoundCamera| format!("gige:{} ({} at {})", found.id, found.model, found.address);
     format!("cameras that answer: {}", found.iter().map(one).collect::<Vec<_>>().join(", "))
 }

@@ -238,7 +238,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_told_in_stretches() {
+    fn numbers_are_listed_as_ranges() {
         assert_eq!(poses(&[3]), "pose 3");
         assert_eq!(poses(&[3, 4]), "poses 3, 4");
         assert_eq!(numbers(&[1, 2, 3, 7, 9, 10]), "1 to 3, 7, 9, 10");

@@ -92,7 +92,7 @@ struct Inspector<'a> {
 }
 
 /// A decoded picture: `rgb` for the overlay, `gray` for the metrics.
-struct Seen {
+struct DecodedPicture {
     kind: Kind,
     rgb: RgbImage,
     gray: GrayImage,
@@ -153,7 +153,7 @@ impl<'a> Inspector<'a> {
         Ok(report)
     }
 
-    fn see(&mut self, path: &Path) -> Result<Seen, Failure> {
+    fn see(&mut self, path: &Path) -> Result<DecodedPicture, Failure> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
         let bytes = fs::read(path).map_err(|error| named(&format_args!("cannot be read: {error}")))?;
 
@@ -167,8 +167,8 @@ impl<'a> Inspector<'a> {
         }
 
         Ok(match picture {
-            Picture::Rgb(rgb, gray) => Seen { kind: Kind::Rgb, rgb, gray },
-            Picture::Gray(gray) => Seen { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
+            Picture::Rgb(rgb, gray) => DecodedPicture { kind: Kind::Rgb, rgb, gray },
+            Picture::Gray(gray) => DecodedPicture { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
             Picture::Mosaic(frame) => {
                 let size = (frame.width(), frame.height());
                 calibration::check_size(&self.calibration, &path.display().to_string(), Some(size))?;
@@ -184,7 +184,8 @@ impl<'a> Inspector<'a> {
                     ));
                 }
 
-                let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
+                let mut seen =
+                    DecodedPicture { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
                 self.developer.develop(&frame, Size::Cell, &mut seen.rgb, &mut seen.gray);
                 if self.size != Size::Cell {
                     // The gray picture stays that of the cells, as policies see it.

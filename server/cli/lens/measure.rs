@@ -7,7 +7,7 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::which::Which;
+use super::which::LensChoice;
 use crate::camera::{self, CameraSettings};
 use crate::cli::output::{Failure, print};
 use crate::clock::{Clock, SystemClock};
@@ -21,7 +21,7 @@ use crate::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
-    which: Which,
+    which: LensChoice,
     /// Camera that looks through the lens at something still: `gige:ID`; try it with `phantom:still`.
     #[arg(long, value_name = "SPEC")]
     camera: String,

@@ -7,7 +7,7 @@ mod which;
 
 use super::output::{Failure, print};
 use crate::lens::FocalPower;
-use which::{Which, go};
+use which::{LensChoice, go};
 
 /// Arguments of `parfocal lens`.
 #[derive(Debug, clap::Args)]
@@ -21,7 +21,7 @@ enum Action {
     /// Print what the lens is and what state it is in.
     Info {
         #[command(flatten)]
-        which: Which,
+        which: LensChoice,
     },
     /// Move to a focal power and stay there.
     Set {
@@ -29,7 +29,7 @@ enum Action {
         #[arg(value_parser = parse_focal_power)]
         focal_power: FocalPower,
         #[command(flatten)]
-        which: Which,
+        which: LensChoice,
     },
     /// Step through the range and compare the positions requested with those read back.
     Sweep(sweep::Arguments),
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn info(which: &Which) -> Result<(), Failure> {
+fn info(which: &LensChoice) -> Result<(), Failure> {
     let mut lens = which.open()?;
     let info = lens.info()?;
     if which.json {
@@ -71,7 +71,7 @@ fn info(which: &Which) -> Result<(), Failure> {
     ))
 }
 
-fn set(target: FocalPower, which: &Which) -> Result<(), Failure> {
+fn set(target: FocalPower, which: &LensChoice) -> Result<(), Failure> {
     let mut lens = which.open_to_stay()?;
     let position = go(lens.as_mut(), target)?;
     if which.json {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::which::{Which, dioptre, go};
+use super::which::{LensChoice, dioptre, go};
 use crate::cli::output::{Failure, print};
 use crate::files::replace;
 use crate::lens::FocalPower;
@@ -15,7 +15,7 @@ use crate::lens::FocalPower;
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
-    which: Which,
+    which: LensChoice,
     /// Number of stops on the way up, and again on the way down.
     #[arg(long, default_value_t = 21, value_parser = clap::value_parser!(u16).range(2..=1001))]
     steps: u16,

@@ -12,7 +12,7 @@ use crate::lens::{self, FocalPower, Lens, LensInfo};
 
 /// The lens to use, and the output format.
 #[derive(Debug, clap::Args)]
-pub struct Which {
+pub struct LensChoice {
     /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or
     /// `emulated`, an emulated Optotune driver, with options like those of `lens emulate`: `?delay=10&settling=40`.
     #[arg(long, value_name = "SPEC")]
@@ -22,7 +22,7 @@ pub struct Which {
     pub json: bool,
 }
 
-impl Which {
+impl LensChoice {
     pub fn open(&self) -> Result<Box<dyn Lens>, Failure> {
         interrupt::let_lenses_go_first()?;
         Ok(lens::open(&self.lens, Arc::new(SystemClock))?)

@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distant_server_is_no_slow_link() {
+    fn a_distant_server_is_not_taken_for_a_slow_link() {
         // 70 ms for every picture: the larger sizes are tried in time, and kept.
         let mut viewer = Viewer::new(2048, 70.0, 100_000.0);
         assert_eq!(viewer.watch(5), [Size::Cell]);

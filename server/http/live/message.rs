@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A message from a page.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
-pub(super) enum Said {
+pub(super) enum PageMessage {
     /// This frame is on screen.
     Drawn { frame: u64 },
     /// Whether the page is visible.
@@ -22,7 +22,7 @@ pub(super) enum Said {
 /// A text message to a page.
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
-pub(super) enum Told<S, T> {
+pub(super) enum ServerMessage<S, T> {
     Session { view: Option<S> },
     Status(T),
     Beat,

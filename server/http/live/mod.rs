@@ -47,7 +47,7 @@ use crate::live::{EncodedFrame, Watcher};
 use crate::trial::role::Role;
 use audience::Audience;
 use link::Link;
-use message::{Said, Told, close, pack, tell, tenth_millis};
+use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis};
 use operator::ForOperator;
 use surgeon::ForSurgeon;
 use tablets::OpenTablet;
@@ -120,7 +120,7 @@ fn is_over(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
 }
 
 /// Error: the page has left or is silent.
-struct Left;
+struct PageGone;
 
 /// A frame that was sent and is not yet acknowledged.
 struct InFlight {
@@ -207,7 +207,7 @@ impl<A: Audience> Desk<A> {
     }
 
     /// Waits for the next message for the page. Never returns `Ok(None)`.
-    async fn next_message(&mut self, socket: &mut WebSocket) -> Result<Option<Message>, Left> {
+    async fn next_message(&mut self, socket: &mut WebSocket) -> Result<Option<Message>, PageGone> {
         if let Some(message) = self.next.take() {
             return Ok(Some(message));
         }
@@ -222,7 +222,7 @@ impl<A: Audience> Desk<A> {
                         self.note_tablet();
                         answer
                     }
-                    _ => return Err(Left),
+                    _ => return Err(PageGone),
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
@@ -238,27 +238,27 @@ impl<A: Audience> Desk<A> {
         }
     }
 
-    fn hear(&mut self, message: &Message) -> Result<Option<Message>, Left> {
+    fn hear(&mut self, message: &Message) -> Result<Option<Message>, PageGone> {
         self.silent = 0;
         let text = match message {
             Message::Text(text) => text.as_str(),
-            Message::Close(_) => return Err(Left),
+            Message::Close(_) => return Err(PageGone),
             Message::Binary(_) => return Ok(Some(close(close_code::UNSUPPORTED, "text is expected"))),
             Message::Ping(_) | Message::Pong(_) => return Ok(None),
         };
 
         match serde_json::from_str(text) {
-            Ok(Said::Drawn { frame }) => self.drawn(frame),
-            Ok(Said::Visible { visible: false }) => {
+            Ok(PageMessage::Drawn { frame }) => self.drawn(frame),
+            Ok(PageMessage::Visible { visible: false }) => {
                 self.watcher = None;
                 self.coming = None;
             }
-            Ok(Said::Visible { visible: true }) => {
+            Ok(PageMessage::Visible { visible: true }) => {
                 self.in_flight = None;
                 self.due = Instant::now() + link::PATIENCE;
                 self.watcher.get_or_insert_with(|| join::<A>(&self.app, self.link.size()));
             }
-            Ok(Said::Screen { width }) => {
+            Ok(PageMessage::Screen { width }) => {
                 self.screen = Some(width);
                 self.look_at_screen();
             }
@@ -323,7 +323,7 @@ impl<A: Audience> Desk<A> {
         // Whether a policy may be named depends on the session.
         self.statuses.mark_changed();
         let view = self.sessions.borrow_and_update().clone();
-        tell(&Told::<_, A::Status>::Session { view: view.as_deref() })
+        tell(&ServerMessage::<_, A::Status>::Session { view: view.as_deref() })
     }
 
     fn status(&mut self) -> Option<Message> {
@@ -332,7 +332,7 @@ impl<A: Audience> Desk<A> {
             return None;
         }
 
-        let message = tell(&Told::<&A::Session, _>::Status(&status));
+        let message = tell(&ServerMessage::<&A::Session, _>::Status(&status));
         self.told = Some(status);
         message
     }
@@ -395,7 +395,7 @@ impl<A: Audience> Desk<A> {
         Some(Message::Binary(message))
     }
 
-    async fn beat(&mut self) -> Result<Option<Message>, Left> {
+    async fn beat(&mut self) -> Result<Option<Message>, PageGone> {
         if let Some(token) = &self.token
             && self.app.accounts.has_ended(token).await.unwrap_or(false)
         {
@@ -404,10 +404,10 @@ impl<A: Audience> Desk<A> {
 
         self.silent += 1;
         if self.silent > 2 {
-            return Err(Left);
+            return Err(PageGone);
         }
         // Browsers answer pings themselves without telling the page, so the page gets a message as well.
-        self.next = tell(&Told::<&A::Session, &A::Status>::Beat);
+        self.next = tell(&ServerMessage::<&A::Session, &A::Status>::Beat);
         Ok(Some(Message::Ping(Bytes::new())))
     }
 }

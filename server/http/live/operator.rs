@@ -34,12 +34,12 @@ pub(super) struct OperatorFrame {
     held: Option<Hold>,
     /// What the loop did with the frame; every field is null while a session is under way.
     #[serde(flatten)]
-    seen: Seen,
+    seen: RevealingValues,
 }
 
 /// The values that could reveal the policy.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-struct Seen {
+struct RevealingValues {
     /// Focal power asked for after this frame.
     asked: Option<FocalPower>,
     /// Focal power at which the frame was exposed.
@@ -51,7 +51,7 @@ struct Seen {
     belief: Option<Arc<[f32]>>,
 }
 
-impl Seen {
+impl RevealingValues {
     fn new(insight: &Insight) -> Self {
         Self {
             asked: Some(insight.asked),
@@ -145,7 +145,11 @@ impl Audience for ForOperator {
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
         // Ask only once: a session may begin between two questions.
         let blinded = app.blinded();
-        let (age, seen) = if blinded { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
+        let (age, seen) = if blinded {
+            (coarse(age_ms), RevealingValues::default())
+        } else {
+            (age_ms, RevealingValues::new(&frame.insight))
+        };
         let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));
 
         OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
@@ -165,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_policys_holds_are_told_in_a_session_only_when_they_last_and_then_all_alike() {
+    fn a_policys_holds_are_shown_in_a_session_only_if_they_last_and_then_all_alike() {
         let message: Arc<str> = Arc::from("the policy is starting");
         let told = |hold, seconds| told_in_session(hold, Duration::from_secs(seconds), Some(&message));
         let policys = [Hold::PolicyPanicked, Hold::PolicyNonsense, Hold::PolicySlow, Hold::PolicyUnavailable];

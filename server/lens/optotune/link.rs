@@ -30,7 +30,7 @@ pub struct Link<'a> {
     shared: &'a Shared,
     /// The device's range, once known. From then on commands are taken from the slot.
     range: Option<Range>,
-    sent: Option<Sent>,
+    sent: Option<SentCommand>,
     /// Whether a reply to an earlier request may still come.
     awaiting: bool,
     /// Whether the lens's current is being removed at the end. Nothing may interrupt this.
@@ -41,7 +41,7 @@ pub struct Link<'a> {
 
 /// The last command sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sent {
+pub struct SentCommand {
     /// Focal power in the driver's own units.
     pub raw: i16,
     /// Time at which it was sent.
@@ -103,7 +103,7 @@ impl<'a> Link<'a> {
     }
 
     /// The last command sent.
-    pub const fn sent(&self) -> Option<Sent> {
+    pub const fn sent(&self) -> Option<SentCommand> {
         self.sent
     }
 
@@ -112,7 +112,7 @@ impl<'a> Link<'a> {
         let now = self.shared.clock.now();
         self.outgoing.extend(Request::SetFocalPower(raw).encode());
         self.shared.response.command(now, range.focal_power(raw));
-        self.sent = Some(Sent { raw, at: now });
+        self.sent = Some(SentCommand { raw, at: now });
     }
 
     /// Greets the driver, at most three times: the first greeting may only complete a request that another program left

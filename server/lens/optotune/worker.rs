@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::codec::{Reply, Request};
 use super::handshake::{self, Settings};
-use super::link::{Link, Sent};
+use super::link::{Link, SentCommand};
 use super::port::Port;
 use super::shared::{Device, Shared};
 use super::trouble::Trouble;
@@ -205,7 +205,7 @@ impl Session<'_, '_> {
     }
 
     /// Sends the last command again if the device did not accept it.
-    fn compare(&mut self, sent: Option<Sent>, read_back: i16) {
+    fn compare(&mut self, sent: Option<SentCommand>, read_back: i16) {
         // A command sent in the meantime makes the comparison meaningless.
         let Some(last) = self.link.sent().filter(|&last| Some(last) == sent) else { return };
         if last.raw == read_back {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use std::{fmt, io};
 
-use super::{PoseSource, RecordError, Taken};
+use super::{PosePictures, PoseSource, RecordError};
 use crate::camera::recorded::LEAST_SIDE;
 use crate::camera::{Camera, CameraError, FrameImage};
 use crate::clock::{Clock, Moment};
@@ -88,7 +88,7 @@ pub struct Devices {
 }
 
 impl PoseSource for Devices {
-    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<PosePictures, RecordError> {
         self.stepper.go(pose)?;
         let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;
         let Some(GrayImage { width, height, .. }) = pictures.first() else { return Err(RecordError::TooSmall(0, 0)) };
@@ -107,7 +107,7 @@ impl PoseSource for Devices {
 
         let area = pictures.first().and_then(content_area::detect);
         let patch = PatchArea::central(width, height, area.as_ref()).map_err(too_small)?;
-        Ok(Taken { pictures, patch, truth: None })
+        Ok(PosePictures { pictures, patch, truth: None })
     }
 }
 

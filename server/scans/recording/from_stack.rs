@@ -6,7 +6,7 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Taken, shot};
+use super::{PosePictures, shot};
 use crate::autofocus::mgm;
 use crate::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, ScanError, VERSION};
 use crate::imaging::{GrayImage, PATCH_SIDE, PatchArea};
@@ -147,7 +147,7 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
         if !recording.folder().poses().contains_key(&pose) {
             let planes = &stack.planes()[window.plane..window.plane + cut.planes];
             let pictures = planes.iter().map(|plane| cropped(&plane.picture, window, cut.size)).collect();
-            recording.store(&shot(pose, &powers, Taken { pictures, patch, truth: None }))?;
+            recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
         }
         progress();
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::import_error::ImportError;
-use super::{Taken, shot};
+use super::{PosePictures, shot};
 use crate::camera::footage::picture_reader;
 use crate::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
@@ -131,7 +131,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
             }
         } else {
             let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
-            recording.store(&shot(pose, &powers, Taken { pictures, patch, truth: None }))?;
+            recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
         }
         progress();
     }

@@ -24,12 +24,12 @@ pub trait PoseSource {
     ///
     /// # Errors
     /// If the pose cannot be reached, or lens or camera fail. Then nothing of the pose is stored.
-    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError>;
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<PosePictures, RecordError>;
 }
 
 /// The pictures of one pose.
 #[derive(Debug, Clone)]
-pub struct Taken {
+pub struct PosePictures {
     /// The pictures, in the requested order and all of one size.
     pub pictures: Vec<GrayImage>,
     /// Where the patch is.
@@ -98,8 +98,8 @@ pub fn record(
 }
 
 /// A pose as it is stored. Its optimum is searched in the stack, as the evaluation does.
-fn shot(pose: usize, in_order: &[FocalPower], taken: Taken) -> Shot {
-    let Taken { pictures, patch, truth } = taken;
+fn shot(pose: usize, in_order: &[FocalPower], taken: PosePictures) -> Shot {
+    let PosePictures { pictures, patch, truth } = taken;
     let patches = pictures.iter().map(|picture| Box::new(levels_at(picture, patch))).collect();
     let optimum = PatchStack::new(in_order, patches).optimum;
     Shot { pose, images: in_order.iter().copied().zip(pictures).collect(), patch, optimum, truth }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{PoseSource, RecordError, Taken};
+use super::{PosePictures, PoseSource, RecordError};
 use crate::camera::CameraError;
 use crate::imaging::{GrayImage, MosaicFrame, Reconstructor, RgbImage};
 use crate::lens::FocalPower;
@@ -24,7 +24,7 @@ impl PhantomPoses {
 }
 
 impl PoseSource for PhantomPoses {
-    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<PosePictures, RecordError> {
         let beyond = || CameraError::BadSource(format!("the trajectory has no pose {pose}"));
         let still = pose.checked_sub(1).and_then(|index| self.trajectory.still(index)).ok_or_else(beyond)?;
 
@@ -46,6 +46,6 @@ impl PoseSource for PhantomPoses {
 
         let numbered: Vec<(u16, FocalPower)> = (0..).zip(powers.iter().copied()).collect();
         let pictures = numbered.into_par_iter().map_init(tools, picture).collect::<Result<_, CameraError>>()?;
-        Ok(Taken { pictures, patch: still.patch(), truth: Some(still.optimal()) })
+        Ok(PosePictures { pictures, patch: still.patch(), truth: Some(still.optimal()) })
     }
 }

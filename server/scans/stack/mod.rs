@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_that_are_no_stack_are_refused() {
+    fn pictures_that_are_not_a_stack_are_refused() {
         let told = |planes: Vec<Plane>| FocalStack::new(planes).unwrap_err().to_string();
         let five = || (0..5).map(|i| plane(f64::from(i), 0.0)).collect::<Vec<_>>();
         assert!(told(five()[..2].to_vec()).contains("at least 5 pictures at different positions, but has 2"));

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
-use super::{AccountEvent, By, PassphraseHash};
+use super::{AccountEvent, ChangedBy, PassphraseHash};
 use crate::clock::Clock;
 use crate::store::schema::DATABASE;
 use crate::store::values::{begin, drop_if_failed, nanoseconds};
@@ -16,13 +16,13 @@ use crate::trial::account::{Account, AccountChange, AccountName};
 /// Writes accounts, each change with its row in the chain. Clone freely.
 #[derive(Clone)]
 pub struct AccountBook {
-    way: Way,
+    way: Backend,
     reader: Reader,
     clock: Arc<dyn Clock>,
 }
 
 #[derive(Clone)]
-enum Way {
+enum Backend {
     /// Within the server.
     Server(Store),
     /// From the command line, whether or not a server runs.
@@ -43,7 +43,7 @@ impl AccountBook {
     /// The account book of the server.
     #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>) -> Self {
-        Self { way: Way::Server(store.clone()), reader: store.reader().clone(), clock }
+        Self { way: Backend::Server(store.clone()), reader: store.reader().clone(), clock }
     }
 
     /// Opens data folder `folder` for a command, whether or not a server has it open.
@@ -59,7 +59,7 @@ impl AccountBook {
             .pragma("wal_autocheckpoint", "0")
             .synchronous(SqliteSynchronous::Full);
         let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
-        Ok(Self { way: Way::CommandLine(pool), reader, clock })
+        Ok(Self { way: Backend::CommandLine(pool), reader, clock })
     }
 
     /// The reader of the same database.
@@ -70,7 +70,7 @@ impl AccountBook {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Way::CommandLine(pool) = &self.way {
+        if let Backend::CommandLine(pool) = &self.way {
             self.reader.close().await;
             pool.close().await;
         }
@@ -80,7 +80,7 @@ impl AccountBook {
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn add(&self, account: &Account, hash: &PassphraseHash, by: By<'_>) -> Result<(), StoreError> {
+    pub async fn add(&self, account: &Account, hash: &PassphraseHash, by: ChangedBy<'_>) -> Result<(), StoreError> {
         let event = AccountEvent::Added(account.role);
         self.write(Some(&account.account), &event, by, Write::Insert(account, hash)).await
     }
@@ -89,7 +89,12 @@ impl AccountBook {
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn change(&self, account: &AccountName, change: &AccountChange, by: By<'_>) -> Result<(), StoreError> {
+    pub async fn change(
+        &self,
+        account: &AccountName,
+        change: &AccountChange,
+        by: ChangedBy<'_>,
+    ) -> Result<(), StoreError> {
         self.write(Some(account), &AccountEvent::Changed(change.clone()), by, Write::Change(change)).await
     }
 
@@ -101,7 +106,7 @@ impl AccountBook {
         &self,
         account: &AccountName,
         hash: &PassphraseHash,
-        by: By<'_>,
+        by: ChangedBy<'_>,
     ) -> Result<(), StoreError> {
         self.write(Some(account), &AccountEvent::PassphraseReplaced, by, Write::Passphrase(hash)).await
     }
@@ -138,8 +143,8 @@ impl AccountBook {
     /// If the disk or database fails.
     pub async fn note_use(&self, token_sha256: &str) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
-            Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Way::CommandLine(pool) => (pool, None),
+            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Backend::CommandLine(pool) => (pool, None),
         };
         sqlx::query("UPDATE sign_ins SET used = ? WHERE token_sha256 = ?")
             .bind(self.clock.wall().to_string())
@@ -153,12 +158,12 @@ impl AccountBook {
         &self,
         account: Option<&AccountName>,
         event: &AccountEvent,
-        by: By<'_>,
+        by: ChangedBy<'_>,
         write: Write<'_>,
     ) -> Result<(), StoreError> {
         let (pool, run, _turn) = match &self.way {
-            Way::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
-            Way::CommandLine(pool) => (pool, None, None),
+            Backend::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
+            Backend::CommandLine(pool) => (pool, None, None),
         };
 
         let mut connection = pool.acquire().await?;
@@ -173,7 +178,7 @@ impl AccountBook {
         run: Option<i64>,
         account: Option<&AccountName>,
         event: &AccountEvent,
-        by: By<'_>,
+        by: ChangedBy<'_>,
         write: Write<'_>,
     ) -> Result<(), StoreError> {
         let wall = self.clock.wall().to_string();

@@ -116,4 +116,4 @@ impl AccountEvent {
 }
 
 /// The account that makes a change, such as a lead's; `None` for the command line.
-pub type By<'a> = Option<&'a AccountName>;
+pub type ChangedBy<'a> = Option<&'a AccountName>;

@@ -16,14 +16,14 @@ pub struct FoundRow {
     /// Hash of the row before, as stored in this row; `None` in an export, which does not repeat it.
     pub previous: Option<String>,
     /// Its entry. For the rows of other sessions, an export has only the entry's hash.
-    pub entry: Found,
+    pub entry: FoundEntry,
     /// Its hash, as it is written in the row.
     pub hash: String,
 }
 
 /// What a row says about its record.
 #[derive(Debug, Clone)]
-pub enum Found {
+pub enum FoundEntry {
     /// The whole entry, and the salt of the sealed columns; `None` if the salt is withheld or erased.
     Whole(Entry, Option<String>),
     /// Only the hash of the entry.
@@ -88,8 +88,8 @@ impl Walk {
     pub fn row(&mut self, row: &FoundRow) -> Result<Option<BlockToCheck>, String> {
         self.link(row)?;
         match &row.entry {
-            Found::Hash(_) => Ok(None),
-            Found::Whole(entry, salt) => self.record(entry, salt.as_ref()),
+            FoundEntry::Hash(_) => Ok(None),
+            FoundEntry::Whole(entry, salt) => self.record(entry, salt.as_ref()),
         }
     }
 
@@ -100,8 +100,8 @@ impl Walk {
         }
 
         let (named, entry) = match &row.entry {
-            Found::Whole(entry, _) => (format!(" ({} {})", entry.kind, entry.key), entry.hash()),
-            Found::Hash(hash) => (String::new(), hash.clone()),
+            FoundEntry::Whole(entry, _) => (format!(" ({} {})", entry.kind, entry.key), entry.hash()),
+            FoundEntry::Hash(hash) => (String::new(), hash.clone()),
         };
 
         if row.previous.as_ref().is_some_and(|previous| *previous != self.last.hash) {

@@ -146,8 +146,8 @@ impl NewFolder {
 pub struct ZipStream {
     /// The folder in the archive that holds its files.
     root: String,
-    archive: ZipWriter<StreamWriter<Made>>,
-    made: Made,
+    archive: ZipWriter<StreamWriter<UnsentBytes>>,
+    made: UnsentBytes,
     pieces: mpsc::Sender<Piece>,
 }
 
@@ -164,7 +164,7 @@ impl ZipStream {
     /// the file was cut off.
     pub fn new(root: String) -> (Self, impl Stream<Item = io::Result<Bytes>> + Send + use<>) {
         let (pieces, receiver) = mpsc::channel(PIECES);
-        let made = Made::default();
+        let made = UnsentBytes::default();
         let archive = ZipWriter::new_stream(made.clone());
         let bytes = stream::unfold(Some(receiver), async |receiver| {
             let mut receiver = receiver?;
@@ -236,9 +236,9 @@ async fn send(pieces: &mpsc::Sender<Piece>, piece: Piece) -> io::Result<()> {
 
 /// Bytes of a ZIP file that were made and not yet sent.
 #[derive(Clone, Default)]
-struct Made(Arc<Mutex<Vec<u8>>>);
+struct UnsentBytes(Arc<Mutex<Vec<u8>>>);
 
-impl Made {
+impl UnsentBytes {
     fn len(&self) -> usize {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
@@ -248,7 +248,7 @@ impl Made {
     }
 }
 
-impl Write for Made {
+impl Write for UnsentBytes {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).write(bytes)
     }
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_nobody_takes_is_not_made() {
+    async fn a_download_that_nobody_reads_is_not_made() {
         let (mut zip, bytes) = ZipStream::new("session".to_owned());
         zip.begin("noise.bin").unwrap();
         let mut noise = vec![0; 100 * PIECE];

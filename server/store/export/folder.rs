@@ -26,7 +26,7 @@ pub struct Folder {
 }
 
 /// A file that was written.
-struct Written {
+struct WrittenFile {
     sha256: String,
     bytes: usize,
 }
@@ -107,7 +107,7 @@ impl Folder {
         Ok(self.files.into_iter().map(|(file, _)| file).collect())
     }
 
-    fn tabulated(&mut self, table: &Table, file: Written) {
+    fn tabulated(&mut self, table: &Table, file: WrittenFile) {
         self.resources.push(json!({
             "name": table.name,
             "description": table.description,
@@ -156,7 +156,7 @@ impl<R: Row> CsvFile<'_, R> {
     pub async fn end(mut self) -> Result<(), ExportError> {
         self.pass_on().await?;
         self.folder.destination.end(&self.name)?;
-        let written = Written { sha256: hex::encode(self.sha256.finalize()), bytes: self.bytes };
+        let written = WrittenFile { sha256: hex::encode(self.sha256.finalize()), bytes: self.bytes };
         self.folder.tabulated(&R::TABLE, written);
         Ok(())
     }

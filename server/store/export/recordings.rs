@@ -7,7 +7,7 @@ use tokio::task::spawn_blocking;
 
 use super::description::RecordingRow;
 use crate::ids::SessionId;
-use crate::recording::{AnyRecording, FOLDER, Found, of_session};
+use crate::recording::{AnyRecording, FOLDER, FoundRecording, of_session};
 
 /// A row for each recording of `session` in the data folder `data`. A recording that cannot be read has a row that says
 /// so. A broken recording must not prevent the export of what was said.
@@ -16,16 +16,16 @@ pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(told).collect());
     let looked = spawn_blocking(look).await;
 
-    let told: Vec<Told> = match looked {
+    let told: Vec<RecordingContents> = match looked {
         Ok(Ok(told)) => told,
-        Ok(Err(error)) => vec![Told { name: String::new(), read: Err(error.to_string()) }],
-        Err(error) => vec![Told { name: String::new(), read: Err(error.to_string()) }],
+        Ok(Err(error)) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
+        Err(error) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
     };
     told.into_iter().map(|told| row(session, told)).collect()
 }
 
 /// What was read from a recording's folder.
-struct Told {
+struct RecordingContents {
     name: String,
     read: Result<Read, String>,
 }
@@ -35,15 +35,15 @@ struct Read {
     sha256: String,
 }
 
-fn told((name, opened): Found) -> Told {
+fn told((name, opened): FoundRecording) -> RecordingContents {
     let read = opened.and_then(|recording| {
         let sha256 = recording.description_sha256()?;
         Ok(Read { recording, sha256 })
     });
-    Told { name, read: read.map_err(|error| error.to_string()) }
+    RecordingContents { name, read: read.map_err(|error| error.to_string()) }
 }
 
-fn row(session: SessionId, Told { name, read }: Told) -> RecordingRow {
+fn row(session: SessionId, RecordingContents { name, read }: RecordingContents) -> RecordingRow {
     let path = format!("{FOLDER}/{name}");
     let mut row = RecordingRow {
         session,

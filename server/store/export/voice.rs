@@ -11,7 +11,7 @@ use crate::store::values::nanoseconds;
 use crate::store::{Comment, Latest, Reader, Recorded, StoredPiece};
 use crate::trial::correction::Subject;
 use crate::trial::erasure::Erasable;
-use crate::trial::remark::Said;
+use crate::trial::remark::CommentContent;
 use crate::trial::voice::{Ending, MediaType};
 
 /// The folder of an export in which the recordings are.
@@ -29,7 +29,7 @@ impl Blinded {
         let comments = self.comments.iter().map(|(_, comment)| comment);
         let mut rows = Vec::new();
 
-        for comment in comments.filter(|comment| comment.said == Said::Voice) {
+        for comment in comments.filter(|comment| comment.said == CommentContent::Voice) {
             let sound = reader.voice_audio(comment.session, comment.key).await?;
             let file = sound.as_ref().map(|(media_type, _)| file_name(comment.key, *media_type));
             if let (Some(name), Some((_, audio))) = (&file, &sound) {

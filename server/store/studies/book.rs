@@ -17,12 +17,12 @@ use crate::trial::study::definition::StudyName;
 /// Writes studies. Clone freely.
 #[derive(Clone)]
 pub struct StudyBook {
-    way: Way,
+    way: Backend,
     reader: Reader,
 }
 
 #[derive(Clone)]
-enum Way {
+enum Backend {
     /// Within the server.
     Server(Store),
     /// From the command line. The lock keeps servers out, so that no server decides on data that is being changed.
@@ -33,7 +33,7 @@ impl StudyBook {
     /// The book of the server.
     #[must_use]
     pub fn of_server(store: &Store) -> Self {
-        Self { way: Way::Server(store.clone()), reader: store.reader().clone() }
+        Self { way: Backend::Server(store.clone()), reader: store.reader().clone() }
     }
 
     /// Opens the book of data folder `folder` for a command.
@@ -54,15 +54,15 @@ impl StudyBook {
             .busy_timeout(Duration::from_secs(5))
             .synchronous(SqliteSynchronous::Full);
         let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
-        Ok(Self { way: Way::CommandLine { pool, _lock: lock }, reader })
+        Ok(Self { way: Backend::CommandLine { pool, _lock: lock }, reader })
     }
 
     /// The run of the server that writes in it; `None` for a command.
     #[must_use]
     pub fn run(&self) -> Option<i64> {
         match &self.way {
-            Way::Server(store) => Some(store.run()),
-            Way::CommandLine { .. } => None,
+            Backend::Server(store) => Some(store.run()),
+            Backend::CommandLine { .. } => None,
         }
     }
 
@@ -78,8 +78,8 @@ impl StudyBook {
     /// If the disk or database fails.
     pub async fn plan(&self, new: &NewStudy, planned: &StudyChange) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
-            Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Way::CommandLine { pool, .. } => (pool, None),
+            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Backend::CommandLine { pool, .. } => (pool, None),
         };
 
         let mut connection = pool.acquire().await?;
@@ -94,8 +94,8 @@ impl StudyBook {
     /// If the disk or database fails.
     pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
         let (pool, _turn) = match &self.way {
-            Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Way::CommandLine { pool, .. } => (pool, None),
+            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Backend::CommandLine { pool, .. } => (pool, None),
         };
 
         let mut connection = pool.acquire().await?;
@@ -106,7 +106,7 @@ impl StudyBook {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Way::CommandLine { pool, .. } = &self.way {
+        if let Backend::CommandLine { pool, .. } = &self.way {
             self.reader.close().await;
             pool.close().await;
         }

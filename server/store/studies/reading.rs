@@ -15,7 +15,7 @@ use crate::trial::protocol::Protocol;
 use crate::trial::study::definition::Definition;
 use crate::trial::study::event::{StudyEvent, StudyEventKind};
 use crate::trial::study::places::Enrolled;
-use crate::trial::study::signature::{Signature, Way};
+use crate::trial::study::signature::{Channel, Signature};
 
 impl Reader {
     /// The names of all studies, in the order in which they were planned.
@@ -163,7 +163,7 @@ fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
     let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
     Ok(StudyEvent {
         number: row.try_get("number")?,
-        way: Way::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
+        way: Channel::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
         signature: Signature { person: row.try_get("person")?, reason: row.try_get("reason")?, account },
         wall: parsed(row, "wall")?,
         kind: StudyEventKind::of(&kind, session, row.try_get("commitment")?)

@@ -25,7 +25,7 @@ use crate::autofocus::weights::{self, WeightsError, floats};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
-use replay::{Frames, Replay, Seen, Transition};
+use replay::{CompactView, Frames, Replay, Transition};
 use values::Values;
 
 /// A training in progress.
@@ -93,12 +93,14 @@ impl DqnTrainer {
     /// Lets every actor see a frame, act, and advance to the next frame.
     fn play_a_frame(&mut self) {
         let sight = self.online.network.sight;
-        let seen: Vec<Seen> = self
+        let seen: Vec<CompactView> = self
             .actors
             .par_iter_mut()
             .map(|actor| {
                 let patch = actor.environment.observe();
-                sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
+                sight
+                    .metric(&patch)
+                    .map_or_else(|| CompactView::patch(&patch), |metric| CompactView::Metric(sight.scaled(metric)))
             })
             .collect();
 
@@ -131,7 +133,7 @@ impl DqnTrainer {
         self.frames += self.actors.len() as u64;
     }
 
-    fn finish_frame(&mut self, index: usize, seen: &Seen, action: usize) {
+    fn finish_frame(&mut self, index: usize, seen: &CompactView, action: usize) {
         let actor = &mut self.actors[index];
         let stood = actor.environment.focal_power();
         let mut target = stood.moved(action_step(action)).get();

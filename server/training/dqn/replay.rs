@@ -25,14 +25,14 @@ pub struct Transition {
 
 /// What was seen of a frame, in compact form.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Seen {
+pub enum CompactView {
     /// A patch: 1024 gray levels, row by row.
     Patch(Box<[u8]>),
     /// A scaled focus metric.
     Metric(f32),
 }
 
-impl Seen {
+impl CompactView {
     /// A patch in compact form.
     #[must_use]
     pub fn patch(patch: &Patch) -> Self {
@@ -51,10 +51,10 @@ pub struct Frames {
 
 impl Frames {
     /// Adds a frame.
-    pub fn push(&mut self, seen: &Seen) {
+    pub fn push(&mut self, seen: &CompactView) {
         match seen {
-            Seen::Patch(patch) => self.patches.extend_from_slice(patch),
-            Seen::Metric(metric) => self.metrics.push(*metric),
+            CompactView::Patch(patch) => self.patches.extend_from_slice(patch),
+            CompactView::Metric(metric) => self.metrics.push(*metric),
         }
     }
 }
@@ -115,14 +115,14 @@ impl Replay {
     }
 
     /// Adds a frame of `actor`. Replaces its oldest frame if its ring is full.
-    pub fn push(&mut self, actor: usize, seen: &Seen, transition: Transition) {
+    pub fn push(&mut self, actor: usize, seen: &CompactView, transition: Transition) {
         let capacity = self.capacity;
         let ring = &mut self.actors[actor];
         if ring.transitions.len() < capacity {
             ring.transitions.push(transition);
             match seen {
-                Seen::Patch(bytes) => ring.patches.extend_from_slice(bytes),
-                Seen::Metric(metric) => ring.metrics.push(*metric),
+                CompactView::Patch(bytes) => ring.patches.extend_from_slice(bytes),
+                CompactView::Metric(metric) => ring.metrics.push(*metric),
             }
             if ring.transitions.len() == 1 {
                 ring.reserve(capacity - 1);
@@ -134,8 +134,8 @@ impl Replay {
         let at = ring.head;
         ring.transitions[at] = transition;
         match seen {
-            Seen::Patch(bytes) => ring.patches[at * bytes.len()..(at + 1) * bytes.len()].copy_from_slice(bytes),
-            Seen::Metric(metric) => ring.metrics[at] = *metric,
+            CompactView::Patch(bytes) => ring.patches[at * bytes.len()..(at + 1) * bytes.len()].copy_from_slice(bytes),
+            CompactView::Metric(metric) => ring.metrics[at] = *metric,
         }
         ring.head = (at + 1) % capacity;
     }
@@ -236,7 +236,7 @@ mod tests {
     fn a_window_is_consecutive_after_the_ring_has_wrapped() {
         let mut replay = Replay::new(20, 2);
         for time in 0..37u16 {
-            replay.push(0, &Seen::Metric(f32::from(time)), Transition { age: time, ..Transition::default() });
+            replay.push(0, &CompactView::Metric(f32::from(time)), Transition { age: time, ..Transition::default() });
         }
         assert_eq!(replay.len(), 10);
 
@@ -256,7 +256,7 @@ mod tests {
     }
 
     /// A replay memory whose first ring has wrapped, and the folder with its checkpoint.
-    fn saved(seen: impl Fn(u16) -> Seen) -> (Replay, tempfile::TempDir) {
+    fn saved(seen: impl Fn(u16) -> CompactView) -> (Replay, tempfile::TempDir) {
         let mut replay = Replay::new(20, 2);
         for time in 0..13u16 {
             replay.push(0, &seen(time), Transition { age: time, ..Transition::default() });
@@ -276,7 +276,11 @@ mod tests {
     fn a_memory_comes_back_as_it_was_with_room_for_the_rest() {
         for patches in [true, false] {
             let seen = |time: u16| {
-                if patches { Seen::Patch(vec![time as u8; PIXELS].into()) } else { Seen::Metric(f32::from(time)) }
+                if patches {
+                    CompactView::Patch(vec![time as u8; PIXELS].into())
+                } else {
+                    CompactView::Metric(f32::from(time))
+                }
             };
             let (mut replay, folder) = saved(seen);
 
@@ -300,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_damaged_memory_is_rejected() {
-        let (_replay, folder) = saved(|_| Seen::Patch(vec![1; PIXELS].into()));
+        let (_replay, folder) = saved(|_| CompactView::Patch(vec![1; PIXELS].into()));
         let path = folder.path().join("a");
         let damage: [fn(&mut Checkpoint<'_>); 4] = [
             |checkpoint| checkpoint.put_bytes("replay.0.patches", vec![0; 77]),

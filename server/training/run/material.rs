@@ -70,8 +70,8 @@ impl Material {
     /// Opens what the training of `checkpoint` was begun on. `asked` holds its new paths, if any were given.
     pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, pictures: u64) -> Result<Self, TrainError> {
         let paths = |footage: &[PathBuf]| footage.iter().map(|path| path.to_string_lossy().into_owned()).collect();
-        let footage = Known::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
-        let scans = Known::of(checkpoint, SCANS, asked.scans.clone())?;
+        let footage = KnownSources::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
+        let scans = KnownSources::of(checkpoint, SCANS, asked.scans.clone())?;
 
         let from = footage.paths().iter().map(PathBuf::from).collect::<Vec<_>>();
         let (clips, origin) = clips(&from, pictures).map_err(|error| footage.unusable(error))?;
@@ -132,7 +132,7 @@ impl Kind {
 }
 
 /// What a checkpoint says about a kind of source, and its new paths.
-struct Known {
+struct KnownSources {
     kind: Kind,
     /// Its paths and hash when the training was begun; `None` if the training used no such source.
     begun: Option<Origin>,
@@ -140,7 +140,7 @@ struct Known {
     asked: Vec<String>,
 }
 
-impl Known {
+impl KnownSources {
     fn of(checkpoint: &Checkpoint<'_>, kind: Kind, asked: Vec<String>) -> Result<Self, TrainError> {
         let begun = checkpoint.notes.get(kind.name).map(|paths| Origin {
             paths: paths.lines().map(str::to_owned).collect(),

@@ -34,7 +34,7 @@ use curves::Point;
 use folder::RunFolder;
 use material::Material;
 pub use material::Sources;
-use model_card::Made;
+use model_card::Provenance;
 use resume::ResumeRequest;
 use tensorboard::EventFile;
 
@@ -257,7 +257,7 @@ impl Run {
         if row.mae < self.best {
             self.best = row.mae;
             self.folder.write(&self.weights_file(), &bytes)?;
-            let made = Made {
+            let made = Provenance {
                 policy: &self.recipe.policy,
                 seed: self.seed,
                 updates: self.updates(),

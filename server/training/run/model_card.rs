@@ -5,7 +5,7 @@ use crate::evaluation::Row;
 use crate::scans::benchmark::SEED;
 
 /// How weights were made.
-pub(super) struct Made<'a> {
+pub(super) struct Provenance<'a> {
     pub policy: &'a str,
     pub seed: u64,
     /// Updates of the training.
@@ -17,7 +17,7 @@ pub(super) struct Made<'a> {
 }
 
 /// The card of weights, with their figures `row` on `count` validation scans.
-pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
+pub(super) fn validated(made: &Provenance<'_>, row: &Row, count: usize) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
 
     let input = match design(made.policy) {

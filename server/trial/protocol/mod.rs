@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_surgeons_read_may_not_name_a_policy() {
+    fn texts_for_surgeons_may_not_name_a_policy() {
         let said =
             error(&PAPER.replace("text = \"How does the focus feel now?\"", "text = \"Is MGM-hill-climber good?\""));
         assert!(said.contains("mgm-hill-climber") && said.contains("must not know"), "{said}");

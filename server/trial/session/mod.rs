@@ -23,7 +23,7 @@ use super::event::{Event, EventKind};
 use super::phase::Phase;
 use super::protocol::Protocol;
 use super::question::{AnswerValue, Question};
-use super::standing::{Given, counted};
+use super::standing::{GivenAnswer, counted};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
 
@@ -94,7 +94,7 @@ pub struct SessionState {
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Answered {
     /// All answers, in the order of their arrival.
-    given: Vec<Given>,
+    given: Vec<GivenAnswer>,
     /// The answer that counts.
     counts: Option<AnswerValue>,
 }
@@ -214,7 +214,7 @@ impl SessionState {
     }
 
     /// Adds an answer that has arrived. Of all answers to a question, the one given last counts.
-    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, given: Given) {
+    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, given: GivenAnswer) {
         let answered = self.answers.entry((segment, question.to_owned())).or_default();
         answered.given.push(given);
         answered.counts = counted(&answered.given);

@@ -79,9 +79,9 @@ impl Run {
 }
 
 /// An answer that arrives at once, in time.
-fn said(text: &str) -> Given {
+fn said(text: &str) -> GivenAnswer {
     let value = AnswerValue::Text(text.to_owned());
-    Given { device: None, sequence: None, at: Timestamp::UNIX_EPOCH, late: false, value }
+    GivenAnswer { device: None, sequence: None, at: Timestamp::UNIX_EPOCH, late: false, value }
 }
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -150,7 +150,7 @@ fn a_double_click_and_a_stale_tab_change_nothing() {
 }
 
 #[test]
-fn after_a_restart_the_surgeon_goes_on_where_the_session_was() {
+fn after_a_restart_the_surgeon_continues_where_the_session_was() {
     let mut run = Run::inspecting(true);
     run.wait(30 * SECOND);
     run.restart(29 * SECOND);

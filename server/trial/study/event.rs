@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 
-use super::signature::{Signature, Way};
+use super::signature::{Channel, Signature};
 use crate::ids::SessionId;
 
 /// Something that happened to a study.
@@ -11,7 +11,7 @@ pub struct StudyEvent {
     /// Number of the event in its study: from 1, without gaps.
     pub number: u32,
     /// How it was done: on a page, or with a command.
-    pub way: Way,
+    pub way: Channel,
     /// Person who did it, and the reason.
     pub signature: Signature,
     /// Time by the wall clock. The order of events is that of their numbers, whatever the clock did.

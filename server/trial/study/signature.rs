@@ -11,14 +11,14 @@ const LONGEST_PERSON: usize = 200;
 
 /// How something was done to a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Channel {
     /// On a page or through the HTTP interface, in this role.
     Role(Role),
     /// With a command.
     CommandLine,
 }
 
-impl Way {
+impl Channel {
     /// The way's name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {

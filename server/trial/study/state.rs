@@ -8,7 +8,7 @@ use super::definition::Definition;
 use super::event::{StudyEvent, StudyEventKind};
 use super::places::Enrolled;
 use super::refusal::StudyRefusal;
-use super::signature::{Signature, Way};
+use super::signature::{Channel, Signature};
 use super::stage::Stage;
 use crate::autofocus::PolicyName;
 use crate::ids::SessionId;
@@ -105,7 +105,7 @@ impl StudyState {
     pub fn check(
         &self,
         change: Change,
-        way: Way,
+        way: Channel,
         signature: &Signature,
         circumstances: StudyCircumstances<'_>,
     ) -> Result<(), StudyRefusal> {
@@ -206,10 +206,10 @@ impl StudyState {
 ///
 /// # Errors
 /// If `way` is a role other than the researcher.
-pub fn check_way(way: Way) -> Result<(), StudyRefusal> {
+pub fn check_way(way: Channel) -> Result<(), StudyRefusal> {
     match way {
-        Way::CommandLine | Way::Role(Role::Researcher) => Ok(()),
-        Way::Role(_) => Err(StudyRefusal::NotTheResearcher),
+        Channel::CommandLine | Channel::Role(Role::Researcher) => Ok(()),
+        Channel::Role(_) => Err(StudyRefusal::NotTheResearcher),
     }
 }
 

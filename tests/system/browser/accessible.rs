@@ -114,7 +114,7 @@ fn none(what: &str, found: &[String]) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_nobody_can_use_is_found() {
+async fn elements_that_nobody_can_use_are_found() {
     // A picture without words, a button beyond the side, a small link on another button, and text that is cut off.
     const SPOIL: &str = "const add = (tag, text, style, more = {}) => {
             const element = Object.assign(document.createElement(tag), { textContent: text, ...more });

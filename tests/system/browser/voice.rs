@@ -352,7 +352,7 @@ async fn a_tablet_that_loses_its_power_in_the_middle_of_a_word_has_all_but_the_l
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_microphone_that_is_refused_or_missing_is_said_in_a_sentence_and_typing_goes_on() {
+async fn a_refused_or_missing_microphone_is_reported_and_typing_still_works() {
     let driver = Driver::start();
     let device = ["--use-fake-device-for-media-stream".to_owned()];
     let theatre = Theatre::heard(&driver, Arc::new(tempfile::tempdir().unwrap()), &device).await;

@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grows_is_told() {
+    fn growth_is_reported() {
         let leak = course(|minute| 400_000 + minute * 1000, |_| 900);
         assert_eq!(judge(&leak, [sample(0, 0); 2]), ["memory grew by 7.1 % after the warm-up"]);
 

@@ -29,7 +29,7 @@ async fn status(server: &Server, path: &str, cookie: &str) -> u16 {
 }
 
 #[tokio::test]
-async fn whoever_signs_in_has_the_pages_of_the_role_until_it_is_ended() {
+async fn a_person_who_signs_in_has_the_pages_of_the_role_until_the_sign_in_ends() {
     let server = Server::start();
     server.add_account("lead", "lead", "Dr Lead");
     server.add_account("operator", "operator", "Nurse Op");

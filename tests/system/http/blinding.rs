@@ -142,7 +142,7 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 }
 
 #[tokio::test]
-async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart() {
+async fn during_a_session_the_operator_sees_nothing_that_distinguishes_policies() {
     let server = Server::start();
     let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "operator").await;

@@ -19,7 +19,7 @@ fn about<'a>(findings: &'a [Value], subject: &str) -> &'a Value {
 }
 
 #[tokio::test]
-async fn the_operator_is_told_of_the_machine_its_devices_and_the_tablet() {
+async fn the_operator_sees_the_checks_of_machine_devices_and_tablet() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
     let found = findings(&server).await;
     for subject in ["disk", "data folder", "database", "clock", "network", "camera", "lens", "calibration", "tablet"] {
@@ -49,7 +49,7 @@ async fn the_operator_is_told_of_the_machine_its_devices_and_the_tablet() {
 }
 
 #[tokio::test]
-async fn nobody_but_the_operator_is_told() {
+async fn only_the_operator_sees_the_checks() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
     for role in ["surgeon", "researcher"] {
         let answer = server.get_as(role, "/api/operator/checks").send().await.unwrap();

@@ -100,7 +100,7 @@ fn allow(path: &Path, mode: u32) {
 }
 
 #[tokio::test]
-async fn a_user_who_may_not_write_is_told_so_at_the_start_and_loses_nothing_in_mid_session() {
+async fn a_user_without_write_permission_learns_it_at_the_start_and_loses_nothing_in_mid_session() {
     let data = Arc::new(tempfile::tempdir().unwrap());
     let Some(start) = as_nobody(&command(data.path(), &LISTEN)) else { return };
     allow(data.path(), 0o755);

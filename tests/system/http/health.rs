@@ -50,7 +50,7 @@ async fn a_lens_that_is_unplugged_degrades_the_server_and_costs_no_restart() {
 }
 
 #[tokio::test]
-async fn a_locked_database_is_told_while_it_is_locked() {
+async fn a_locked_database_is_reported_while_it_is_locked() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
     let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db"));
     let mut other = file.connect().await.unwrap();
@@ -87,7 +87,7 @@ async fn a_database_that_takes_nothing_for_a_minute_is_a_failure() {
 }
 
 #[tokio::test]
-async fn a_small_or_full_disk_is_told() {
+async fn a_small_or_full_disk_is_reported() {
     let Some(disk) = SmallDisk::mount() else { return };
     let server = Server::on(Arc::clone(&disk.folder), &["--bind", "127.0.0.1:0", "--fps", "10"]);
     becomes(&server, StatusCode::OK, "degraded", &["disk-nearly-full"]).await;

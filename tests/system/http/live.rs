@@ -281,7 +281,7 @@ async fn nonsense_closes_the_connection_with_a_reason() {
 }
 
 #[tokio::test]
-async fn pages_are_told_when_the_server_ends() {
+async fn pages_learn_when_the_server_ends() {
     let mut server = Server::start();
     let mut page = Page::open(&server, "surgeon").await;
     page.frame().await;

@@ -142,7 +142,7 @@ async fn the_view_is_played_as_it_was_recorded() {
 }
 
 #[tokio::test]
-async fn a_recording_that_is_broken_or_gone_is_told_and_costs_the_timeline_nothing() {
+async fn a_broken_or_missing_recording_is_reported_and_the_timeline_still_works() {
     let server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = recorded(&server, "recorded").await;
     unblind(&server, &session).await;

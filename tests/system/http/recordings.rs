@@ -215,7 +215,7 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
 }
 
 #[tokio::test]
-async fn a_restart_in_mid_session_goes_on_in_a_second_recording() {
+async fn after_a_restart_in_mid_session_a_second_recording_continues() {
     let mut server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = begin(&server, "recorded").await;
     until(&server, |status| status["frames"].as_u64() >= Some(30)).await;
@@ -239,7 +239,7 @@ async fn a_restart_in_mid_session_goes_on_in_a_second_recording() {
 }
 
 #[tokio::test]
-async fn the_operator_may_stop_what_a_protocol_records_and_the_session_goes_on_without() {
+async fn the_operator_may_stop_a_protocols_recording_and_the_session_continues() {
     let server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = begin(&server, "recorded").await;
     until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
@@ -264,7 +264,7 @@ async fn the_operator_may_stop_what_a_protocol_records_and_the_session_goes_on_w
 }
 
 #[tokio::test]
-async fn near_the_disks_end_recording_stops_by_itself_and_the_trial_goes_on() {
+async fn on_a_nearly_full_disk_recording_stops_by_itself_and_the_trial_continues() {
     // Large enough that the twentieth that recording leaves free holds everything that the database writes until then.
     let Some(disk) = SmallDisk::of_megabytes(100) else { return };
     let server = start(Arc::clone(&disk.folder));

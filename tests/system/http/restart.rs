@@ -69,7 +69,7 @@ impl Stage {
 }
 
 #[tokio::test]
-async fn a_setting_goes_on_at_the_focal_power_that_was_last_commanded_in_it() {
+async fn a_setting_continues_at_the_focal_power_last_commanded_in_it() {
     let data = Arc::new(tempfile::tempdir().unwrap());
     let mut stage = Stage { server: Stage::start(data), session: Value::Null };
     stage.post("operator", "participants", json!({"code": "S-05"})).await;

@@ -85,7 +85,7 @@ async fn nothing_but_the_door_is_open_without_a_key() {
 }
 
 #[tokio::test]
-async fn who_comes_without_a_key_is_told_where_to_find_one() {
+async fn a_visitor_without_a_key_learns_where_to_find_one() {
     let server = Server::start();
     for (path, page_words) in [
         ("/", "the server prints all three when it starts"),
@@ -122,7 +122,7 @@ async fn each_role_opens_its_own_endpoints_and_no_others() {
 }
 
 #[tokio::test]
-async fn a_cookie_is_no_key_and_a_key_no_cookie() {
+async fn a_cookie_is_not_accepted_as_a_key_nor_a_key_as_a_cookie() {
     let server = open_server();
     let cookie = cookie(&server, "operator").await;
     let (_, token) = cookie.split_once('=').unwrap();

@@ -194,7 +194,7 @@ async fn what_the_layers_answer_and_what_the_server_refuses_is_described() {
         assert_eq!(schemas["Focus"]["oneOf"][either]["additionalProperties"], false);
     }
     for said in [0, 1] {
-        assert_eq!(schemas["Said"]["oneOf"][said]["properties"]["text"]["pattern"], "\\S");
+        assert_eq!(schemas["CommentContent"]["oneOf"][said]["properties"]["text"]["pattern"], "\\S");
     }
     assert_eq!(schemas["AnswerValue"]["oneOf"][0]["type"], "integer");
     assert_eq!(schemas["AnswerValue"]["oneOf"][1]["items"]["maximum"], 255);
@@ -216,7 +216,7 @@ async fn a_whole_number_may_be_written_with_a_point() {
 }
 
 #[tokio::test]
-async fn counters_are_told_to_prometheus_without_naming_a_policy() {
+async fn prometheus_gets_the_counters_without_a_policys_name() {
     let server = Server::start();
     let response = server.get_as("operator", "/metrics").send().await.unwrap();
     assert!(response.headers()[CONTENT_TYPE].to_str().unwrap().starts_with("application/openmetrics-text"));

@@ -25,7 +25,7 @@ async fn open_trust_page(browser: &Browser, server: &Server) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_device_that_does_not_trust_the_server_is_told_so_and_one_that_does_goes_on() {
+async fn a_device_that_does_not_trust_the_server_gets_the_steps_and_one_that_does_continues() {
     let server = Server::encrypted();
     let driver = Driver::start();
 

@@ -48,7 +48,7 @@ async fn one_session_is_unblinded_only_in_an_emergency_that_somebody_signs() {
 }
 
 #[tokio::test]
-async fn a_session_under_way_is_unblinded_in_an_emergency_and_goes_on() {
+async fn a_session_under_way_is_unblinded_in_an_emergency_and_continues() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = opened(folder.path()).await;
     let session = prepare(&trial, PARTICIPANT, "leeds").await.unwrap();

@@ -9,10 +9,10 @@ use parfocal::store::export::{ExportError, export};
 use parfocal::store::{Reader, StoreError};
 use parfocal::trial::action::Action;
 use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::remark::{NewComment, Origin, Said};
+use parfocal::trial::remark::{CommentContent, NewComment, Origin};
 use parfocal::trial::role::Role;
 use parfocal::trial::study::refusal::StudyRefusal;
-use parfocal::trial::study::signature::{Signature, Way};
+use parfocal::trial::study::signature::{Channel, Signature};
 use parfocal::trial::study::stage::Stage;
 use parfocal::trial::study::state::Change;
 use rand::SeedableRng;
@@ -68,7 +68,7 @@ async fn a_study_goes_from_plan_to_unblinding_and_each_step_is_an_event_with_a_r
 }
 
 #[tokio::test]
-async fn what_does_not_fit_where_the_study_stands_is_refused_and_changes_nothing() {
+async fn changes_that_the_studys_stage_does_not_allow_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let trial = a_trial(folder.path()).await;
     assert!(
@@ -174,7 +174,7 @@ async fn sessions_take_the_places_of_their_site_in_turn_and_a_used_up_list_refus
 }
 
 #[tokio::test]
-async fn what_the_study_does_not_have_is_named() {
+async fn missing_parts_of_a_study_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let trial = opened(folder.path()).await;
     let ask = async |study: &str, site: &str, protocol: &str| {
@@ -224,7 +224,7 @@ async fn a_study_is_not_locked_over_a_session_or_over_words_that_may_still_come(
     trial.conductor.comment(late).await.unwrap();
     let comments = trial.store.reader().comments(session).await.unwrap();
     let (_, last) = comments.last().unwrap();
-    assert_eq!(last.said, Said::Text("said after the lock".to_owned()));
+    assert_eq!(last.said, CommentContent::Text("said after the lock".to_owned()));
     assert!(last.late);
     assert!(!comments[0].1.late);
 }
@@ -251,7 +251,7 @@ async fn a_session_of_a_study_takes_words_after_its_end_like_any_other() {
         frame: None,
         run: None,
         origin: Origin::default(),
-        said: Said::Text("one more thing".to_owned()),
+        said: CommentContent::Text("one more thing".to_owned()),
     };
     trial.conductor.comment(comment).await.unwrap();
     let comments = trial.store.reader().comments(session).await.unwrap();
@@ -289,7 +289,7 @@ async fn a_command_changes_studies_while_no_server_runs() {
     let studies = Studies::open(folder.path(), &library, clock).await.unwrap();
     let mut random = ChaCha12Rng::seed_from_u64(1);
     for change in [Change::Close, LOCK] {
-        studies.change(Way::CommandLine, STUDY, change, signed("no server"), None, &mut random).await.unwrap();
+        studies.change(Channel::CommandLine, STUDY, change, signed("no server"), None, &mut random).await.unwrap();
     }
     let study = studies.detail(STUDY).await.unwrap();
     assert_eq!((study.line.stage, study.log[3].by), (Stage::Locked, "command-line"));
@@ -328,7 +328,7 @@ async fn sessions_of_an_earlier_version_are_outside_any_study() {
 }
 
 #[tokio::test]
-async fn an_open_study_of_the_version_before_accounts_goes_on_with_its_orders_and_sessions() {
+async fn an_open_study_of_the_version_before_accounts_keeps_its_orders_and_sessions() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
     let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 5).await;

@@ -69,7 +69,7 @@ fn every_field_wrong_in_turn_is_named() {
 }
 
 #[test]
-fn a_missing_hash_is_told_so_that_it_can_be_written() {
+fn a_missing_hash_is_printed_so_that_it_can_be_written() {
     let hash = hex::encode(protocol().sha256());
     let said = said(&format!("sha256 = \"{hash}\"\n"), "");
     assert!(said.contains("key 'sha256': is missing") && said.contains(&hash), "{said}");

@@ -13,7 +13,7 @@ use crate::trial::protocol::Protocol;
 
 /// `allocation.json` of an unblinded export.
 #[derive(Deserialize)]
-struct Told {
+struct AllocationFile {
     session: SessionId,
     algorithm: Algorithm,
     seed: Option<String>,
@@ -27,7 +27,7 @@ fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, Strin
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
     }
 
-    let told = Told::deserialize(&*export.json("allocation.json")?);
+    let told = AllocationFile::deserialize(&*export.json("allocation.json")?);
     let told = told.map_err(|error| format!("allocation.json: {error}"))?;
 
     for column in ["session", "setting", "segment"] {

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
-use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
+use crate::store::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
 use crate::store::chain::{
     Block, Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, netstring,
 };
@@ -47,7 +47,7 @@ pub(super) fn chain(export: &ExportFiles, format: u64, expected: Option<&Head>) 
 }
 
 /// Checks that the chain ends where the export says, with the record of the export itself.
-fn ends_with_itself(export: &ExportFiles, last: Option<Found>, head: &Head) -> Result<(), String> {
+fn ends_with_itself(export: &ExportFiles, last: Option<FoundEntry>, head: &Head) -> Result<(), String> {
     let package = export.json("datapackage.json")?;
     let told = &package["parfocal"]["chain"];
     let same = told["number"].as_i64() == Some(head.number) && told["hash"].as_str() == Some(head.hash.as_str());
@@ -59,7 +59,7 @@ fn ends_with_itself(export: &ExportFiles, last: Option<Found>, head: &Head) -> R
     let has = |row: &Cells, column: &str, value: &str| row.get(column).is_some_and(|cell| cell == value);
     let is_export = |key: &str| exports.iter().any(|row| has(row, "number", key) && has(row, "kind", "exported"));
     match last {
-        Some(Found::Whole(entry, _)) if entry.kind == "access" && is_export(&entry.key) => Ok(()),
+        Some(FoundEntry::Whole(entry, _)) if entry.kind == "access" && is_export(&entry.key) => Ok(()),
         _ => Err("chain: its last row is not that of an export: what came after it was cut off".to_owned()),
     }
 }
@@ -96,7 +96,7 @@ impl ChainColumns {
         let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] =
             cells;
         if kind.is_empty() {
-            let entry = Found::Hash(hashed.to_owned());
+            let entry = FoundEntry::Hash(hashed.to_owned());
             return Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() });
         }
 
@@ -120,7 +120,7 @@ impl ChainColumns {
 
         let told = Some(sealed_salt).filter(|salt| !salt.is_empty()).map(str::to_owned);
         let sealed_salt = told.or_else(|| salts.get(number).cloned());
-        let entry = Found::Whole(entry, sealed_salt);
+        let entry = FoundEntry::Whole(entry, sealed_salt);
         Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() })
     }
 }

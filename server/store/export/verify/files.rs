@@ -17,14 +17,14 @@ use crate::store::export::table::{FORMAT, Row};
 const LONG: [&str; 3] = [ChainRow::TABLE.name, TelemetryRow::TABLE.name, PolicyStepRow::TABLE.name];
 
 /// The results of reading files, by file name, kept for all checks.
-type Kept<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
+type ReadCache<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
 
 /// The files of an export. Its JSON files and its short tables are read once each, when they are first asked for,
 /// because a dozen checks look at the same ones.
 pub struct ExportFiles {
     folder: PathBuf,
-    documents: Kept<Value>,
-    tables: Kept<Rows>,
+    documents: ReadCache<Value>,
+    tables: ReadCache<Rows>,
 }
 
 /// A table that is read once and kept.
@@ -37,7 +37,7 @@ impl ExportFiles {
     /// The files of the export in `folder`. Nothing is read yet.
     #[must_use]
     pub fn of(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), documents: Kept::default(), tables: Kept::default() }
+        Self { folder: folder.to_owned(), documents: ReadCache::default(), tables: ReadCache::default() }
     }
 
     /// The folder of the export.
@@ -142,7 +142,7 @@ impl ExportFiles {
 }
 
 /// The result for `file` from `kept`. If it has none yet, calls `read` and keeps the result.
-fn once<T>(kept: &Kept<T>, file: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
+fn once<T>(kept: &ReadCache<T>, file: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
     if let Some(known) = kept.borrow().get(file) {
         return known.clone();
     }
