@@ -73,11 +73,11 @@ const LIMITS: [(&str, &str, Limit); 10] = [
     ("Focus/oneOf/1", "additionalProperties", Limit::None),
     ("Focus/oneOf/0/properties/focal_power", "minimum", Limit::Number(0)),
     ("Focus/oneOf/0/properties/focal_power", "maximum", Limit::Number(1)),
-    ("Said/oneOf/0/properties/text", "pattern", Limit::Text(NOT_BLANK)),
-    ("Said/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
+    ("CommentContent/oneOf/0/properties/text", "pattern", Limit::Text(NOT_BLANK)),
+    ("CommentContent/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
     // The last two kinds have no text. Words that are sent with them by mistake must be refused, not lost.
-    ("Said/oneOf/2/properties", "text", Limit::None),
-    ("Said/oneOf/3/properties", "text", Limit::None),
+    ("CommentContent/oneOf/2/properties", "text", Limit::None),
+    ("CommentContent/oneOf/3/properties", "text", Limit::None),
     ("AnswerValue/oneOf/0", "maximum", Limit::Number(u8::MAX)),
     ("AnswerValue/oneOf/1/items", "maximum", Limit::Number(u8::MAX)),
 ];
