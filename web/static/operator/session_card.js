@@ -154,8 +154,8 @@ export class SessionCard {
     askReason({
       heading: "The participant withdraws",
       consequence:
-        "From now on this session’s data are not shown, analysed or exported. The record keeps that it was withdrawn. " +
-        "This cannot be undone.",
+        "From now on this session’s data are not shown, analysed or exported. " +
+        "The record keeps that it was withdrawn. This cannot be undone.",
       go: "Withdraw session",
       danger: true,
       done: (reason) => this.#send(session, { action: "withdraw", reason }),

@@ -70,7 +70,9 @@ export function correctParticipant(session, old, participants) {
   const others = participants.filter((code) => code !== old);
   ask({
     heading: "Correct the participant",
-    consequence: `The session keeps the recorded code ${old}. The correct code is shown beside it, here and in exports.`,
+    consequence:
+      `The session keeps the recorded code ${old}. ` +
+      "The correct code is shown beside it, here and in exports.",
     which: { label: "Right participant", options: others.map((code) => ({ value: code, text: code })) },
     done: ({ which, reason }) => record(session, { field: "participant", old, new: which, reason }),
   });
@@ -89,7 +91,8 @@ export async function correctAnswer(session) {
   ask({
     heading: "Correct an answer",
     consequence:
-      "The surgeon’s answer stays as it was given. The correct one is shown beside it, and scores use the correct one.",
+      "The surgeon’s answer stays as it was given. " +
+      "The correct one is shown beside it, and scores use the correct one.",
     which: {
       label: "Answer",
       options: answers.map((answer) => ({ value: answer.key, text: answerName(answer) })),
@@ -140,7 +143,8 @@ export function askTranscript(session, comment) {
   ask({
     heading: old ? "Change what was typed out" : "Type out what was said",
     consequence:
-      "The recording stays as it is. What you type is shown beside it, here and in exports, with who typed it and when.",
+      "The recording stays as it is. " +
+      "What you type is shown beside it, here and in exports, with who typed it and when.",
     text: { label: "What was said", value: old, hint: "" },
     reason: old ? "" : "Typed out from the recording",
     player: voicePlayer(session, comment) ?? undefined,
@@ -160,7 +164,8 @@ export function askErasure(session, subject, key) {
     heading: "Erase these words",
     consequence:
       "The words are permanently deleted from the database, with every note on them. Earlier backups and exports " +
-      "still hold them. The record stays, and says that its words were erased, by whom and why. Do not repeat the words here.",
+      "still hold them. The record stays, and says that its words were erased, by whom and why. " +
+      "Do not repeat the words here.",
     go: "Erase permanently",
     danger: true,
     done: (reason) => erase(session, { subject, record: key, reason }),
@@ -177,7 +182,8 @@ export function askErasureOfAll(session) {
     heading: "Erase all words of this session",
     consequence:
       "All comments with their sound, all answers in words and all notes are permanently deleted from the database. " +
-      "Earlier backups and exports still hold them. The records stay, and say that their words were erased, by whom and why.",
+      "Earlier backups and exports still hold them. " +
+      "The records stay, and say that their words were erased, by whom and why.",
     go: "Erase all permanently",
     danger: true,
     done: async (reason) => {
@@ -198,8 +204,8 @@ export function askErasureOfReason(session, number) {
     heading: "Erase this reason",
     consequence:
       "The reason is permanently deleted from the database, also where the study’s audit trail repeats it. Earlier " +
-      "backups and exports still hold it. The event stays, and the audit trail says that its words were erased, by whom and " +
-      "why. Do not repeat the words here.",
+      "backups and exports still hold it. The event stays, and the audit trail says that its words were erased, " +
+      "by whom and why. Do not repeat the words here.",
     go: "Erase permanently",
     danger: true,
     done: (reason) => erase(session, { subject: "event", record: number, reason }),
@@ -226,8 +232,8 @@ export function askWithdrawal(session) {
   askReason({
     heading: "The participant withdraws",
     consequence:
-      "From now on this session’s data are not shown, analysed or exported. That it was withdrawn remains on record. " +
-      "This cannot be undone. Afterwards its words can be erased as well.",
+      "From now on this session’s data are not shown, analysed or exported. " +
+      "The record keeps that it was withdrawn. This cannot be undone. Afterwards its words can be erased as well.",
     go: "Withdraw session",
     danger: true,
     done: async (reason) => {
