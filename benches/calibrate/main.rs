@@ -4,15 +4,16 @@
 
 use std::sync::Arc;
 
-use parfocal::autofocus::networks::compute_on_this_thread;
-use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::evaluation::{Outcome, evaluate};
-use parfocal::imaging::GrayImage;
-use parfocal::scans::benchmark::{Benchmark, Conditions, FRAMES};
-use parfocal::scans::clip::Clip;
-use parfocal::scans::pictures::{Split, sharp_phantom};
-use parfocal::scans::simulated::{ScanSettings, Scene};
-use parfocal::simulation::texture::vary_contrast;
+use parfocal_autofocus::Registry;
+use parfocal_autofocus::networks::compute_on_this_thread;
+use parfocal_base::PolicyName;
+use parfocal_devices::simulation::texture::vary_contrast;
+use parfocal_imaging::GrayImage;
+use parfocal_learning::evaluation::{Outcome, evaluate};
+use parfocal_learning::scans::benchmark::{Benchmark, Conditions, FRAMES};
+use parfocal_learning::scans::clip::Clip;
+use parfocal_learning::scans::pictures::{Split, sharp_phantom};
+use parfocal_learning::scans::simulated::{ScanSettings, Scene};
 
 const COUNT: usize = 200;
 /// The paper's simulated column: policy and mean absolute error.

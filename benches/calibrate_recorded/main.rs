@@ -5,11 +5,12 @@
 
 use std::sync::Arc;
 
-use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::evaluation::{Outcome, evaluate};
-use parfocal::scans::benchmark::SEED;
-use parfocal::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
-use parfocal::simulation::phantom::{Haste, Trajectory};
+use parfocal_autofocus::Registry;
+use parfocal_base::PolicyName;
+use parfocal_devices::simulation::phantom::{Haste, Trajectory};
+use parfocal_learning::evaluation::{Outcome, evaluate};
+use parfocal_learning::scans::benchmark::SEED;
+use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
 
 /// The paper's robotic column: policy and mean absolute error.
 const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];

@@ -9,12 +9,13 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use parfocal::camera::gige::GigeCamera;
-use parfocal::camera::{Camera, CameraError, CameraHealth, CameraSettings, Frame};
-use parfocal::clock::{Clock, Moment, SystemClock};
-use parfocal::control::LatencyFigures;
-use parfocal::lens::emulator::{Emulator, Model};
-use parfocal::lens::{self, FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment, SystemClock};
+use parfocal_devices::camera::gige::GigeCamera;
+use parfocal_devices::camera::{Camera, CameraError, CameraHealth, CameraSettings, Frame};
+use parfocal_devices::lens::emulator::{Emulator, Model};
+use parfocal_devices::lens::{self, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
+use parfocal_pipeline::control::LatencyFigures;
 
 use crate::fake_camera::{FakeCamera, NAME};
 use crate::watch_loop;

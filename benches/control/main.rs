@@ -13,14 +13,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use parfocal::autofocus::{Observation, PolicyName, Registry, mgm, mlr};
-use parfocal::camera::{self, Camera, CameraSettings, Frame, FrameImage};
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::control::{
-    Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, StepRecord, Stepper,
+use parfocal_autofocus::{Observation, Registry, mgm, mlr};
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::step::StepRecord;
+use parfocal_devices::camera::{self, Camera, CameraSettings, Frame, FrameImage};
+use parfocal_devices::lens::{Lens, SimulatedLens};
+use parfocal_imaging::{GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER};
+use parfocal_pipeline::control::{
+    Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper,
 };
-use parfocal::imaging::{GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER};
-use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 
 fn texture(index: usize) -> usize {
     (index * index * 37 + index * 11) % 256

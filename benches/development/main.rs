@@ -6,7 +6,7 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use parfocal::imaging::{
+use parfocal_imaging::{
     Calibration, Developed, Developer, GrayImage, JpegEncoder, MosaicFrame, Reference, RgbImage, Size,
 };
 use rustix::time::{ClockId, clock_gettime};

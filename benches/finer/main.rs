@@ -5,9 +5,9 @@
 
 use std::path::Path;
 
-use parfocal::autofocus::mgm;
-use parfocal::imaging::{GrayImage, PATCH_SIDE, Patch, in_blocks};
-use parfocal::scans::stack::FocalStack;
+use parfocal_autofocus::mgm;
+use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch, in_blocks};
+use parfocal_learning::scans::stack::FocalStack;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

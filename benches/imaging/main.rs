@@ -6,10 +6,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use parfocal::imaging::{
+use parfocal_devices::simulation::blur::gaussian_blur;
+use parfocal_imaging::{
     Calibration, GrayImage, JpegEncoder, MosaicFrame, PatchArea, Reconstructor, Reference, RgbImage, content_area,
 };
-use parfocal::simulation::blur::gaussian_blur;
 
 const WIDTH: usize = 2048;
 const HEIGHT: usize = 1088;

@@ -7,10 +7,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use parfocal::camera::{self, CameraSettings};
-use parfocal::clock::{ManualClock, Moment};
-use parfocal::lens::{FocalPower, Optics};
-use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH, Scene};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{ManualClock, Moment};
+use parfocal_devices::camera::{self, CameraSettings};
+use parfocal_devices::lens::Optics;
+use parfocal_devices::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH, Scene};
 
 /// A lens that never moves.
 struct Still;

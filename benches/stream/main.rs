@@ -13,8 +13,8 @@ mod viewer;
 use std::collections::HashMap;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::recording::Recording;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_recording::Recording;
 use process::{Busy, Server, Usage};
 use sqlx::{Connection, SqliteConnection};
 use viewer::Seen;

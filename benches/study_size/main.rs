@@ -13,11 +13,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use parfocal::analysis::analyse;
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::store::export::verify::Verdict;
-use parfocal::study_export::{Progress, export_study};
-use parfocal::trial::role::Role;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_records::store::export::verify::Verdict;
+use parfocal_results::analysis::analyse;
+use parfocal_results::study_export::{Progress, export_study};
+use parfocal_trial::role::Role;
 
 use measuring::{Measured, measured};
 use study::STUDY;
@@ -95,7 +95,7 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
 
     // Only one session is verified, as `parfocal verify` does: all of them take as long as the export.
     let session = out.join("sessions").join(made.sessions[0].to_string());
-    let checks = parfocal::store::export::verify::verify(&session, None);
+    let checks = parfocal_records::store::export::verify::verify(&session, None);
     assert!(checks.iter().all(|check| !matches!(check.verdict, Verdict::Failed(_))), "{checks:?}");
     std::fs::remove_dir_all(&out).expect("it was just written");
 }

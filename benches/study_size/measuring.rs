@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
+use parfocal_base::clock::{Clock, SystemClock};
 
 /// Result and cost of a piece of work.
 pub struct Measured<T> {

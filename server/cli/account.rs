@@ -10,11 +10,11 @@ use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr
 
 use super::output::{Failure, print};
 use super::wait::wait_for;
-use crate::accounts::{Accounts, Cost, Passphrase};
-use crate::clock::SystemClock;
-use crate::notices::tell;
-use crate::store::StoreError;
-use crate::trial::account::{AccountChange, AccountName, AccountRole};
+use parfocal_base::clock::SystemClock;
+use parfocal_base::notices::tell;
+use parfocal_records::accounts::{Accounts, Cost, Passphrase};
+use parfocal_records::store::StoreError;
+use parfocal_trial::account::{AccountChange, AccountName, AccountRole};
 
 /// Arguments of `parfocal account`.
 #[derive(Debug, Args)]

@@ -6,12 +6,12 @@ use std::fmt::Write;
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
-use crate::control::ControlStatus;
-use crate::http::Reach;
-use crate::http::error::role_name;
-use crate::http::keys::{Keys, ROLES};
-use crate::imaging::Calibration;
-use crate::trial::role::Role;
+use parfocal_dashboard::http::Reach;
+use parfocal_dashboard::http::error::role_name;
+use parfocal_dashboard::http::keys::{Keys, ROLES};
+use parfocal_imaging::Calibration;
+use parfocal_pipeline::control::ControlStatus;
+use parfocal_trial::role::Role;
 
 /// The announcement of a server that is reachable at `reach`. On a `terminal` the QR code has colours.
 pub fn announcement(

@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::output::{Failure, print};
 use super::wait::wait_for;
-use crate::clock::SystemClock;
-use crate::store::backup;
+use parfocal_base::clock::SystemClock;
+use parfocal_records::store::backup;
 
 /// Arguments of `parfocal backup`.
 #[derive(Debug, Args)]

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::output::{Failure, print};
-use crate::camera::calibration::{self, tables};
-use crate::camera::{self, CameraSettings, FrameImage};
-use crate::clock::{Clock, SystemClock};
-use crate::imaging::{Average, Calibration, Reference};
-use crate::lens::{Lens, SimulatedLens};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::camera::calibration::{self, tables};
+use parfocal_devices::camera::{self, CameraSettings, FrameImage};
+use parfocal_devices::lens::{Lens, SimulatedLens};
+use parfocal_imaging::{Average, Calibration, Reference};
 
 /// Frames skipped before the first that counts, so that settings take effect and automatic controls settle.
 const WARM_UP: u32 = 10;

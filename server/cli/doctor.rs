@@ -8,12 +8,12 @@ use jiff::tz::TimeZone;
 
 use super::output::{Failure, print};
 use super::wait::wait_for;
-use crate::camera::calibration::read;
-use crate::clock::{Clock, SystemClock};
-use crate::doctor::{Finding, Verdict, calibration, database, lens, machine, unreadable_calibration};
-use crate::imaging::SENSOR_SIZE;
-use crate::lens::open;
-use crate::store::database_state;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_dashboard::doctor::{Finding, Verdict, calibration, database, lens, machine, unreadable_calibration};
+use parfocal_devices::camera::calibration::read;
+use parfocal_devices::lens::open;
+use parfocal_imaging::SENSOR_SIZE;
+use parfocal_records::store::database_state;
 
 /// Arguments of `parfocal doctor`.
 #[derive(Debug, clap::Args)]

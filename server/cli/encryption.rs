@@ -7,8 +7,8 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::output::Failure;
-use crate::clock::Clock;
-use crate::tls::{Certificates, keep_current};
+use parfocal_base::clock::Clock;
+use parfocal_dashboard::tls::{Certificates, keep_current};
 
 /// How connections are encrypted.
 #[derive(Debug, Args)]

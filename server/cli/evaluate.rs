@@ -9,23 +9,24 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{Failure, bar, print};
-use crate::autofocus::networks::compute_on_this_thread;
-use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
-use crate::camera::recorded::ScanFolder;
-use crate::evaluation::evaluate;
-use crate::evaluation::report::Subject;
-use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::evaluation::stacks::{BlurKnowledge, FIRST_SEED, SEEDS, evaluate_stacks};
-use crate::files::replace;
-use crate::notices::tell;
-use crate::scans::ScanSet;
-use crate::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
-use crate::scans::detail::{warning, without_detail};
-use crate::scans::footage;
-use crate::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
-use crate::scans::simulated::Scene;
-use crate::scans::stack::source::StackSource;
-use crate::simulation::phantom::Trajectory;
+use parfocal_autofocus::networks::compute_on_this_thread;
+use parfocal_autofocus::{Registry, scripted, shipped};
+use parfocal_base::files::replace;
+use parfocal_base::notices::tell;
+use parfocal_base::{BlurRate, PolicyName};
+use parfocal_devices::camera::recorded::ScanFolder;
+use parfocal_devices::simulation::phantom::Trajectory;
+use parfocal_learning::evaluation::evaluate;
+use parfocal_learning::evaluation::report::Subject;
+use parfocal_learning::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
+use parfocal_learning::evaluation::stacks::{BlurKnowledge, FIRST_SEED, SEEDS, evaluate_stacks};
+use parfocal_learning::scans::ScanSet;
+use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
+use parfocal_learning::scans::detail::{warning, without_detail};
+use parfocal_learning::scans::footage;
+use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
+use parfocal_learning::scans::simulated::Scene;
+use parfocal_learning::scans::stack::source::StackSource;
 
 /// What to evaluate, and on what.
 #[derive(Debug, clap::Args)]

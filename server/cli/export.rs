@@ -7,12 +7,12 @@ use clap::Args;
 
 use super::output::{Failure, Steps, print};
 use super::wait::wait_for;
-use crate::clock::SystemClock;
-use crate::ids::SessionId;
-use crate::package::{self, LeftOut, Sessions, Source, Summary};
-use crate::store::Recorder;
-use crate::store::export::export;
-use crate::study_export::{Progress, export_study};
+use parfocal_base::clock::SystemClock;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::Recorder;
+use parfocal_records::store::export::export;
+use parfocal_results::package::{self, LeftOut, Sessions, Source, Summary};
+use parfocal_results::study_export::{Progress, export_study};
 
 /// Arguments of `parfocal export`.
 #[derive(Debug, Args)]

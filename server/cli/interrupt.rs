@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use tokio::signal::unix::{SignalKind, signal};
 
-use crate::lens;
-use crate::notices::tell;
+use parfocal_base::notices::tell;
+use parfocal_devices::lens;
 
 /// Releases every lens, then ends the process as `signal` does by default. (A normal exit would destroy libtorch while
 /// another thread computes with it.)

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::output::Failure;
-use crate::autofocus::Registry;
-use crate::conductor::Library;
+use parfocal_autofocus::Registry;
+use parfocal_session::conductor::Library;
 
 /// The shipped protocols and those of `folder`; without `folder`, those of `trial-protocols` if it exists.
 pub fn protocols(folder: Option<&Path>, registry: &Registry) -> Result<Library, Failure> {

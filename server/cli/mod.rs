@@ -28,8 +28,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::notices::tell;
 use output::Failure;
+use parfocal_base::notices::tell;
 
 /// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
 #[derive(Debug, Parser)]
@@ -82,7 +82,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = run(arguments.command);
     // A thread that hangs may still hold a lens.
-    crate::lens::let_go_of_all();
+    parfocal_devices::lens::let_go_of_all();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::notices;
+use parfocal_base::notices;
 
 /// A command's failure: one clear sentence that says what to do.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;

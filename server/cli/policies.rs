@@ -1,7 +1,7 @@
 //! `parfocal policies`: lists the registry.
 
 use super::output::{Failure, print};
-use crate::autofocus::{PolicyEntry, Registry};
+use parfocal_autofocus::{PolicyEntry, Registry};
 
 /// Arguments of `parfocal policies`.
 #[derive(Debug, clap::Args)]

@@ -15,13 +15,13 @@ use super::library::protocols;
 use super::output::{Failure, print};
 use super::study_analysis;
 use super::wait::wait_for;
-use crate::autofocus::Registry;
-use crate::clock::SystemClock;
-use crate::conductor::{Studies, StudyDetail};
-use crate::package::{self, Source};
-use crate::store::{Reader, StoreError, StoredStudy};
-use crate::trial::study::signature::{Channel, Signature};
-use crate::trial::study::state::Change;
+use parfocal_autofocus::Registry;
+use parfocal_base::clock::SystemClock;
+use parfocal_records::store::{Reader, StoreError, StoredStudy};
+use parfocal_results::package::{self, Source};
+use parfocal_session::conductor::{Studies, StudyDetail};
+use parfocal_trial::study::signature::{Channel, Signature};
+use parfocal_trial::study::state::Change;
 
 /// Arguments of `parfocal study`.
 #[derive(Debug, Args)]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::output::{Failure, print};
-use crate::analysis::{Analysis, Comparison, ProtocolAnalysis, analyse, decimals};
-use crate::store::Reader;
+use parfocal_records::store::Reader;
+use parfocal_results::analysis::{Analysis, Comparison, ProtocolAnalysis, analyse, decimals};
 
 /// Arguments of `parfocal study analyse`.
 #[derive(Debug, Args)]

@@ -7,14 +7,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
 use super::output::{Failure, print};
-use crate::autofocus::networks::compute_on_this_thread;
-use crate::clock::SystemClock;
-use crate::notices::tell;
-use crate::training::recipe::LEG;
-use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
-use crate::training::run::comparison::{TrainedRun, markdown};
-use crate::training::run::resume::ResumeRequest;
-use crate::training::run::{Progress, Run, Sources};
+use parfocal_autofocus::networks::compute_on_this_thread;
+use parfocal_base::clock::SystemClock;
+use parfocal_base::notices::tell;
+use parfocal_learning::training::recipe::LEG;
+use parfocal_learning::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
+use parfocal_learning::training::run::comparison::{TrainedRun, markdown};
+use parfocal_learning::training::run::resume::ResumeRequest;
+use parfocal_learning::training::run::{Progress, Run, Sources};
 
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -7,9 +7,9 @@ use clap::Args;
 
 use super::output::{Failure, print};
 use super::wait::wait_for;
-use crate::package::{check, is_package};
-use crate::store::export::verify::{Check, Verdict, is_export, verify};
-use crate::store::{Head, verify_database};
+use parfocal_records::store::export::verify::{Check, Verdict, is_export, verify};
+use parfocal_records::store::{Head, verify_database};
+use parfocal_results::package::{check, is_package};
 
 /// Arguments of `parfocal verify`.
 #[derive(Debug, Args)]

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use parfocal::autofocus::mgm;
-use parfocal::camera::{self, Camera, CameraError, CameraSettings, Frame, FrameImage};
-use parfocal::clock::{Clock, Moment};
-use parfocal::imaging::{GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbImage, content_area, rgb_patch};
-use parfocal::lens::{FocalPower, Optics};
-use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal_autofocus::mgm;
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment};
+use parfocal_devices::camera::{self, Camera, CameraError, CameraSettings, Frame, FrameImage};
+use parfocal_devices::lens::Optics;
+use parfocal_devices::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal_imaging::{GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbImage, content_area, rgb_patch};
 
 /// A clock that stands still until a test sets it, so that frames take no time.
 #[derive(Default)]

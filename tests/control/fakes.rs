@@ -5,13 +5,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName, Registry};
-use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
-use parfocal::clock::{Clock, Moment};
-use parfocal::control::{Command, Drive};
-use parfocal::ids::SegmentId;
-use parfocal::imaging::RgbImage;
-use parfocal::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use parfocal_autofocus::{Decision, FieldOfView, Observation, Policy, Registry};
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::ids::SegmentId;
+use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
+use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use parfocal_imaging::RgbImage;
+use parfocal_pipeline::control::{Command, Drive};
 use rustix::thread::{Pid, gettid};
 
 pub fn power(value: f64) -> FocalPower {

@@ -4,13 +4,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::camera::{Frame, FrameImage, Truth};
-use parfocal::clock::{Clock, ManualClock};
-use parfocal::control::{Command, Drive, Eye, Stepper};
-use parfocal::imaging::{MosaicFrame, Reconstructor};
-use parfocal::lens::{FocalPower, Lens, SimulatedLens};
-use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal_autofocus::Registry;
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::{Clock, ManualClock};
+use parfocal_devices::camera::{Frame, FrameImage, Truth};
+use parfocal_devices::lens::{Lens, SimulatedLens};
+use parfocal_devices::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal_imaging::{MosaicFrame, Reconstructor};
+use parfocal_pipeline::control::{Command, Drive, Eye, Stepper};
 
 /// A frame every 40 ms, exposed for 10 ms. The lens comes to rest before the next exposure.
 const EXPOSURE: Duration = Duration::from_millis(10);

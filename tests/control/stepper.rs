@@ -4,12 +4,14 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName, Registry};
-use parfocal::clock::{Clock, ManualClock};
-use parfocal::control::{Command, Drive, Eye, Hold, StepRecord, Stepper};
-use parfocal::ids::SegmentId;
-use parfocal::imaging::{ContentArea, Reconstructor};
-use parfocal::lens::{LensDynamics, LensError};
+use parfocal_autofocus::{Decision, FieldOfView, Observation, Policy, Registry};
+use parfocal_base::PolicyName;
+use parfocal_base::clock::{Clock, ManualClock};
+use parfocal_base::ids::SegmentId;
+use parfocal_base::step::{Hold, StepRecord};
+use parfocal_devices::lens::{LensDynamics, LensError};
+use parfocal_imaging::{ContentArea, Reconstructor};
+use parfocal_pipeline::control::{Command, Drive, Eye, Stepper};
 use proptest::prelude::*;
 use uuid::Uuid;
 

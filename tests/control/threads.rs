@@ -5,11 +5,12 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::control::{
-    Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Hold, Rig, Settings, StepRecord,
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::step::{Hold, StepRecord};
+use parfocal_imaging::Reconstructor;
+use parfocal_pipeline::control::{
+    Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Rig, Settings,
 };
-use parfocal::imaging::Reconstructor;
 use rustix::thread::Pid;
 use tokio::sync::mpsc;
 

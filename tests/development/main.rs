@@ -5,7 +5,7 @@ mod measures;
 mod scenes;
 
 use measures::{amplitude_kept, ciede2000, lab, psnr, quantile};
-use parfocal::imaging::{
+use parfocal_imaging::{
     BANDS, CELL, Calibration, Developer, GrayImage, MosaicFrame, Reconstructor, Reference, RgbImage, Size,
 };
 use scenes::{SIDE, Scene};

@@ -1,7 +1,7 @@
 //! Multispectral scenes with every band known at every place, and the mosaics that a sensor would take of them.
 
-use parfocal::imaging::{BANDS, CELL, Calibration, MosaicFrame};
-use parfocal::simulation::phantom::Scene as Brain;
+use parfocal_devices::simulation::phantom::Scene as Brain;
+use parfocal_imaging::{BANDS, CELL, Calibration, MosaicFrame};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

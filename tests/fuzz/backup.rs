@@ -4,9 +4,9 @@
 use std::fs;
 use std::time::Duration;
 
-use parfocal::store::verify_database;
-use parfocal::trial::action::Action;
-use parfocal::trial::role::Role;
+use parfocal_records::store::verify_database;
+use parfocal_trial::action::Action;
+use parfocal_trial::role::Role;
 use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
 use tokio::time::timeout;

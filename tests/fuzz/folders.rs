@@ -9,17 +9,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::camera::calibration::tables;
-use parfocal::clock::Moment;
-use parfocal::http::keys::Keys;
-use parfocal::imaging::{Calibration, MosaicFrame};
-use parfocal::lens::FocalPower;
-use parfocal::recording::{
+use parfocal_base::FocalPower;
+use parfocal_base::clock::Moment;
+use parfocal_dashboard::http::keys::Keys;
+use parfocal_dashboard::tls::Certificates;
+use parfocal_devices::camera::calibration::tables;
+use parfocal_imaging::{Calibration, MosaicFrame};
+use parfocal_recording::{
     Ended, FORMAT, Header, Recorder, Recording, Shot, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewRecording,
     ViewWriter, Writer, of_session,
 };
-use parfocal::store::export::verify::verify;
-use parfocal::tls::Certificates;
+use parfocal_records::store::export::verify::verify;
 use tempfile::TempDir;
 
 use super::ROOT;

@@ -5,15 +5,15 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use parfocal::autofocus::weights;
-use parfocal::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
-use parfocal::evaluation::shard::{Shard, merge};
-use parfocal::imaging::{GrayImage, PatchArea};
-use parfocal::lens::FocalPower;
-use parfocal::scans::recorded::{RecordedScan, evenly_spread};
-use parfocal::scans::recording::{self, Imported};
-use parfocal::scans::stack::{FocalStack, check};
-use parfocal::training::run::checkpoint::{self, Checkpoint};
+use parfocal_autofocus::weights;
+use parfocal_base::FocalPower;
+use parfocal_devices::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
+use parfocal_imaging::{GrayImage, PatchArea};
+use parfocal_learning::evaluation::shard::{Shard, merge};
+use parfocal_learning::scans::recorded::{RecordedScan, evenly_spread};
+use parfocal_learning::scans::recording::{self, Imported};
+use parfocal_learning::scans::stack::{FocalStack, check};
+use parfocal_learning::training::run::checkpoint::{self, Checkpoint};
 use tch::{Device, nn};
 
 use super::folders::Folder;

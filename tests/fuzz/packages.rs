@@ -7,17 +7,17 @@ use std::fs;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use parfocal::conductor::StudySite;
-use parfocal::package::{Sessions, Source, check, exports_of, left_out, write};
-use parfocal::study_export::export_study;
-use parfocal::trial::account::AccountRole;
-use parfocal::trial::action::Action;
-use parfocal::trial::protocol::Protocol;
-use parfocal::trial::remark::CommentContent;
-use parfocal::trial::role::Role;
-use parfocal::trial::study::signature::Signature;
-use parfocal::trial::study::state::Change;
-use parfocal::trial::voice::{Ending, NewPiece};
+use parfocal_results::package::{Sessions, Source, check, exports_of, left_out, write};
+use parfocal_results::study_export::export_study;
+use parfocal_session::conductor::StudySite;
+use parfocal_trial::account::AccountRole;
+use parfocal_trial::action::Action;
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::remark::CommentContent;
+use parfocal_trial::role::Role;
+use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::state::Change;
+use parfocal_trial::voice::{Ending, NewPiece};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 use tokio::runtime::Builder;
@@ -91,7 +91,7 @@ pub fn packages() -> Vec<Vec<u8>> {
 }
 
 /// Joins the package in `folder`, as `study merge` does.
-fn joined(folder: &Path) -> Result<(), parfocal::package::PackageError> {
+fn joined(folder: &Path) -> Result<(), parfocal_results::package::PackageError> {
     let left_out = left_out(folder)?;
     let sources = exports_of(folder)?.iter().map(|export| Source::open(export)).collect::<Result<Vec<_>, _>>()?;
     let out = tempfile::tempdir().unwrap();

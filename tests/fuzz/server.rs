@@ -8,20 +8,20 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::{Arc, Once};
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::health::HealthWatch;
-use parfocal::http::keys::Keys;
-use parfocal::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
-use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal::imaging::{Calibration, Developer, Size};
-use parfocal::live;
-use parfocal::playback::Player;
-use parfocal::recorder::{Parts, Recordings};
-use parfocal::study_export::StudyExports;
-use parfocal::tls::Certificates;
-use parfocal::trial::account::AccountRole;
-use parfocal::trial::action::Action;
-use parfocal::trial::remark::CommentContent;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_dashboard::health::HealthWatch;
+use parfocal_dashboard::http::keys::Keys;
+use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
+use parfocal_dashboard::tls::Certificates;
+use parfocal_imaging::{Calibration, Developer, Size};
+use parfocal_pipeline::live;
+use parfocal_results::study_export::StudyExports;
+use parfocal_session::playback::Player;
+use parfocal_session::recorder::{Parts, Recordings};
+use parfocal_trial::account::AccountRole;
+use parfocal_trial::action::Action;
+use parfocal_trial::remark::CommentContent;
 use tempfile::TempDir;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
@@ -448,7 +448,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,
-        registry: parfocal::autofocus::Registry::standard(),
+        registry: parfocal_autofocus::Registry::standard(),
         keys: Keys::load_or_create(folder.path()).unwrap(),
         reach,
         equipment: Equipment::new(None, calibration, None),

@@ -5,21 +5,22 @@ use std::path::Path;
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::camera::footage::next_pnm;
-use parfocal::imaging::{
+use parfocal_autofocus::Registry;
+use parfocal_base::PolicyName;
+use parfocal_base::options::Options;
+use parfocal_devices::camera::footage::next_pnm;
+use parfocal_devices::lens::MeasuredDynamics;
+use parfocal_devices::lens::optotune::codec::{Request, error_reply};
+use parfocal_imaging::{
     Calibration, GrayImage, MosaicFrame, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode, decode_raw,
 };
-use parfocal::lens::MeasuredDynamics;
-use parfocal::lens::optotune::codec::{Request, error_reply};
-use parfocal::options::Options;
-use parfocal::training::recipe::Recipe;
-use parfocal::trial::action::{Action, Focus};
-use parfocal::trial::consent::NewConsent;
-use parfocal::trial::correction::NewCorrection;
-use parfocal::trial::protocol::Protocol;
-use parfocal::trial::remark::{Holding, NewAnswer, NewComment};
-use parfocal::trial::study::definition::Definition;
+use parfocal_learning::training::recipe::Recipe;
+use parfocal_trial::action::{Action, Focus};
+use parfocal_trial::consent::NewConsent;
+use parfocal_trial::correction::NewCorrection;
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
+use parfocal_trial::study::definition::Definition;
 
 use super::{ROOT, backup, folders, lessons, packages, server};
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// The floor of each room: rows of the table whose header begins with `floor`, rooms in backticks.
+/// The floor of each crate: rows of the table whose header begins with `floor`, crates in backticks.
 pub fn floors(root: &Path) -> BTreeMap<String, u32> {
     let text = fs::read_to_string(root.join("ARCHITECTURE.md")).expect("ARCHITECTURE.md is there");
     let rows = text.lines().skip_while(|line| !line.starts_with("| floor |")).skip(2);
@@ -13,9 +13,8 @@ pub fn floors(root: &Path) -> BTreeMap<String, u32> {
     for row in rows.take_while(|line| line.starts_with('|')) {
         let mut cells = row.split('|').skip(1).map(str::trim);
         let floor = cells.next().and_then(|cell| cell.parse().ok()).expect("each row begins with its floor");
-        let rooms = cells.next().expect("each row names its rooms");
-        for room in rooms.split('`').skip(1).step_by(2) {
-            let name = room.trim_end_matches('/').trim_end_matches(".rs");
+        let crates = cells.next().expect("each row names its crates");
+        for name in crates.split('`').skip(1).step_by(2) {
             assert!(floors.insert(name.to_owned(), floor).is_none(), "{name} stands on two floors");
         }
     }

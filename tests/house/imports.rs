@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use syn::visit::{self, Visit};
 use syn::{Attribute, ItemMod, ItemUse, UseTree, Visibility};
 
-/// A module or item by its full path, without `crate`.
+/// A module or item by its full path, from the name of its crate on.
 type Name = Vec<String>;
 
 /// One file's use of another; both by their path below server/.
@@ -19,19 +19,18 @@ pub struct Import {
     pub from: String,
     /// The file that defines the item.
     pub to: String,
-    /// The item that is used, as a path from the crate's root.
+    /// The item that is used, by its full path.
     pub item: String,
+    /// The module right below the crate's root in which the using file is; empty for the root itself.
+    pub from_room: String,
+    /// The same for the file that defines the item.
+    pub to_room: String,
 }
 
 impl Import {
-    /// The room of the file that uses the item.
-    pub fn user_room(&self) -> &str {
-        room(&self.from)
-    }
-
-    /// The room of the file that defines the item.
-    pub fn used_room(&self) -> &str {
-        room(&self.to)
+    /// Whether both files are in one crate.
+    pub fn is_within_a_crate(&self) -> bool {
+        folder(&self.from) == folder(&self.to)
     }
 }
 
@@ -41,15 +40,16 @@ impl fmt::Display for Import {
     }
 }
 
-fn room(file: &str) -> &str {
-    file.split('/').next().unwrap_or(file).trim_end_matches(".rs")
+/// The folder below server/ in which a file is: its crate.
+fn folder(file: &str) -> &str {
+    file.split('/').next().unwrap_or(file)
 }
 
-/// Names of all rooms: folders and files of server/, except `lib.rs` and `main.rs`.
-pub fn rooms(root: &Path) -> BTreeSet<String> {
+/// Names of all crates: the folders of server/.
+pub fn crates(root: &Path) -> BTreeSet<String> {
     let entries = fs::read_dir(root.join("server")).expect("server/ is there");
-    let names = entries.map(|entry| entry.expect("server/ can be read").file_name().to_string_lossy().into_owned());
-    names.filter(|name| name != "lib.rs" && name != "main.rs").map(|name| room(&name).to_owned()).collect()
+    let folders = entries.map(|entry| entry.expect("server/ can be read")).filter(|entry| entry.path().is_dir());
+    folders.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
 }
 
 /// All files of server/ and how they use one another.
@@ -82,7 +82,8 @@ impl SourceTree {
                 let Some(to) = house.file_of(item) else { continue };
                 let from = files[module].clone();
                 if *to != from {
-                    imports.insert(Import { from, to: to.clone(), item: item.join("::") });
+                    let (from_room, to_room) = (room(module), room(&module_of(to)));
+                    imports.insert(Import { from, to: to.clone(), item: item.join("::"), from_room, to_room });
                 }
             }
         }
@@ -99,7 +100,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
         if path.is_dir() {
             found.extend(sources(&path));
         } else if path.extension().is_some_and(|extension| extension == "rs")
-            && !["lib.rs", "main.rs", "tests.rs"].contains(&&*name)
+            && !["build.rs", "main.rs", "tests.rs"].contains(&&*name)
         {
             found.push(path);
         }
@@ -108,13 +109,24 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The module that a file below server/ holds.
+/// The module that a file below server/ holds: `devices/src/lens/mod.rs` holds `parfocal_devices::lens`. What lies in
+/// no crate's `src` belongs to the program.
 fn module_of(file: &str) -> Name {
-    let mut parts: Name = file.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
-    if parts.last().is_some_and(|last| last == "mod") {
+    let path = file.trim_end_matches(".rs");
+    let mut parts: Name = match path.split_once("/src/") {
+        Some((name, below)) => {
+            [format!("parfocal_{name}")].into_iter().chain(below.split('/').map(str::to_owned)).collect()
+        }
+        None => ["parfocal"].into_iter().chain(path.split('/')).map(str::to_owned).collect(),
+    };
+    if parts.last().is_some_and(|last| last == "mod" || last == "lib") {
         parts.pop();
     }
     parts
+}
+
+fn room(module: &Name) -> String {
+    module.get(1).cloned().unwrap_or_default()
 }
 
 /// What one file brings into its scope and uses.
@@ -130,7 +142,7 @@ impl Paths {
         Self { module, brought_in: BTreeMap::new(), used: BTreeSet::new() }
     }
 
-    /// The path `parts` from the crate's root; `None` if it begins outside the crate.
+    /// The full path of `parts`; `None` if it is empty or goes above the crate.
     fn absolute(&self, parts: &[String]) -> Option<Name> {
         let supers = parts.iter().take_while(|part| *part == "super").count();
         if supers > 0 {
@@ -139,7 +151,8 @@ impl Paths {
         }
 
         match parts.first().map(String::as_str) {
-            Some("crate") => Some(parts[1..].to_vec()),
+            Some("crate") => Some([&self.module[..1], &parts[1..]].concat()),
+            Some(name) if name.starts_with("parfocal_") => Some(parts.to_vec()),
             Some("self") => Some([&self.module[..], &parts[1..]].concat()),
             // A path that begins with one of the module's own children; anything else belongs to no file and is dropped
             // later.

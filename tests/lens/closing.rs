@@ -6,9 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use parfocal::clock::{Clock, Moment, SystemClock};
-use parfocal::lens::emulator::{Emulator, Fault, Glitch, Model, Order};
-use parfocal::lens::{self, FocalPower};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment, SystemClock};
+use parfocal_devices::lens;
+use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, Model, Order};
 use rustix::process::{Pid, Signal, kill_process};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{Connection, SqliteConnection};

@@ -4,8 +4,8 @@ use std::io::{BufRead, BufReader, Lines, Write};
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::Arc;
 
-use parfocal::clock::SystemClock;
-use parfocal::lens;
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens;
 
 use super::{emulator, last_command, quick, until};
 

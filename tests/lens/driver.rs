@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::lens::emulator::Model;
-use parfocal::lens::{FocalPower, LensInfo, Optics};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::lens::emulator::Model;
+use parfocal_devices::lens::{LensInfo, Optics};
 
 use super::{emulator, last_command, open, power, quick, refused, until};
 

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
-use parfocal::clock::{Clock, ManualClock, Moment, SystemClock};
-use parfocal::control::Eye;
-use parfocal::imaging::{Reconstructor, RgbImage};
-use parfocal::lens::emulator::Model;
-use parfocal::lens::{FocalPower, Lens, LensDynamics, Optics, SimulatedLens};
-use parfocal::lens_measurement::{Measurement, MeasurementError, Plan, View, measure};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, ManualClock, Moment, SystemClock};
+use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
+use parfocal_devices::lens::emulator::Model;
+use parfocal_devices::lens::{Lens, LensDynamics, Optics, SimulatedLens};
+use parfocal_imaging::{Reconstructor, RgbImage};
+use parfocal_pipeline::control::Eye;
+use parfocal_pipeline::lens_measurement::{Measurement, MeasurementError, Plan, View, measure};
 
 use super::{emulator, open};
 

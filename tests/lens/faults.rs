@@ -4,8 +4,9 @@ use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::process::Command;
 
-use parfocal::lens::emulator::{Fault, Model};
-use parfocal::lens::{FocalPower, LensError};
+use parfocal_base::FocalPower;
+use parfocal_devices::lens::LensError;
+use parfocal_devices::lens::emulator::{Fault, Model};
 
 use super::{emulator, last_command, open, power, quick, refused, until};
 

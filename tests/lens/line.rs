@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use parfocal::lens::emulator::{Fault, Glitch};
+use parfocal_devices::lens::emulator::{Fault, Glitch};
 
 use super::{emulator, last_command, open, power, quick, until};
 

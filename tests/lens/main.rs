@@ -11,9 +11,10 @@ mod line;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::lens::emulator::{Emulator, Model};
-use parfocal::lens::{self, FocalPower, Lens, LensError};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::lens::emulator::{Emulator, Model};
+use parfocal_devices::lens::{self, Lens, LensError};
 
 fn emulator(model: Model) -> Emulator {
     Emulator::start(model, Arc::new(SystemClock)).unwrap()

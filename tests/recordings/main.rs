@@ -11,11 +11,12 @@ use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::camera::{self, CameraSettings, FrameImage};
-use parfocal::clock::{Clock, Moment, SystemClock};
-use parfocal::imaging::{Calibration, MosaicFrame};
-use parfocal::lens::{FocalPower, Lens, SimulatedLens};
-use parfocal::recording::{CALIBRATION, FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment, SystemClock};
+use parfocal_devices::camera::{self, CameraSettings, FrameImage};
+use parfocal_devices::lens::{Lens, SimulatedLens};
+use parfocal_imaging::{Calibration, MosaicFrame};
+use parfocal_recording::{CALIBRATION, FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
 use serde_json::Value;
 use tempfile::TempDir;
 

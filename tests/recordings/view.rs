@@ -3,7 +3,7 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 
-use parfocal::recording::{Ended, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewRecording, ViewWriter};
+use parfocal_recording::{Ended, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewRecording, ViewWriter};
 
 use super::*;
 

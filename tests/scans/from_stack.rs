@@ -1,8 +1,8 @@
 //! A focal stack is made into a scan. Pictures that are not a stack are refused. Policies can be evaluated on the scan.
 
-use parfocal::imaging::GrayImage;
-use parfocal::simulation::blur::gaussian_blur;
-use parfocal::simulation::texture::texture;
+use parfocal_devices::simulation::blur::gaussian_blur;
+use parfocal_devices::simulation::texture::texture;
+use parfocal_imaging::GrayImage;
 
 use super::*;
 

@@ -13,13 +13,14 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::camera::recorded::{POSES, ScanFolder};
-use parfocal::camera::{self, CameraSettings, FrameImage};
-use parfocal::clock::{Clock, Moment, SystemClock};
-use parfocal::lens::emulator::{Emulator, Model};
-use parfocal::lens::{FocalPower, Optics};
-use parfocal::scans::recorded::{HASTE, RecordedScan};
-use parfocal::simulation::phantom::Trajectory;
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment, SystemClock};
+use parfocal_devices::camera::recorded::{POSES, ScanFolder};
+use parfocal_devices::camera::{self, CameraSettings, FrameImage};
+use parfocal_devices::lens::Optics;
+use parfocal_devices::lens::emulator::{Emulator, Model};
+use parfocal_devices::simulation::phantom::Trajectory;
+use parfocal_learning::scans::recorded::{HASTE, RecordedScan};
 use serde_json::Value;
 use tempfile::TempDir;
 

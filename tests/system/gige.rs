@@ -5,11 +5,11 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::camera::gige::GigeCamera;
-use parfocal::camera::{Camera, CameraError, CameraSettings, Controls, Frame, FrameImage, Setting};
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::lens::Lens;
-use parfocal::lens::SimulatedLens;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::camera::gige::GigeCamera;
+use parfocal_devices::camera::{Camera, CameraError, CameraSettings, Controls, Frame, FrameImage, Setting};
+use parfocal_devices::lens::Lens;
+use parfocal_devices::lens::SimulatedLens;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

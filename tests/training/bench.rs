@@ -1,7 +1,7 @@
 //! Training on the recordings of a bench: which are accepted, kept for validation, or rejected.
 
-use parfocal::simulation::blur::gaussian_blur;
-use parfocal::simulation::texture::texture;
+use parfocal_devices::simulation::blur::gaussian_blur;
+use parfocal_devices::simulation::texture::texture;
 
 use super::*;
 

@@ -10,18 +10,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 
-use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::clock::SystemClock;
-use parfocal::evaluation::evaluate;
-use parfocal::imaging::GrayImage;
-use parfocal::scans::benchmark::{Benchmark, Conditions, FRAMES};
-use parfocal::scans::clip::Clip;
-use parfocal::scans::simulated::Scene;
-use parfocal::training::recipe::LEG;
-use parfocal::training::recipe::{Recipe, shipped};
-use parfocal::training::run::checkpoint::Checkpoint;
-use parfocal::training::run::resume::ResumeRequest;
-use parfocal::training::run::{Run, Sources};
+use parfocal_autofocus::Registry;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::SystemClock;
+use parfocal_imaging::GrayImage;
+use parfocal_learning::evaluation::evaluate;
+use parfocal_learning::scans::benchmark::{Benchmark, Conditions, FRAMES};
+use parfocal_learning::scans::clip::Clip;
+use parfocal_learning::scans::simulated::Scene;
+use parfocal_learning::training::recipe::LEG;
+use parfocal_learning::training::recipe::{Recipe, shipped};
+use parfocal_learning::training::run::checkpoint::Checkpoint;
+use parfocal_learning::training::run::resume::ResumeRequest;
+use parfocal_learning::training::run::{Run, Sources};
 
 /// The recipe that ships as `policy`, made small, with `updates` updates.
 fn small(policy: &str, updates: u64) -> Recipe {

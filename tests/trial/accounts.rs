@@ -3,13 +3,13 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
 
-use parfocal::accounts::{AccountError, Cost, Passphrase, Token};
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::store::verify_database;
-use parfocal::trial::account::{AccountChange, AccountName, AccountRole, Actor};
-use parfocal::trial::action::Action;
-use parfocal::trial::role::Role;
+use parfocal_records::accounts::{AccountError, Cost, Passphrase, Token};
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_records::store::verify_database;
+use parfocal_trial::account::{AccountChange, AccountName, AccountRole, Actor};
+use parfocal_trial::action::Action;
+use parfocal_trial::role::Role;
 
 use crate::chain::{after, said};
 use crate::exports::{failed, rows};
@@ -136,7 +136,7 @@ async fn whatever_is_wrong_has_the_same_words_and_is_recorded_without_them() {
 async fn the_production_parameters_hash_and_a_hash_keeps_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;
-    let costly = parfocal::accounts::Accounts::of_server(&trial.store, trial.clock.clone(), Cost::default());
+    let costly = parfocal_records::accounts::Accounts::of_server(&trial.store, trial.clock.clone(), Cost::default());
     let passphrase = Passphrase::new(PASSPHRASE).unwrap();
     costly.add(name("lead"), "Dr Lead", AccountRole::Lead, passphrase, None).await.unwrap();
     trial.accounts().sign_in("lead", PASSPHRASE, None, PEER).await.unwrap();
@@ -147,7 +147,7 @@ async fn the_production_parameters_hash_and_a_hash_keeps_its_own() {
 }
 
 /// Makes a session with an operator and a researcher who are signed in.
-async fn a_session(trial: &mut Trial) -> parfocal::ids::SessionId {
+async fn a_session(trial: &mut Trial) -> parfocal_base::ids::SessionId {
     let operator = trial.account("operator", AccountRole::Operator, "Nurse Op").await;
     let researcher = trial.account("researcher", AccountRole::Researcher, "Dr Search").await;
     let operator = Actor { role: Role::Operator, account: Some(operator.account) };
@@ -159,7 +159,7 @@ async fn a_session(trial: &mut Trial) -> parfocal::ids::SessionId {
     // An abort stops the lens first, and is recorded after that.
     let abort = Action::Abort { reason: "the light failed".to_owned() };
     trial.conductor.act(operator, session, abort).await.unwrap();
-    trial.conductor.recorder(researcher).record(&parfocal::store::Access::PathViewed(session)).await.unwrap();
+    trial.conductor.recorder(researcher).record(&parfocal_records::store::Access::PathViewed(session)).await.unwrap();
     session
 }
 

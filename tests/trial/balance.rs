@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use parfocal::ids::SessionId;
-use parfocal::store::NewSession;
-use parfocal::trial::action::Action;
-use parfocal::trial::role::Role;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::NewSession;
+use parfocal_trial::action::Action;
+use parfocal_trial::role::Role;
 
 use crate::fixture::Trial;
 

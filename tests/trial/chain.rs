@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use parfocal::clock::Clock;
-use parfocal::doctor::DatabaseState;
-use parfocal::ids::SessionId;
-use parfocal::store::backup::{BackupError, Relation, backup, restore};
-use parfocal::store::export::export;
-use parfocal::store::export::verify::{Check, Verdict, verify};
-use parfocal::store::{
+use parfocal_base::clock::Clock;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::DatabaseState;
+use parfocal_records::store::backup::{BackupError, Relation, backup, restore};
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::{Check, Verdict, verify};
+use parfocal_records::store::{
     Access, DeviceEvent, Head, MIGRATOR, Reader, Store, StoreError, database_state, verify_database,
 };
-use parfocal::trial::role::Role;
+use parfocal_trial::role::Role;
 use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 

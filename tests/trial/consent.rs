@@ -1,15 +1,15 @@
 //! Consent before a session, and withdrawal after it.
 
 use jiff::civil::date;
-use parfocal::conductor::ConductError;
-use parfocal::store::export::verify::verify;
-use parfocal::store::export::{ExportError, export};
-use parfocal::store::verify_database;
-use parfocal::trial::action::Action;
-use parfocal::trial::consent::{Consent, NewConsent};
-use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::phase::Phase;
-use parfocal::trial::role::Role;
+use parfocal_records::store::export::verify::verify;
+use parfocal_records::store::export::{ExportError, export};
+use parfocal_records::store::verify_database;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::consent::{Consent, NewConsent};
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::phase::Phase;
+use parfocal_trial::role::Role;
 
 use crate::exports::{failed, rows, with_session};
 use crate::fixture::{PARTICIPANT, Trial};

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use parfocal::conductor::ConductError;
-use parfocal::ids::{IdempotencyKey, SessionId};
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::store::verify_database;
-use parfocal::trial::action::Action;
-use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::question::AnswerValue;
-use parfocal::trial::role::Role;
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_records::store::verify_database;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::role::Role;
 
 use crate::exports::{failed, rows, with_session};
 use crate::fixture::{PARTICIPANT, Trial};

@@ -2,19 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use parfocal::conductor::ConductError;
-use parfocal::ids::{IdempotencyKey, SessionId};
-use parfocal::store::backup::backup;
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::store::{Reader, StoreError, verify_database};
-use parfocal::trial::action::Action;
-use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::erasure::{Erasable, NewErasure};
-use parfocal::trial::question::AnswerValue;
-use parfocal::trial::remark::NewComment;
-use parfocal::trial::role::Role;
-use parfocal::trial::study::signature::Signature;
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_records::store::backup::backup;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_records::store::{Reader, StoreError, verify_database};
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::erasure::{Erasable, NewErasure};
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::NewComment;
+use parfocal_trial::role::Role;
+use parfocal_trial::study::signature::Signature;
 
 use crate::exports::{failed, rows};
 use crate::fixture::{PARTICIPANT, Trial};

@@ -6,14 +6,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use futures_util::TryStreamExt;
-use parfocal::clock::Clock;
-use parfocal::control::{Hold, StepRecord};
-use parfocal::ids::SessionId;
-use parfocal::store::export::verify::{Check, Verdict, verify};
-use parfocal::store::export::{Export, ExportError, ZipStream, export};
-use parfocal::store::{DeviceEvent, Reader, Recorder, telemetry};
-use parfocal::trial::action::Action;
-use parfocal::trial::role::Role;
+use parfocal_base::clock::Clock;
+use parfocal_base::ids::SessionId;
+use parfocal_base::step::{Hold, StepRecord};
+use parfocal_records::store::export::verify::{Check, Verdict, verify};
+use parfocal_records::store::export::{Export, ExportError, ZipStream, export};
+use parfocal_records::store::{DeviceEvent, Reader, Recorder, telemetry};
+use parfocal_trial::action::Action;
+use parfocal_trial::role::Role;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 

@@ -4,22 +4,24 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::accounts::{Accounts, Cost, Passphrase};
-use parfocal::autofocus::{BlurRate, PolicyName, Registry};
-use parfocal::camera::{CameraHealth, CameraOffer};
-use parfocal::clock::{Clock, ManualClock};
-use parfocal::conductor::{ConductError, Conductor, Library, Parts};
-use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot, Tap};
-use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal::lens::{FocalPower, LensHealth};
-use parfocal::store::{Recorder, Run, Store};
-use parfocal::trial::account::{Account, AccountName, AccountRole};
-use parfocal::trial::action::Action;
-use parfocal::trial::phase::Phase;
-use parfocal::trial::question::{AnswerValue, QuestionKind};
-use parfocal::trial::remark::{CommentContent, NewAnswer, NewComment, Origin};
-use parfocal::trial::role::Role;
-use parfocal::trial::view::{OperatorView, SurgeonView};
+use parfocal_autofocus::Registry;
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, ManualClock};
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_base::{BlurRate, PolicyName};
+use parfocal_devices::camera::{CameraHealth, CameraOffer};
+use parfocal_devices::lens::LensHealth;
+use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, Tap};
+use parfocal_records::accounts::{Accounts, Cost, Passphrase};
+use parfocal_records::store::{Recorder, Run, Store};
+use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
+use parfocal_trial::account::{Account, AccountName, AccountRole};
+use parfocal_trial::action::Action;
+use parfocal_trial::phase::Phase;
+use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::remark::{CommentContent, NewAnswer, NewComment, Origin};
+use parfocal_trial::role::Role;
+use parfocal_trial::view::{OperatorView, SurgeonView};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{mpsc, watch};
@@ -234,7 +236,7 @@ impl Trial {
 /// A fake control loop that only receives commands.
 fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
     let status = ControlStatus {
-        at: parfocal::clock::Moment::default(),
+        at: parfocal_base::clock::Moment::default(),
         camera: CameraHealth {
             name: "none".into(),
             simulated: true,
@@ -262,7 +264,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         telemetry_dropped: 0,
         latency_p50_micros: 0,
         latency_p99_micros: 0,
-        priority: parfocal::priority::Standing::Ordinary,
+        priority: parfocal_base::priority::Standing::Ordinary,
     };
 
     let (commands, received) = mpsc::unbounded_channel();

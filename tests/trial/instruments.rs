@@ -6,15 +6,15 @@ use std::path::Path;
 use std::time::Duration;
 
 use jiff::civil::date;
-use parfocal::conductor::ConductError;
-use parfocal::ids::SessionId;
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::trial::action::Action;
-use parfocal::trial::consent::{Consent, Medium, NewConsent};
-use parfocal::trial::protocol::Protocol;
-use parfocal::trial::question::AnswerValue;
-use parfocal::trial::role::Role;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::consent::{Consent, Medium, NewConsent};
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::role::Role;
 
 use crate::exports::{failed, rows};
 use crate::fixture::{PARTICIPANT, Trial, known};

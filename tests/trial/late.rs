@@ -3,16 +3,16 @@
 use std::path::Path;
 use std::time::Duration;
 
-use parfocal::conductor::ConductError;
-use parfocal::ids::{DeviceId, SessionId};
-use parfocal::store::MIGRATOR;
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::trial::action::Action;
-use parfocal::trial::phase::Phase;
-use parfocal::trial::question::AnswerValue;
-use parfocal::trial::remark::{Holding, NewAnswer, Origin, WaitClock};
-use parfocal::trial::role::Role;
+use parfocal_base::ids::{DeviceId, SessionId};
+use parfocal_records::store::MIGRATOR;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::phase::Phase;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::{Holding, NewAnswer, Origin, WaitClock};
+use parfocal_trial::role::Role;
 use uuid::Uuid;
 
 use crate::exports::{failed, rows};

@@ -1,11 +1,11 @@
 //! Who may move the lens outside sessions, and when.
 
-use parfocal::autofocus::PolicyName;
-use parfocal::conductor::ConductError;
-use parfocal::control::{Command, Drive};
-use parfocal::lens::FocalPower;
-use parfocal::trial::action::{Action, Focus};
-use parfocal::trial::role::Role;
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_pipeline::control::{Command, Drive};
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::{Action, Focus};
+use parfocal_trial::role::Role;
 
 use crate::fixture::Trial;
 

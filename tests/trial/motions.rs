@@ -1,8 +1,8 @@
 //! The figures that are computed from the telemetry of each setting, compared with values computed by hand.
 
-use parfocal::store::Motion;
-use parfocal::trial::action::Action;
-use parfocal::trial::role::Role;
+use parfocal_records::store::Motion;
+use parfocal_trial::action::Action;
+use parfocal_trial::role::Role;
 use sqlx::SqlitePool;
 
 use crate::fixture::Trial;

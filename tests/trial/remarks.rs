@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use parfocal::conductor::ConductError;
-use parfocal::trial::action::Action;
-use parfocal::trial::phase::Phase;
-use parfocal::trial::question::{AnswerValue, QuestionKind};
-use parfocal::trial::remark::{CommentContent, NewAnswer, Origin};
-use parfocal::trial::role::Role;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::phase::Phase;
+use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::remark::{CommentContent, NewAnswer, Origin};
+use parfocal_trial::role::Role;
 
 use crate::fixture::Trial;
 

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 use std::task::{Context, Waker};
 use std::time::Duration;
 
-use parfocal::autofocus::PolicyName;
-use parfocal::conductor::ConductError;
-use parfocal::control::{Command, Drive};
-use parfocal::lens::FocalPower;
-use parfocal::trial::action::Action;
-use parfocal::trial::phase::{Phase, SessionStatus};
-use parfocal::trial::role::Role;
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_pipeline::control::{Command, Drive};
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::phase::{Phase, SessionStatus};
+use parfocal_trial::role::Role;
 
 use crate::fixture::{PARTICIPANT, Trial};
 
@@ -195,7 +195,8 @@ async fn practice_never_mixes_with_real_sessions() {
     let mut trial = Trial::start(folder.path()).await;
     let practice = trial.whole_session("practice").await;
     let real = trial.whole_session("paper").await;
-    let listed = |lines: Vec<parfocal::store::SessionLine>| lines.iter().map(|line| line.session).collect::<Vec<_>>();
+    let listed =
+        |lines: Vec<parfocal_records::store::SessionLine>| lines.iter().map(|line| line.session).collect::<Vec<_>>();
     assert_eq!(listed(trial.conductor.sessions(false).await.unwrap()), [real]);
     assert_eq!(listed(trial.conductor.sessions(true).await.unwrap()), [real, practice]);
     assert_eq!(trial.conductor.participants().await.unwrap()[0].sessions, 1);
@@ -269,7 +270,7 @@ async fn a_stop_that_the_disk_does_not_take_is_done_all_the_same_and_recorded_on
     assert!(trial.view().unrecorded && trial.view().phase == Phase::Questions);
     assert!(trial.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
     // Only stops are reported as done before they are on disk.
-    let answer = trial.answer("sharpness", parfocal::trial::question::AnswerValue::Point(4)).await;
+    let answer = trial.answer("sharpness", parfocal_trial::question::AnswerValue::Point(4)).await;
     assert!(matches!(answer, Err(ConductError::Storage(_))), "{answer:?}");
     let finish = Action::FinishQuestions { segment: Some(segment) };
     assert!(matches!(trial.conductor.act(Role::Surgeon, session, finish).await, Err(ConductError::Storage(_))));

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use parfocal::autofocus::PolicyName;
-use parfocal::clock::Moment;
-use parfocal::conductor::ConductError;
-use parfocal::control::{Hold, StepRecord};
-use parfocal::ids::SegmentId;
-use parfocal::lens::FocalPower;
-use parfocal::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
-use parfocal::trial::action::Action;
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::SegmentId;
+use parfocal_base::step::{Hold, StepRecord};
+use parfocal_records::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::fixture::{Trial, a_clock, a_run};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use parfocal::store::export::export;
-use parfocal::store::export::verify::{Verdict, verify};
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::{Verdict, verify};
 use sha2::{Digest, Sha256};
 
 use crate::exports::{failed, json, with_session};

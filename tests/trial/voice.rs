@@ -4,18 +4,18 @@
 use std::path::Path;
 use std::time::Duration;
 
-use parfocal::clock::Clock;
-use parfocal::conductor::ConductError;
-use parfocal::ids::{IdempotencyKey, SessionId};
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::store::verify_database;
-use parfocal::trial::action::Action;
-use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::erasure::{Erasable, NewErasure};
-use parfocal::trial::remark::CommentContent;
-use parfocal::trial::role::Role;
-use parfocal::trial::voice::{Ending, LARGEST_PIECE, LARGEST_RECORDING, NewPiece};
+use parfocal_base::clock::Clock;
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_records::store::verify_database;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::erasure::{Erasable, NewErasure};
+use parfocal_trial::remark::CommentContent;
+use parfocal_trial::role::Role;
+use parfocal_trial::voice::{Ending, LARGEST_PIECE, LARGEST_RECORDING, NewPiece};
 use sha2::{Digest, Sha256};
 
 use crate::chain::{after, recomputed, said};

@@ -10,14 +10,14 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use super::output::{Failure, print};
-use crate::autofocus::{mgm, mlr};
-use crate::camera::calibration;
-use crate::files::replace;
-use crate::imaging::{
+use parfocal_autofocus::{mgm, mlr};
+use parfocal_base::files::replace;
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{
     Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode,
     decode_raw,
 };
-use crate::notices::tell;
 use report::{Kind, Report};
 
 /// Arguments of `parfocal inspect`.

@@ -1,7 +1,7 @@
 //! The picture that `parfocal inspect --out` writes: content area, patch and metrics drawn in.
 
 use super::report::Report;
-use crate::imaging::{ContentArea, GrayImage, PatchArea, RgbImage};
+use parfocal_imaging::{ContentArea, GrayImage, PatchArea, RgbImage};
 
 const AREA_COLOUR: [u8; 3] = [0, 220, 255];
 const PATCH_COLOUR: [u8; 3] = [255, 220, 0];

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::imaging::{ContentArea, PatchArea};
+use parfocal_imaging::{ContentArea, PatchArea};
 
 /// The kind of picture in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

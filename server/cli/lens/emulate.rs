@@ -9,10 +9,10 @@ use tokio::sync::mpsc;
 
 use crate::cli::output::{Failure, print};
 use crate::cli::wait::wait_for;
-use crate::clock::{Clock, SystemClock};
-use crate::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
-use crate::lens::{LensDynamics, Optics};
-use crate::notices::tell;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::notices::tell;
+use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
+use parfocal_devices::lens::{LensDynamics, Optics};
 
 const HELP: &str = "type what should happen, then Enter:
   unplug | plug-in | restart       pull its USB cable, plug it in, cut its power for a moment

@@ -8,14 +8,14 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::which::LensChoice;
-use crate::camera::{self, CameraSettings};
 use crate::cli::output::{Failure, print};
-use crate::clock::{Clock, SystemClock};
-use crate::control::Eye;
-use crate::files::replace;
-use crate::imaging::Reconstructor;
-use crate::lens::{LensInfo, MeasuredDynamics};
-use crate::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::files::replace;
+use parfocal_devices::camera::{self, CameraSettings};
+use parfocal_devices::lens::{LensInfo, MeasuredDynamics};
+use parfocal_imaging::Reconstructor;
+use parfocal_pipeline::control::Eye;
+use parfocal_pipeline::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
 
 /// Arguments of `parfocal lens measure`.
 #[derive(Debug, clap::Args)]

@@ -6,7 +6,7 @@ mod sweep;
 mod which;
 
 use super::output::{Failure, print};
-use crate::lens::FocalPower;
+use parfocal_base::FocalPower;
 use which::{LensChoice, go};
 
 /// Arguments of `parfocal lens`.

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::which::{LensChoice, dioptre, go};
 use crate::cli::output::{Failure, print};
-use crate::files::replace;
-use crate::lens::FocalPower;
+use parfocal_base::FocalPower;
+use parfocal_base::files::replace;
 
 /// Arguments of `parfocal lens sweep`.
 #[derive(Debug, clap::Args)]

@@ -7,8 +7,9 @@ use serde::Serialize;
 
 use crate::cli::interrupt;
 use crate::cli::output::Failure;
-use crate::clock::SystemClock;
-use crate::lens::{self, FocalPower, Lens, LensInfo};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::{self, Lens, LensInfo};
 
 /// The lens to use, and the output format.
 #[derive(Debug, clap::Args)]

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::camera::calibration;
 use crate::cli::output::{Failure, print};
-use crate::files::replace;
-use crate::imaging::{CELL, Calibration, MosaicFrame};
-use crate::recording::{Recording, by_wavelength};
+use parfocal_base::files::replace;
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{CELL, Calibration, MosaicFrame};
+use parfocal_recording::{Recording, by_wavelength};
 
 /// Arguments of `parfocal recording cube`.
 #[derive(Debug, clap::Args)]

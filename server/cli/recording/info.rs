@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::view_info;
 use crate::cli::output::{Failure, print};
-use crate::recording::{AnyRecording, Header, Recording};
+use parfocal_recording::{AnyRecording, Header, Recording};
 
 /// Bytes per sample when four samples of 10 bit are packed into five bytes.
 const PACKED: f64 = 1.25;

@@ -6,15 +6,16 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
-use crate::autofocus::{PolicyName, Registry};
-use crate::camera::{self, CameraSettings, calibration};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, print};
-use crate::clock::{Clock, SystemClock};
-use crate::control::{self, Command, ControlHandle, ControlLoop, Drive, Rig, Settings};
-use crate::imaging::{Calibration, Reconstructor};
-use crate::lens;
-use crate::recording::{CALIBRATION, Ended, FORMAT, Header, Progress, Recorder, VERSION, Writer};
+use parfocal_autofocus::Registry;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::camera::{self, CameraSettings, calibration};
+use parfocal_devices::lens;
+use parfocal_imaging::{Calibration, Reconstructor};
+use parfocal_pipeline::control::{self, Command, ControlHandle, ControlLoop, Drive, Rig, Settings};
+use parfocal_recording::{CALIBRATION, Ended, FORMAT, Header, Progress, Recorder, VERSION, Writer};
 
 /// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(20);
@@ -132,7 +133,7 @@ fn recorder(
     header: Header,
     size: (usize, usize),
     calibration: &Calibration,
-    began: crate::clock::Moment,
+    began: parfocal_base::clock::Moment,
 ) -> Result<Recorder, Failure> {
     let writer = Writer::create(&arguments.out, header, size, calibration)?;
     calibration::save(&arguments.out.join(CALIBRATION), calibration, &[])?;

@@ -3,12 +3,13 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
-use crate::camera::calibration;
 use crate::cli::output::{Failure, print};
-use crate::files::replace;
-use crate::playback::stepping::Stepping;
-use crate::recording::Recording;
+use parfocal_autofocus::{Registry, scripted, shipped};
+use parfocal_base::files::replace;
+use parfocal_base::{BlurRate, PolicyName};
+use parfocal_devices::camera::calibration;
+use parfocal_recording::Recording;
+use parfocal_session::playback::stepping::Stepping;
 
 /// Arguments of `parfocal recording step`.
 #[derive(Debug, clap::Args)]

@@ -7,11 +7,11 @@ use std::process::{Child, Command, Stdio};
 
 use image::{ImageBuffer, ImageFormat, Luma, Rgb};
 
-use crate::camera::calibration;
 use crate::cli::output::{Failure, print};
-use crate::files::replace;
-use crate::imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
-use crate::recording::Recording;
+use parfocal_base::files::replace;
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
+use parfocal_recording::Recording;
 
 /// File endings of videos; `ffmpeg` chooses the format by them.
 const VIDEOS: [&str; 4] = ["mp4", "mkv", "mov", "avi"];

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::recording::{ViewHeader, ViewRecording, ViewRow};
+use parfocal_recording::{ViewHeader, ViewRecording, ViewRow};
 
 /// What is printed.
 #[derive(Debug, Serialize)]

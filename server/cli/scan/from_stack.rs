@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use sha2::{Digest, Sha256};
 
 use super::info;
-use crate::camera::recorded::{LEAST_SIDE, MOST_POSES};
 use crate::cli::output::{Failure, bar, poses, print};
-use crate::notices::tell;
-use crate::scans::benchmark::SEED;
-use crate::scans::recording::{Cut, from_stack};
-use crate::scans::stack::FocalStack;
-use crate::scans::stack::check::check;
-use crate::scans::stack::optics::Optics;
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES};
+use parfocal_learning::scans::benchmark::SEED;
+use parfocal_learning::scans::recording::{Cut, from_stack};
+use parfocal_learning::scans::stack::FocalStack;
+use parfocal_learning::scans::stack::check::check;
+use parfocal_learning::scans::stack::optics::Optics;
 
 /// Default number of poses: 20 s at 25 per second.
 const POSES: usize = 500;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::cli::output::{Failure, bar, poses, print};
-use crate::scans::recording::{Imported, import};
+use parfocal_learning::scans::recording::{Imported, import};
 
 /// Arguments of `parfocal scan import`.
 #[derive(Debug, clap::Args)]

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::camera::recorded::{Damage, Image, ScanFolder, poses};
 use crate::cli::output::{Failure, bar, print};
-use crate::files::replace;
-use crate::plot::{Axis, Plot};
-use crate::scans::stack::optics::Optics;
-use crate::scans::stack::{FocalStack, Plane};
+use parfocal_base::files::replace;
+use parfocal_base::plot::{Axis, Plot};
+use parfocal_devices::camera::recorded::{Damage, Image, ScanFolder, poses};
+use parfocal_learning::scans::stack::optics::Optics;
+use parfocal_learning::scans::stack::{FocalStack, Plane};
 
 /// Most poses whose focus curves are used.
 const SHOWN: usize = 3;

@@ -9,18 +9,20 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
-use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
-use crate::camera::{self, CameraSettings, calibration};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, bar, poses, print};
-use crate::clock::SystemClock;
-use crate::imaging::{Calibration, Reconstructor};
-use crate::lens;
-use crate::notices::tell;
-use crate::scans::benchmark::SEED;
-use crate::scans::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
-use crate::scans::recording::{Devices, PhantomPoses, PoseSource, RecordError, Stepper, StepperError, record};
-use crate::simulation::phantom::Trajectory;
+use parfocal_base::clock::SystemClock;
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
+use parfocal_devices::camera::{self, CameraSettings, calibration};
+use parfocal_devices::lens;
+use parfocal_devices::simulation::phantom::Trajectory;
+use parfocal_imaging::{Calibration, Reconstructor};
+use parfocal_learning::scans::benchmark::SEED;
+use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
+use parfocal_learning::scans::recording::{
+    Devices, PhantomPoses, PoseSource, RecordError, Stepper, StepperError, record,
+};
 
 /// Arguments of `parfocal scan record`.
 #[derive(Debug, clap::Args)]

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use parfocal::clock::SystemClock;
-use parfocal::lens::emulator::{Emulator, Model};
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::emulator::{Emulator, Model};
 use reqwest::Method;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use parfocal::clock::SystemClock;
-use parfocal::lens::emulator::{Emulator, Fault, Model};
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::emulator::{Emulator, Fault, Model};
 
 use super::driver::Driver;
 use super::screenshots::shoot;

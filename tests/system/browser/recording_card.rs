@@ -1,6 +1,6 @@
 //! The operator records: reads how long the disk lasts, starts, stops, and reads the result.
 
-use parfocal::recording::Recording;
+use parfocal_recording::Recording;
 
 use super::driver::Driver;
 use super::screenshots::shoot;

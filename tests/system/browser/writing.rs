@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
+use parfocal_base::clock::{Clock, SystemClock};
 use serde_json::json;
 
 use super::driver::{Browser, Driver};

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::lens::emulator::{Emulator, Model};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::lens::emulator::{Emulator, Model};
 use reqwest::StatusCode;
 use serde_json::Value;
 use tokio::sync::watch;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use parfocal::control::LatencyFigures;
+use parfocal_pipeline::control::LatencyFigures;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{ConnectOptions, Connection};
 

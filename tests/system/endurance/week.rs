@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::{Rgb, RgbImage};
-use parfocal::clock::{Clock, SystemClock};
+use parfocal_base::clock::{Clock, SystemClock};
 
 use super::course::{Conductor, Pace};
 use super::judgement::judge;

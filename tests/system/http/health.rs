@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use parfocal::clock::SystemClock;
-use parfocal::lens::emulator::{Emulator, Model};
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::emulator::{Emulator, Model};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use sqlx::sqlite::SqliteConnectOptions;

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use parfocal::camera::calibration;
-use parfocal::imaging::{Developer, GrayImage, RgbImage, Size};
-use parfocal::recording::{Recording, ViewRecording};
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{Developer, GrayImage, RgbImage, Size};
+use parfocal_recording::{Recording, ViewRecording};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use sqlx::sqlite::SqliteConnectOptions;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::recording::{Ended, Recording, ViewRecording, ViewRow};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_recording::{Ended, Recording, ViewRecording, ViewRow};
 use reqwest::StatusCode;
 use rustix::process::Signal;
 use serde_json::{Value, json};

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use parfocal::clock::SystemClock;
-use parfocal::lens::emulator::{Emulator, Model};
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::emulator::{Emulator, Model};
 use reqwest::StatusCode;
 use rustix::process::Signal;
 use serde_json::{Value, json};

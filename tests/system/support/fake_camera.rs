@@ -4,8 +4,8 @@ use std::fs::File;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use parfocal::camera::gige::list;
-use parfocal::clock::{Clock, SystemClock};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_devices::camera::gige::list;
 
 const PROGRAM: &str = "arv-fake-gv-camera-0.8";
 /// Serial number; the camera answers to `Aravis-Fake-TEST`.

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::SignedDuration;
-use parfocal::clock::{Clock, ManualClock, SystemClock};
-use parfocal::tls::{Certificates, Names};
+use parfocal_base::clock::{Clock, ManualClock, SystemClock};
+use parfocal_dashboard::tls::{Certificates, Names};
 use rustix::process::Signal;
 use tokio::net::TcpListener;
 use tokio_rustls::TlsAcceptor;

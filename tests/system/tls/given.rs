@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
-use parfocal::clock::{Clock, SystemClock};
-use parfocal::tls::{Certificates, Names};
+use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_dashboard::tls::{Certificates, Names};
 use rcgen::{CertificateParams, KeyPair};
 use serde_json::Value;
 use time::OffsetDateTime;

@@ -1,11 +1,11 @@
 //! Blinding within a study: emergency unblinding of one session, and what nobody may learn too early.
 
-use parfocal::conductor::ConductError;
-use parfocal::store::export::export;
-use parfocal::store::export::verify::verify;
-use parfocal::trial::action::Action;
-use parfocal::trial::event::EventKind;
-use parfocal::trial::role::Role;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::verify;
+use parfocal_session::conductor::ConductError;
+use parfocal_trial::action::Action;
+use parfocal_trial::event::EventKind;
+use parfocal_trial::role::Role;
 use serde_json::Value;
 
 use super::*;

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::conductor::{ConductError, Studies, StudySite};
-use parfocal::ids::SessionId;
-use parfocal::store::export::{ExportError, export};
-use parfocal::store::{Reader, StoreError};
-use parfocal::trial::action::Action;
-use parfocal::trial::correction::{FieldChange, NewCorrection};
-use parfocal::trial::remark::{CommentContent, NewComment, Origin};
-use parfocal::trial::role::Role;
-use parfocal::trial::study::refusal::StudyRefusal;
-use parfocal::trial::study::signature::{Channel, Signature};
-use parfocal::trial::study::stage::Stage;
-use parfocal::trial::study::state::Change;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::export::{ExportError, export};
+use parfocal_records::store::{Reader, StoreError};
+use parfocal_session::conductor::{ConductError, Studies, StudySite};
+use parfocal_trial::action::Action;
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::remark::{CommentContent, NewComment, Origin};
+use parfocal_trial::role::Role;
+use parfocal_trial::study::refusal::StudyRefusal;
+use parfocal_trial::study::signature::{Channel, Signature};
+use parfocal_trial::study::stage::Stage;
+use parfocal_trial::study::state::Change;
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -278,7 +278,7 @@ async fn a_clock_set_back_changes_neither_the_state_nor_the_order_of_events() {
 async fn a_command_changes_studies_while_no_server_runs() {
     let folder = tempfile::tempdir().unwrap();
     let trial = opened(folder.path()).await;
-    let library = parfocal::conductor::Library::load(Some(folder.path()), &known()).unwrap();
+    let library = parfocal_session::conductor::Library::load(Some(folder.path()), &known()).unwrap();
     let clock = trial.clock.clone();
 
     let refused = Studies::open(folder.path(), &library, clock.clone()).await.map(|_| ()).unwrap_err();
@@ -310,7 +310,7 @@ async fn sessions_of_an_earlier_version_are_outside_any_study() {
 
     // The database as the version before studies left it.
     let pool = crate::storage::raw(folder.path()).await;
-    parfocal::store::MIGRATOR.undo(&pool, 8).await.unwrap();
+    parfocal_records::store::MIGRATOR.undo(&pool, 8).await.unwrap();
     let commitment = "SELECT commitment FROM sessions";
     let before: String = sqlx::query_scalar(commitment).fetch_one(&pool).await.unwrap();
     pool.close().await;
@@ -323,7 +323,7 @@ async fn sessions_of_an_earlier_version_are_outside_any_study() {
     assert_eq!(detail.commitment, before);
     assert!(trial.conductor.studies().lines().await.unwrap().is_empty());
 
-    let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
+    let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }
 
@@ -343,7 +343,7 @@ async fn an_open_study_of_the_version_before_accounts_keeps_its_orders_and_sessi
     let before = trial.conductor.session_detail(session).await.unwrap();
     trial.store.close().await;
     drop(trial);
-    parfocal::store::MIGRATOR.undo(&pool, 10).await.unwrap();
+    parfocal_records::store::MIGRATOR.undo(&pool, 10).await.unwrap();
     pool.close().await;
 
     let mut trial = a_trial(folder.path()).await;
@@ -360,9 +360,9 @@ async fn an_open_study_of_the_version_before_accounts_keeps_its_orders_and_sessi
     to_the_end(&trial).await;
     let out = folder.path().join("export");
     export(&trial.recorder(), session, &out, true).await.unwrap();
-    let checks = parfocal::store::export::verify::verify(&out, None);
+    let checks = parfocal_records::store::export::verify::verify(&out, None);
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
-    let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
+    let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }
 
@@ -386,6 +386,6 @@ async fn a_session_under_the_wrong_code_counts_for_the_right_surgeon_once_it_is_
     change(&trial, Change::Withdraw { session }).await.unwrap();
     assert_eq!(detail(&trial).await.log.last().unwrap().text, "S-03 withdrew");
     assert!(refusal(prepare(&trial, "S-03", "leeds").await).contains("withdrew"));
-    let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
+    let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }

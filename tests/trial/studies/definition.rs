@@ -1,6 +1,6 @@
 //! A study's definition: an error in any field is reported with its line and key.
 
-use parfocal::trial::study::definition::{Definition, Site};
+use parfocal_trial::study::definition::{Definition, Site};
 use sha2::{Digest, Sha256};
 
 use super::{PROTOCOL, definition, protocol};
@@ -78,8 +78,7 @@ fn a_missing_hash_is_printed_so_that_it_can_be_written() {
 #[test]
 fn practice_and_a_protocol_listed_twice_are_refused() {
     let practice = PROTOCOL.replace("repeats = 1", "repeats = 1\npractice = true");
-    let practice =
-        parfocal::trial::protocol::Protocol::parse(&practice, "pair.toml", &crate::fixture::known()).unwrap();
+    let practice = parfocal_trial::protocol::Protocol::parse(&practice, "pair.toml", &crate::fixture::known()).unwrap();
     let hash = hex::encode(protocol().sha256());
 
     let text = definition().replace(&hash, &hex::encode(practice.sha256()));

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Command;
 
-use parfocal::store::export::export;
-use parfocal::store::export::verify::{Verdict, verify};
-use parfocal::store::verify_database;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::{Verdict, verify};
+use parfocal_records::store::verify_database;
 use serde_json::Value;
 
 use super::*;

@@ -9,14 +9,14 @@ mod places;
 
 use std::path::Path;
 
-use parfocal::conductor::{ConductError, StudyDetail, StudySite};
-use parfocal::ids::SessionId;
-use parfocal::trial::account::AccountRole;
-use parfocal::trial::action::Action;
-use parfocal::trial::protocol::Protocol;
-use parfocal::trial::role::Role;
-use parfocal::trial::study::signature::Signature;
-use parfocal::trial::study::state::Change;
+use parfocal_base::ids::SessionId;
+use parfocal_session::conductor::{ConductError, StudyDetail, StudySite};
+use parfocal_trial::account::AccountRole;
+use parfocal_trial::action::Action;
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::role::Role;
+use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::state::Change;
 
 use crate::fixture::Trial;
 

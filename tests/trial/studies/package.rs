@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use parfocal::study_export::{Progress, StudyExportState, StudyExports};
-use parfocal::trial::erasure::{Erasable, NewErasure};
+use parfocal_results::study_export::{Progress, StudyExportState, StudyExports};
+use parfocal_trial::erasure::{Erasable, NewErasure};
 use serde_json::Value;
 
 use super::*;

@@ -1,10 +1,10 @@
 //! Which place a session gets under the rules in the definition.
 
-use parfocal::ids::SessionId;
-use parfocal::trial::phase::SessionStatus;
-use parfocal::trial::study::definition::Definition;
-use parfocal::trial::study::places::{Enrolled, next_place};
-use parfocal::trial::study::refusal::StudyRefusal;
+use parfocal_base::ids::SessionId;
+use parfocal_trial::phase::SessionStatus;
+use parfocal_trial::study::definition::Definition;
+use parfocal_trial::study::places::{Enrolled, next_place};
+use parfocal_trial::study::refusal::StudyRefusal;
 use uuid::Uuid;
 
 use super::{definition, protocol};

@@ -1,0 +1,177 @@
+//! The paper's learned policies: a network gives action values for the latest eight frames, and the best action is
+//! taken.
+
+use std::collections::VecDeque;
+
+use tch::{Device, Tensor, nn};
+
+use super::networks::{ACTIONS, ENCODING, Encoder, HISTORY, ValueHead};
+use super::weights::{self, WeightsError};
+use super::{Decision, FieldOfView, Observation, Policy, STEP, mgm, mlr};
+use parfocal_imaging::Patch;
+
+/// What a learned policy sees of each frame besides the focal power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sight {
+    /// The mean gradient magnitude.
+    Mgm,
+    /// The mean local ratio.
+    Mlr,
+    /// The whole patch, through the encoder.
+    Patch,
+}
+
+impl Sight {
+    /// Numbers per frame in the head's input, without the focal power.
+    #[must_use]
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Mgm | Self::Mlr => 1,
+            Self::Patch => ENCODING,
+        }
+    }
+
+    /// The focus metric of `patch`; `None` if this sight is the whole patch.
+    #[must_use]
+    pub fn metric(self, patch: &Patch) -> Option<f64> {
+        match self {
+            Self::Mgm => Some(mgm(patch)),
+            Self::Mlr => Some(mlr(patch)),
+            Self::Patch => None,
+        }
+    }
+
+    /// A metric as an input of the network: its logarithm, centred and scaled to the order of 1.
+    #[must_use]
+    pub fn scaled(self, metric: f64) -> f32 {
+        match self {
+            Self::Mgm => ((metric + 0.5).ln() - 3.5) as f32,
+            Self::Mlr | Self::Patch => (0.5 * ((metric - 1.0).max(0.0) + 1e-4).ln() + 1.75) as f32,
+        }
+    }
+}
+
+/// The change of focal power of an action: 0 is a step down, 1 none, 2 a step up.
+#[must_use]
+pub const fn action_step(action: usize) -> f64 {
+    match action {
+        0 => -STEP,
+        1 => 0.0,
+        _ => STEP,
+    }
+}
+
+/// A focal power as an input of the networks: from -1 to 1.
+#[must_use]
+pub const fn scaled_focal_power(focal_power: f64) -> f32 {
+    2.0 * (focal_power as f32 - 0.5)
+}
+
+/// A policy's network: the head, and an encoder if the policy sees patches.
+#[derive(Debug)]
+pub struct ValueNetwork {
+    /// What the policy sees of each frame.
+    pub sight: Sight,
+    encoder: Option<Encoder>,
+    /// Computes action values from the histories.
+    pub head: ValueHead,
+}
+
+impl ValueNetwork {
+    /// A network with random weights under `path`.
+    #[must_use]
+    pub fn new(path: &nn::Path<'_>, sight: Sight) -> Self {
+        let encoder = (sight == Sight::Patch).then(|| Encoder::new(&(path / "encoder")));
+        let head = ValueHead::new(&(path / "head"), HISTORY * (sight.width() + 1));
+        Self { sight, encoder, head }
+    }
+
+    /// Encodes frames, `[N, 1024]` (gray) or `[N, 1]` (scaled metric), as inputs of the head: `[N, width]`.
+    pub fn encode(&self, frames: &Tensor) -> Tensor {
+        self.encoder.as_ref().map_or_else(|| frames.shallow_clone(), |encoder| encoder.forward(frames))
+    }
+
+    /// Action values `[N, 3]` from the histories' encodings `[N, 8 * width]` and scaled focal powers `[N, 8]`, oldest
+    /// first.
+    pub fn values(&self, encodings: &Tensor, focal_powers: &Tensor) -> Tensor {
+        self.head.forward(&Tensor::cat(&[encodings, focal_powers], 1))
+    }
+}
+
+/// A learned policy with its memory of eight frames. Before it has seen eight, the first frame fills the places of
+/// those missing.
+pub struct Learned {
+    network: ValueNetwork,
+    encodings: VecDeque<Vec<f32>>,
+    focal_powers: VecDeque<f32>,
+    // Keeps alive the variables that the network's layers use.
+    _store: nn::VarStore,
+}
+
+impl Learned {
+    /// A policy with the weights in `bytes` (safetensors).
+    ///
+    /// # Errors
+    /// If the weights are damaged or belong to another network.
+    pub fn new(sight: Sight, bytes: &[u8]) -> Result<Self, WeightsError> {
+        let store = nn::VarStore::new(Device::Cpu);
+        let network = ValueNetwork::new(&store.root(), sight);
+        weights::load(&store, bytes)?;
+        Ok(Self { network, encodings: VecDeque::new(), focal_powers: VecDeque::new(), _store: store })
+    }
+
+    fn encode(&self, patch: &Patch, metric: Option<f64>) -> Vec<f32> {
+        if let Some(metric) = metric {
+            return vec![self.network.sight.scaled(metric)];
+        }
+
+        let encoding = self.network.encode(&Tensor::from_slice(&patch.0).view([1, -1]));
+        let mut values = vec![0.0; ENCODING];
+        encoding.view([-1]).copy_data(&mut values, ENCODING);
+        values
+    }
+
+    fn remember(&mut self, encoding: &[f32], focal_power: f32) {
+        let missing = if self.encodings.is_empty() { HISTORY } else { 1 };
+        for _ in 0..missing {
+            self.encodings.push_back(encoding.to_vec());
+            self.focal_powers.push_back(focal_power);
+        }
+
+        while self.encodings.len() > HISTORY {
+            self.encodings.pop_front();
+            self.focal_powers.pop_front();
+        }
+    }
+}
+
+impl Policy for Learned {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        tch::no_grad(|| {
+            let metric = self.network.sight.metric(&seen.view.patch);
+            let encoding = self.encode(&seen.view.patch, metric);
+            self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
+
+            let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
+            let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();
+
+            let row = |values: &[f32]| Tensor::from_slice(values).view([1, -1]);
+            let mut values = [0.0f32; ACTIONS];
+            self.network.values(&row(&encodings), &row(&focal_powers)).view([-1]).copy_data(&mut values, ACTIONS);
+
+            let step = action_step(best_action(&values));
+            Decision { target: seen.focal_power.moved(step).get(), metric, belief: None }
+        })
+    }
+}
+
+/// The action of highest value. Standing still wins a tie with a move.
+#[must_use]
+pub fn best_action(values: &[f32]) -> usize {
+    [1, 0, 2].into_iter().reduce(|best, other| if values[other] > values[best] { other } else { best }).unwrap_or(1)
+}

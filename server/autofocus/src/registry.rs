@@ -1,0 +1,225 @@
+//! The registry: all policies by name. Every part of the program uses the same names.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use parfocal_base::{BlurRate, PolicyName};
+
+use super::Policy;
+
+/// One line of the registry.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PolicyEntry {
+    /// The policy's name, by which [`Registry::build`] finds it.
+    pub name: PolicyName,
+    /// What it does, in one sentence.
+    pub summary: &'static str,
+    /// SHA-256 of its weights, in hexadecimal, if it was learned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
+    /// Whether the policy can run now. A learned policy cannot run without its weights.
+    pub available: bool,
+    /// Why the policy cannot run and what to do; `None` if it is available.
+    pub reason: Option<String>,
+}
+
+/// Why a policy could not be built.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PolicyError {
+    /// The registry has no policy of that name.
+    #[error("there is no policy '{name}'; there are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: PolicyName,
+        /// All known names, separated by commas.
+        known: String,
+    },
+    /// The policy is listed but unavailable: its weights or its file are missing or damaged.
+    #[error("policy '{name}' cannot run: {reason}")]
+    Unavailable {
+        /// The policy.
+        name: PolicyName,
+        /// Why, and what to do.
+        reason: String,
+    },
+}
+
+/// All policies. Cheap to clone: the clones share the learned weights.
+#[derive(Clone, Default)]
+pub struct Registry {
+    policies: Vec<Registered>,
+    blur: Option<BlurRate>,
+}
+
+#[derive(Clone)]
+struct Registered {
+    name: PolicyName,
+    summary: &'static str,
+    weights: Option<String>,
+    source: Source,
+}
+
+#[derive(Clone)]
+enum Source {
+    Constructor(Arc<dyn Fn() -> Box<dyn Policy> + Send + Sync>),
+    Missing(Arc<str>),
+}
+
+impl Registry {
+    /// Adds policy `name`, made by `build`. Replaces a policy of that name, or appends it at the end.
+    #[must_use]
+    pub fn with(
+        self,
+        name: &str,
+        summary: &'static str,
+        build: impl Fn() -> Box<dyn Policy> + Send + Sync + 'static,
+    ) -> Self {
+        self.put(name, summary, Source::Constructor(Arc::new(build)))
+    }
+
+    /// Lists policy `name` as unavailable. `reason` says why and what to do.
+    #[must_use]
+    pub fn without(self, name: &str, summary: &'static str, reason: &str) -> Self {
+        self.put(name, summary, Source::Missing(reason.into()))
+    }
+
+    fn put(mut self, name: &str, summary: &'static str, source: Source) -> Self {
+        let new = Registered { name: PolicyName::new(name), summary, weights: None, source };
+        match self.policies.iter_mut().find(|old| old.name == new.name) {
+            Some(old) => *old = new,
+            None => self.policies.push(new),
+        }
+        self
+    }
+
+    /// Records the hash of `bytes` as that of the weights of policy `name`.
+    #[must_use]
+    pub fn weighing(mut self, name: &str, bytes: &[u8]) -> Self {
+        if let Some(policy) = self.policies.iter_mut().find(|policy| policy.name.as_str() == name) {
+            policy.weights = Some(hex::encode(Sha256::digest(bytes)));
+        }
+        self
+    }
+
+    /// Gives the blur rate of the optics, if known, to every policy that is built.
+    #[must_use]
+    pub const fn knowing(mut self, blur: Option<BlurRate>) -> Self {
+        self.blur = blur;
+        self
+    }
+
+    /// The SHA-256 of each learned policy's weights.
+    #[must_use]
+    pub fn weights(&self) -> BTreeMap<PolicyName, String> {
+        self.policies.iter().filter_map(|policy| Some((policy.name.clone(), policy.weights.clone()?))).collect()
+    }
+
+    /// Every policy, in the order in which they were added.
+    #[must_use]
+    pub fn entries(&self) -> Vec<PolicyEntry> {
+        let entry = |policy: &Registered| {
+            let reason = match &policy.source {
+                Source::Constructor(_) => None,
+                Source::Missing(reason) => Some(reason.to_string()),
+            };
+
+            PolicyEntry {
+                name: policy.name.clone(),
+                summary: policy.summary,
+                weights: policy.weights.clone(),
+                available: reason.is_none(),
+                reason,
+            }
+        };
+
+        self.policies.iter().map(entry).collect()
+    }
+
+    /// Builds a new instance of policy `name`, with an empty memory.
+    ///
+    /// # Errors
+    /// If there is no such policy or it cannot run.
+    pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
+        let policy = self.policies.iter().find(|policy| policy.name == *name);
+
+        match policy.map(|policy| &policy.source) {
+            Some(Source::Constructor(build)) => {
+                let mut policy = build();
+                if let Some(blur) = self.blur {
+                    policy.learn_of(blur);
+                }
+                Ok(policy)
+            }
+            Some(Source::Missing(reason)) => {
+                Err(PolicyError::Unavailable { name: name.clone(), reason: reason.to_string() })
+            }
+            None => {
+                let known: Vec<_> = self.policies.iter().map(|policy| policy.name.as_str()).collect();
+                Err(PolicyError::Unknown { name: name.clone(), known: known.join(", ") })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Fixed;
+    use crate::Observation;
+    use parfocal_base::FocalPower;
+    use parfocal_imaging::{PATCH_SIDE, Patch};
+
+    fn names(registry: &Registry) -> Vec<String> {
+        registry.entries().iter().map(|entry| entry.name.to_string()).collect()
+    }
+
+    #[test]
+    fn the_standard_registry_has_the_promised_names_in_the_promised_order() {
+        let promised = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
+        assert_eq!(names(&Registry::standard())[..promised.len()], promised);
+    }
+
+    #[test]
+    fn an_entry_is_available_exactly_when_it_can_be_built() {
+        let registry = Registry::standard();
+        for entry in registry.entries() {
+            assert_eq!(registry.build(&entry.name).is_ok(), entry.available, "{}", entry.name);
+            assert_eq!(entry.reason.is_none(), entry.available, "{}", entry.name);
+        }
+    }
+
+    #[test]
+    fn instances_share_no_memory() {
+        let registry = Registry::standard();
+        let fixed = PolicyName::new("fixed");
+        let patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        for start in [0.2, 0.7] {
+            let focal_power = FocalPower::new(start).unwrap();
+            let decision = registry.build(&fixed).unwrap().step(&Observation { view: &patch.into(), focal_power });
+            assert!((decision.target - start).abs() < f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_known_ones() {
+        let registry = Registry::default().with("a", "", || Box::new(Fixed::default())).without(
+            "b",
+            "",
+            "it is not here: fetch it",
+        );
+
+        let error = |name| registry.build(&PolicyName::new(name)).err().map(|error| error.to_string());
+        assert_eq!(error("c").as_deref(), Some("there is no policy 'c'; there are: a, b"));
+        assert_eq!(error("b").as_deref(), Some("policy 'b' cannot run: it is not here: fetch it"));
+    }
+
+    #[test]
+    fn a_policy_registered_again_keeps_its_place() {
+        let registry = Registry::standard().with("mgm-learned", "trained", || Box::new(Fixed::default()));
+        assert_eq!(names(&registry), names(&Registry::standard()));
+        assert!(registry.build(&PolicyName::new("mgm-learned")).is_ok());
+    }
+}

@@ -1,0 +1,179 @@
+//! The policies that ship with the program, and the use of weights that people trained themselves.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::belief::BeliefTracker;
+use super::learned::{Learned, Sight};
+use super::weights::WeightsError;
+use super::{Fixed, HillClimber, Policy, Registry, mgm, mlr};
+
+/// The kind of network that a learned policy's weights are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Design {
+    /// The paper's value networks.
+    Values(Sight),
+    /// The belief tracker.
+    Belief,
+}
+
+/// A learned policy: its name, what it does, its network, and the weights that ship.
+struct Shipped {
+    name: &'static str,
+    summary: &'static str,
+    design: Design,
+    weights: &'static [u8],
+}
+
+const SHIPPED: [Shipped; 4] = [
+    Shipped {
+        name: "mgm-learned",
+        summary: "learned optimiser of the mean gradient magnitude",
+        design: Design::Values(Sight::Mgm),
+        weights: include_bytes!("../../../policies/mgm-learned.safetensors"),
+    },
+    Shipped {
+        name: "mlr-learned",
+        summary: "learned optimiser of the mean local ratio",
+        design: Design::Values(Sight::Mlr),
+        weights: include_bytes!("../../../policies/mlr-learned.safetensors"),
+    },
+    Shipped {
+        name: "cnn-learned",
+        summary: "learned end to end from the last eight patches",
+        design: Design::Values(Sight::Patch),
+        weights: include_bytes!("../../../policies/cnn-learned.safetensors"),
+    },
+    Shipped {
+        name: "parfocal",
+        summary: "tracks a belief about the optimum and goes where it is most likely in focus",
+        design: Design::Belief,
+        weights: include_bytes!("../../../policies/parfocal.safetensors"),
+    },
+];
+
+impl Registry {
+    /// All policies that ship, in the order of docs/scripting.md.
+    #[must_use]
+    pub fn standard() -> Self {
+        let classical = Self::default()
+            .with("fixed", "the lens stays where it is", || Box::new(Fixed::default()))
+            .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
+                Box::new(HillClimber::new(mgm))
+            })
+            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
+                Box::new(HillClimber::new(mlr))
+            });
+
+        with_shipped(classical)
+    }
+}
+
+/// The design of the learned policy `name`; `None` if no learned policy has that name.
+#[must_use]
+pub fn design(name: &str) -> Option<Design> {
+    SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| shipped.design)
+}
+
+/// Adds all learned policies to `registry`. One with damaged weights is listed but unavailable.
+#[must_use]
+pub fn with_shipped(registry: Registry) -> Registry {
+    SHIPPED.iter().fold(registry, |registry, shipped| {
+        let Shipped { name, summary, design, weights } = shipped;
+        match build(*design, weights) {
+            Ok(_) => put(registry, name, summary, *design, Arc::from(*weights)),
+            Err(error) => registry.without(name, summary, &format!("{error}; replace them with undamaged weights")),
+        }
+    })
+}
+
+/// Why weights in a folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// The folder has no weights of a learned policy.
+    #[error("there are no weights in {}: none of {names}", folder.display())]
+    Empty {
+        /// The folder.
+        folder: PathBuf,
+        /// File names that were looked for, separated by commas.
+        names: String,
+    },
+    /// A file of weights cannot be used.
+    #[error("cannot use the weights {}: {reason}", file.display())]
+    Unfit {
+        /// The file of the weights.
+        file: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// Replaces the weights that ship by those in `folder`, called `NAME.safetensors`. A policy without a file there keeps
+/// its weights.
+///
+/// # Errors
+/// If there are no weights at all, or some are damaged or cannot be read.
+pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, FolderError> {
+    let file_of = |name: &str| folder.join(format!("{name}.safetensors"));
+    let there: Vec<_> = SHIPPED.iter().filter(|shipped| file_of(shipped.name).exists()).collect();
+    if there.is_empty() {
+        let names: Vec<_> = SHIPPED.iter().map(|shipped| format!("{}.safetensors", shipped.name)).collect();
+        return Err(FolderError::Empty { folder: folder.to_owned(), names: names.join(", ") });
+    }
+
+    there.into_iter().try_fold(registry, |registry, Shipped { name, summary, design, .. }| {
+        let file = file_of(name);
+        let unfit = |reason: String| FolderError::Unfit { file: file.clone(), reason };
+        let bytes = std::fs::read(&file).map_err(|error| unfit(error.to_string()))?;
+        build(*design, &bytes).map_err(|error| unfit(error.to_string()))?;
+        Ok(put(registry, name, summary, *design, bytes.into()))
+    })
+}
+
+/// Adds a policy whose weights were checked a moment ago. If libtorch fails now nevertheless, the lens stays where it
+/// is.
+fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
+    let weights = Arc::clone(&bytes);
+    let make = move || build(design, &bytes).unwrap_or_else(|_| Box::<Fixed>::default() as Box<dyn Policy>);
+    registry.with(name, summary, make).weighing(name, &weights)
+}
+
+/// A policy of `design` with the weights in `bytes` (safetensors).
+///
+/// # Errors
+/// If the weights are damaged or belong to another network.
+pub fn build(design: Design, bytes: &[u8]) -> Result<Box<dyn Policy>, WeightsError> {
+    Ok(match design {
+        Design::Values(sight) => Box::new(Learned::new(sight, bytes)?),
+        Design::Belief => Box::new(BeliefTracker::new(bytes)?),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parfocal_base::PolicyName;
+
+    #[test]
+    fn what_ships_is_sound() {
+        let registry = with_shipped(Registry::default());
+        for shipped in SHIPPED {
+            assert!(registry.build(&PolicyName::new(shipped.name)).is_ok(), "{}", shipped.name);
+        }
+    }
+
+    #[test]
+    fn damaged_and_missing_weights_in_a_folder_are_reported_and_others_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let with = || with_folder(with_shipped(Registry::default()), folder.path());
+        assert!(with().err().unwrap().to_string().contains("mgm-learned.safetensors"));
+
+        let file = folder.path().join("mgm-learned.safetensors");
+        std::fs::write(&file, b"damaged").unwrap();
+        let error = with().err().unwrap().to_string();
+        assert!(error.contains("mgm-learned.safetensors") && error.contains("the weights are damaged"), "{error}");
+
+        std::fs::copy("policies/mgm-learned.safetensors", &file).unwrap();
+        assert!(with().unwrap().build(&PolicyName::new("parfocal")).is_ok());
+    }
+}

@@ -1,0 +1,26 @@
+//! What every other crate of parfocal stands on: the words that they share, and small tools that belong to no subject.
+//!
+//! The shared words are [`FocalPower`], [`BlurRate`], [`PolicyName`], the identifiers of a trial ([`ids`]) and the
+//! record of one step of the control loop ([`step`]). They live here so that the trial's rules and its database can
+//! name a policy or a focal power without the cameras, the lenses and the networks behind it.
+//!
+//! The tools are the two clocks ([`clock`]), files written whole ([`files`]), device options ([`options`]), messages on
+//! standard error ([`notices`]), thread priorities ([`priority`]), the one SVG writer ([`plot`]) and the statistics that
+//! evaluations and studies share ([`statistics`]).
+
+mod blur_rate;
+pub mod clock;
+pub mod files;
+mod focal_power;
+pub mod ids;
+pub mod notices;
+pub mod options;
+pub mod plot;
+mod policy_name;
+pub mod priority;
+pub mod statistics;
+pub mod step;
+
+pub use blur_rate::BlurRate;
+pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
+pub use policy_name::PolicyName;

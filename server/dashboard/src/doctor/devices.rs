@@ -1,0 +1,81 @@
+//! Checks the devices of a running server by what it already knows: a device that the control loop holds is never
+//! asked.
+
+use super::finding::Finding;
+use super::lens;
+use parfocal_devices::camera::CameraHealth;
+use parfocal_devices::lens::{LensHealth, LensInfo};
+
+const CAMERA: &str = "camera";
+const LENS: &str = "lens";
+
+/// Checks the camera. For a GigE camera, its message includes the size of the packets.
+#[must_use]
+pub fn camera_in_use(health: &CameraHealth) -> Finding {
+    let found = named(&health.name, &health.message);
+    if !health.working {
+        return Finding::wrong(CAMERA, found, "Check its cable and power. The server looks for it by itself.");
+    }
+    if health.simulated {
+        return Finding::advice(CAMERA, found, "For a real picture, start the server with --camera gige:ID.");
+    }
+    if health.lost > 0 {
+        let found = format!("{found} Frames lost since the start: {}.", health.lost);
+        return Finding::advice(CAMERA, found, "If the number rises, follow docs/bench.md, \"The camera\".");
+    }
+    Finding::well(CAMERA, found)
+}
+
+/// Checks the lens. `info` is what it reported about itself when the server started, if it did.
+#[must_use]
+pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
+    let found = named(&health.name, &health.message);
+    if !health.working {
+        return Finding::wrong(LENS, found, "Check its cable and power. The server looks for it by itself.");
+    }
+    if health.caution {
+        return Finding::advice(LENS, found, "Follow docs/bench.md, \"The lens\".");
+    }
+    if health.simulated {
+        return Finding::advice(LENS, found, "For real glass, start the server with --lens optotune:auto.");
+    }
+    match info {
+        Some(info) => lens(Ok(info.clone())),
+        None => Finding::well(LENS, found),
+    }
+}
+
+/// A device's name and message as one sentence.
+fn named(name: &str, message: &str) -> String {
+    let end = if message.ends_with('.') { "" } else { "." };
+    format!("{name}: {message}{end}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doctor::Verdict;
+
+    fn lens_health(working: bool, caution: bool, simulated: bool) -> LensHealth {
+        let message = "as it should".into();
+        LensHealth { name: "a lens".into(), simulated, working, caution, message, line_errors: 0 }
+    }
+
+    fn camera_health(working: bool, lost: u64) -> CameraHealth {
+        let message = "2048x1088 Mono10, packets of 8996 bytes".into();
+        CameraHealth { name: "a camera".into(), simulated: false, working, message, fps: 50.0, lost }
+    }
+
+    #[test]
+    fn an_absent_device_is_wrong_and_a_simulated_one_is_reported() {
+        assert_eq!(lens_in_use(&lens_health(false, false, false), None).verdict, Verdict::Wrong);
+        assert_eq!(lens_in_use(&lens_health(true, true, false), None).verdict, Verdict::Advice);
+        assert_eq!(lens_in_use(&lens_health(true, false, true), None).verdict, Verdict::Advice);
+        assert_eq!(lens_in_use(&lens_health(true, false, false), None).verdict, Verdict::Well);
+
+        assert_eq!(camera_in_use(&camera_health(false, 0)).verdict, Verdict::Wrong);
+        assert_eq!(camera_in_use(&camera_health(true, 3)).verdict, Verdict::Advice);
+        let well = camera_in_use(&camera_health(true, 0));
+        assert_eq!((well.verdict, well.found.contains("packets of 8996 bytes.")), (Verdict::Well, true));
+    }
+}

@@ -1,0 +1,40 @@
+//! Checks whether a machine is ready for a trial: what is well, what could be better, and what must be fixed first,
+//! with advice on how.
+
+mod calibration;
+mod certificate;
+mod database;
+mod devices;
+mod finding;
+mod folder;
+mod lens;
+mod network;
+mod system;
+mod tablet;
+
+use std::path::Path;
+
+pub use calibration::{calibration, unreadable_calibration};
+pub use certificate::certificate;
+pub use database::database;
+pub use devices::{camera_in_use, lens_in_use};
+pub use finding::{Finding, Verdict};
+pub use folder::LEAST_ROOM;
+pub use lens::lens;
+pub use network::outward;
+pub use tablet::{Tablet, tablets};
+
+use parfocal_base::clock::Clock;
+
+/// Checks everything except the database and the devices: the folder `data` and its disk, clock, network and rights.
+#[must_use]
+pub fn machine(data: &Path, clock: &dyn Clock) -> Vec<Finding> {
+    let mut findings = vec![folder::disk(data), folder::access(data)];
+    findings.push(system::clock(clock));
+    findings.push(network::addresses());
+    findings.extend(network::camera_links());
+    findings.push(system::real_time());
+    findings.push(system::memory());
+    findings.push(system::videos());
+    findings
+}

@@ -1,0 +1,73 @@
+//! The operator's card that says whether everything is ready for a trial: the checks of `parfocal doctor` on the
+//! machine, and what the running server knows about its devices and the surgeon's tablet.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use serde::Serialize;
+use tokio::task::spawn_blocking;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::equipment::Equipment;
+use super::error::Error;
+use super::roles::Operator;
+use super::{App, AppState};
+use crate::doctor::{self, Finding};
+use parfocal_records::store::database_state;
+
+/// Results of all checks.
+#[derive(Debug, Serialize, ToSchema)]
+struct Checks {
+    /// When the checks were made, by the server's wall clock.
+    #[schema(value_type = String)]
+    at: Timestamp,
+    /// One result for each thing that was checked.
+    findings: Vec<Finding>,
+}
+
+/// Whether everything is ready for a trial.
+///
+/// Checks the machine and the database again.
+/// Devices are not asked, because the focus loop holds them: the server reports what it already knows.
+#[utoipa::path(get, path = "/api/operator/checks", tag = "operator", responses((status = 200, body = Checks)))]
+async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
+    let look = Arc::clone(&app.equipment.look).lock_owned().await;
+    let folder = app.store.folder().to_owned();
+    let database = doctor::database(&folder, database_state(&folder).await);
+    let clock = Arc::clone(&app.clock);
+    let machine = spawn_blocking(move || {
+        let _look = look;
+        doctor::machine(&folder, clock.as_ref())
+    });
+
+    let mut findings = machine.await.map_err(|_| Error::Internal)?;
+    findings.extend(database);
+    let now = app.clock.wall();
+    let local = app.reach.authority().is_some();
+    findings.extend(app.reach.certificate_until().map(|until| doctor::certificate(until, local, now)));
+    findings.extend(devices(&app));
+    Ok(Json(Checks { at: now, findings }))
+}
+
+fn devices(app: &App) -> Vec<Finding> {
+    let status = Arc::clone(&app.control.status.borrow());
+    let Equipment { lens, calibration, mosaics, .. } = &app.equipment;
+    let today = app.clock.wall().to_zoned(TimeZone::system()).date();
+
+    let mut findings = vec![
+        doctor::camera_in_use(&status.camera),
+        doctor::lens_in_use(&status.lens, lens.as_ref()),
+        doctor::calibration(calibration, *mosaics, status.camera.simulated, today),
+    ];
+    findings.extend(doctor::tablets(&app.tablets.open()));
+    findings
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(checks))
+}

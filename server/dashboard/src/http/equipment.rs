@@ -1,0 +1,28 @@
+//! What the server learned about its devices when it started. The focus loop holds them, so they are not asked again.
+
+use std::sync::Arc;
+
+use tokio::sync::Mutex;
+
+use parfocal_devices::lens::LensInfo;
+use parfocal_imaging::Calibration;
+
+/// What the server learned about its devices when it started.
+pub struct Equipment {
+    /// What the lens reported about itself, if it did.
+    pub lens: Option<LensInfo>,
+    /// The sensor's calibration.
+    pub calibration: Arc<Calibration>,
+    /// Width and height of the camera's mosaics, samples; `None` for a camera that delivers colour pictures.
+    pub mosaics: Option<(usize, usize)>,
+    /// Held while the machine is checked, so that a hanging disk blocks only one thread, however often somebody asks.
+    pub(super) look: Arc<Mutex<()>>,
+}
+
+impl Equipment {
+    /// A lens, a calibration and a camera as they were at the start.
+    #[must_use]
+    pub fn new(lens: Option<LensInfo>, calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
+        Self { lens, calibration, mosaics, look: Arc::default() }
+    }
+}

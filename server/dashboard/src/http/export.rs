@@ -1,0 +1,87 @@
+//! Exports for the researcher's browser, and the data dictionary that describes them.
+
+use askama::Template;
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{Html, IntoResponse};
+use serde::Deserialize;
+use tokio::runtime::Handle;
+use utoipa::IntoParams;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::people::Acting;
+use super::roles::Researcher;
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::export::{Export, ExportError, TABLES, TEXTS_IN_CSV, Table, ZipStream, folder_name};
+
+impl From<ExportError> for Error {
+    fn from(error: ExportError) -> Self {
+        let text = error.to_string();
+        match error {
+            ExportError::NoSession { .. } => Self::NotFound(text),
+            ExportError::StillBlinded(_) | ExportError::Withdrawn { .. } => Self::Conflict(text),
+            ExportError::Exists(_) | ExportError::Busy | ExportError::Unwritable { .. } | ExportError::Store(_) => {
+                Self::Storage(text)
+            }
+        }
+    }
+}
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct ExportQuery {
+    /// Whether to include which policy ran in which setting; only after unblinding.
+    #[serde(default)]
+    unblinded: bool,
+}
+
+/// A session's export as one ZIP file: CSV, JSON, a data dictionary, checksums. The same as `parfocal export` writes.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/export.zip", tag = "researcher",
+    params(("session" = SessionId, Path), ExportQuery), responses(
+    (status = 200, description = "The file", content_type = "application/zip"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody)))]
+async fn zip(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(session): Path<SessionId>,
+    Query(query): Query<ExportQuery>,
+) -> Result<impl IntoResponse, Error> {
+    let name = folder_name(session, query.unblinded);
+    let by = by.for_session(&app, session).await?;
+    let export = Export::prepare(&app.conductor.recorder(by), session, query.unblinded).await?;
+    let (zip, bytes) = ZipStream::new(name.clone());
+
+    // On a separate thread: compressing would delay the streams.
+    tokio::task::spawn_blocking(move || {
+        if let Err(error) = Handle::current().block_on(export.into_zip(zip)) {
+            tracing::warn!(%session, %error, "an export was cut off");
+        }
+    });
+
+    let disposition = format!("attachment; filename=\"{name}.zip\"");
+    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
+    Ok((headers, Body::from_stream(bytes)))
+}
+
+#[derive(Template)]
+#[template(path = "dictionary.html")]
+struct Dictionary {
+    tables: &'static [Table],
+    texts: &'static str,
+}
+
+/// The data dictionary: every table and column of an export, with its unit.
+#[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
+async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
+    Dictionary { tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(zip)).routes(routes!(dictionary))
+}

@@ -1,0 +1,63 @@
+//! `/stream.mjpeg`: plain motion JPEG, for programs and for browsers without scripts.
+//!
+//! The headers of the next part are sent directly after each frame. A browser shows a part only when it sees the end of
+//! it, so it would otherwise be a frame late.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use bytes::Bytes;
+use futures_util::{Stream, StreamExt, stream};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::credentials::Pass;
+use super::roles::Roles;
+use super::shutdown::ended;
+use super::tablets;
+use parfocal_imaging::Size;
+
+const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
+const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
+const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
+
+/// The live picture as an endless motion JPEG, one pixel per mosaic cell.
+#[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
+    (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
+    (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
+async fn mjpeg(State(app): State<AppState>, roles: Roles) -> impl IntoResponse {
+    // If the browser's only role comes from a surgeon's link, the stream ends when the link is no longer valid.
+    let pass = roles.pass().filter(|_| roles.is_surgeon_alone());
+    ([(CONTENT_TYPE, KIND)], Body::from_stream(parts(app, pass).map(Ok::<_, std::convert::Infallible>)))
+}
+
+fn parts(app: AppState, pass: Option<Pass>) -> impl Stream<Item = Bytes> {
+    let mut shutdown = app.shutdown.clone();
+    let guard = AppState::clone(&app);
+    let over = async move {
+        match pass {
+            Some(pass) => drop(tablets::no_longer_admitted(&guard, pass).await),
+            None => std::future::pending().await,
+        }
+    };
+    let watcher = app.live.watch(Size::Cell);
+
+    let frames = stream::unfold((app, watcher), async |(app, mut watcher)| {
+        let frame = watcher.next().await?;
+        app.metrics.frames_sent.inc();
+        app.metrics.bytes_sent.inc_by(frame.picture.jpeg.len() as u64);
+        Some((frame.picture.jpeg.clone(), (app, watcher)))
+    });
+
+    let frames = frames.flat_map(|jpeg| stream::iter([jpeg, Bytes::from_static(NEXT_PART)]));
+    stream::iter([Bytes::from_static(FIRST_PART)])
+        .chain(frames)
+        .take_until(async move { ended(&mut shutdown).await })
+        .take_until(over)
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(mjpeg))
+}

@@ -1,0 +1,112 @@
+//! A session's recordings for the researcher's page: the times of their frames, and the frames as pictures.
+
+use axum::Json;
+use axum::extract::{Path, Query, State};
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use serde::Deserialize;
+use utoipa::{IntoParams, ToSchema};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::people::Acting;
+use super::roles::Researcher;
+use parfocal_base::ids::SessionId;
+use parfocal_imaging::Size;
+use parfocal_records::store::Access;
+use parfocal_session::conductor::ConductError;
+use parfocal_session::playback::{PlaybackError, SessionRecordings};
+use parfocal_trial::role::Role;
+
+impl From<PlaybackError> for Error {
+    fn from(error: PlaybackError) -> Self {
+        match error {
+            PlaybackError::Session(error) => error.into(),
+            PlaybackError::NotFound(text) => Self::NotFound(text),
+            PlaybackError::Unreadable(text) => Self::Unreadable(text),
+            PlaybackError::Ending => Self::Unreadable(error.to_string()),
+        }
+    }
+}
+
+/// The recordings of an unblinded session, with the times of their frames. Each access is recorded.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings", tag = "researcher",
+    params(("session" = SessionId, Path)), responses(
+    (status = 200, body = SessionRecordings),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody)))]
+async fn recordings(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(session): Path<SessionId>,
+) -> Result<Json<SessionRecordings>, Error> {
+    let by = by.for_session(&app, session).await?;
+    let found = app.player.recordings(Role::Researcher, session).await?;
+    if !found.recordings.is_empty() {
+        let recorder = app.conductor.recorder(by);
+        recorder.record(&Access::RecordingViewed(session)).await.map_err(ConductError::from)?;
+    }
+    Ok(Json(found))
+}
+
+/// The resolution at which a mosaic is developed.
+#[derive(Debug, Clone, Copy, Default, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+enum PictureSize {
+    /// One pixel per mosaic cell.
+    #[default]
+    Cell,
+    /// Two by two pixels per mosaic cell.
+    Half,
+}
+
+impl From<PictureSize> for Size {
+    fn from(size: PictureSize) -> Self {
+        match size {
+            PictureSize::Cell => Self::Cell,
+            PictureSize::Half => Self::Half,
+        }
+    }
+}
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct PictureQuery {
+    /// The resolution at which mosaics are developed. Pictures of a recording of the view are sent as they were
+    /// recorded.
+    #[serde(default)]
+    #[param(inline)]
+    size: PictureSize,
+}
+
+/// A frame of a recording of an unblinded session. Frames count from 0.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}",
+    tag = "researcher",
+    params(
+        ("session" = SessionId, Path),
+        ("recording" = String, Path, description = "The recording's name"),
+        ("frame" = usize, Path, description = "The frame's place in the recording, from 0"),
+        PictureQuery,
+    ),
+    responses(
+    (status = 200, description = "The picture", content_type = "image/jpeg"),
+    (status = 404, description = "No such session, recording or frame", body = ErrorBody),
+    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody),
+    (status = 500, description = "The frame is damaged", body = ErrorBody)))]
+async fn frame(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path((session, recording, frame)): Path<(SessionId, String, usize)>,
+    Query(query): Query<PictureQuery>,
+) -> Result<impl IntoResponse, Error> {
+    by.for_session(&app, session).await?;
+    let size = query.size.into();
+    let jpeg = app.player.picture(Role::Researcher, session, &recording, frame, size).await?;
+    Ok(([(CONTENT_TYPE, "image/jpeg")], jpeg))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(recordings)).routes(routes!(frame))
+}

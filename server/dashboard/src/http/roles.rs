@@ -1,0 +1,242 @@
+//! Roles: which roles a request holds, and the links that let a browser in.
+//!
+//! A request proves a role by the role's cookie, or by its key as a bearer token (programs). Each role has its own
+//! cookie, so one laptop can be operator and researcher at the same time. Somebody who is signed in also has the roles
+//! of the account. Nothing else proves a role: the address of a request may be only that of a proxy.
+
+use std::sync::Arc;
+
+use axum::extract::{FromRequestParts, Query, State};
+use axum::http::header::SET_COOKIE;
+use axum::http::request::Parts;
+use axum::response::{AppendHeaders, IntoResponse, Redirect};
+use serde::Deserialize;
+use utoipa::IntoParams;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::credentials::{Pass, cookie_name, holds, pass, set_cookie};
+use super::error::{Error, role_name};
+use super::keys::ROLES;
+use super::people::{Acting, Person};
+use super::tablets::admit;
+use super::{App, AppState};
+use parfocal_records::store::Access;
+use parfocal_trial::account::Account;
+use parfocal_trial::role::Role;
+
+/// Lifetime of a role's cookie: it outlives a study day, but not a study.
+const COOKIE_SECONDS: u64 = 30 * 24 * 3600;
+
+/// Proof that the request comes from the surgeon of the session on the screens.
+#[derive(Debug, Clone, Copy)]
+pub struct Surgeon;
+
+/// Proof that the request comes from a surgeon's tablet, whichever session it was let in to: comments and answers are
+/// accepted even after their session has ended.
+#[derive(Debug, Clone, Copy)]
+pub struct SurgeonsTablet;
+
+/// Proof that the request holds the operator's role, with the account if somebody is signed in.
+#[derive(Debug, Clone)]
+pub struct Operator(Option<Account>);
+
+/// Proof that the request holds the researcher's role, with the account if somebody is signed in.
+#[derive(Debug, Clone)]
+pub struct Researcher(Option<Account>);
+
+/// Proof that the request comes from somebody who may read what researchers read. It is for requests that change no
+/// records, whatever their method: monitors may make them too.
+#[derive(Debug, Clone)]
+pub struct ResearchReader(Option<Account>);
+
+/// The roles that the request holds, at least one.
+#[derive(Debug, Clone)]
+pub struct Roles {
+    held: Vec<Role>,
+    /// The surgeon's link that the request holds, if any.
+    pass: Option<Pass>,
+    /// The roles among `held` that are proven by a link.
+    by_link: Vec<Role>,
+}
+
+impl Roles {
+    /// Returns `wanted` if it is held; if nothing is wanted, the held role that may see least.
+    ///
+    /// # Errors
+    /// If `wanted` is not held.
+    pub fn choose(&self, wanted: Option<Role>) -> Result<Role, Error> {
+        match wanted {
+            Some(role) if self.held.contains(&role) => Ok(role),
+            Some(role) => Err(Error::NeedsRole(role)),
+            None => self.held.first().copied().ok_or(Error::NoRole),
+        }
+    }
+
+    /// Whether `role` is held only by an account.
+    pub(super) fn by_account_alone(&self, role: Role) -> bool {
+        !self.by_link.contains(&role)
+    }
+
+    /// Whether the surgeon's is the only role.
+    pub(super) fn is_surgeon_alone(&self) -> bool {
+        self.held == [Role::Surgeon]
+    }
+
+    /// The surgeon's link that the request holds, if any.
+    pub(super) const fn pass(&self) -> Option<Pass> {
+        self.pass
+    }
+}
+
+impl FromRequestParts<AppState> for Surgeon {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        let pass = pass(&parts.headers, &app.keys).ok_or(Error::NeedsRole(Role::Surgeon))?;
+        admit(app, pass).map(|()| Self)
+    }
+}
+
+impl FromRequestParts<AppState> for SurgeonsTablet {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        pass(&parts.headers, &app.keys).map(|_| Self).ok_or(Error::NeedsRole(Role::Surgeon))
+    }
+}
+
+/// The account of a request, if somebody is signed in whose account may make it as `role`.
+fn account_as(parts: &Parts, role: Role) -> Option<Account> {
+    let changes = !parts.method.is_safe();
+    let person = parts.extensions.get::<Person>()?;
+    person.account.role.may_act_as(role, changes).then(|| person.account.clone())
+}
+
+macro_rules! proof {
+    ($proof:ident) => {
+        impl FromRequestParts<AppState> for $proof {
+            type Rejection = Error;
+
+            async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+                let account = account_as(parts, Role::$proof);
+                if account.is_some() || holds(&parts.headers, &app.keys, Role::$proof) {
+                    Ok(Self(account))
+                } else {
+                    Err(Error::NeedsRole(Role::$proof))
+                }
+            }
+        }
+
+        impl Acting for $proof {
+            const ROLE: Role = Role::$proof;
+
+            fn account(&self) -> Option<&Account> {
+                self.0.as_ref()
+            }
+        }
+    };
+}
+
+proof!(Operator);
+proof!(Researcher);
+
+impl FromRequestParts<AppState> for ResearchReader {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        let person = parts.extensions.get::<Person>();
+        let reads = |person: &&Person| person.account.role.may_act_as(Role::Researcher, false);
+        let account = person.filter(reads).map(|person| person.account.clone());
+        if account.is_some() || holds(&parts.headers, &app.keys, Role::Researcher) {
+            Ok(Self(account))
+        } else {
+            Err(Error::NeedsRole(Role::Researcher))
+        }
+    }
+}
+
+impl Acting for ResearchReader {
+    const ROLE: Role = Role::Researcher;
+
+    fn account(&self) -> Option<&Account> {
+        self.0.as_ref()
+    }
+}
+
+impl FromRequestParts<AppState> for Roles {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        let pass = pass(&parts.headers, &app.keys);
+        let admitted = pass.map_or(Err(Error::NoRole), |pass| admit(app, pass));
+        let shown = |role: &Role| match role {
+            Role::Surgeon => admitted.is_ok(),
+            role => holds(&parts.headers, &app.keys, *role) || account_as(parts, *role).is_some(),
+        };
+        let held: Vec<_> = ROLES.into_iter().filter(shown).collect();
+        match admitted {
+            Err(error) if held.is_empty() => Err(error),
+            _ => {
+                let by_link = held.iter().copied().filter(|role| holds(&parts.headers, &app.keys, *role)).collect();
+                Ok(Self { held, pass, by_link })
+            }
+        }
+    }
+}
+
+/// Path of the page of `role`.
+#[must_use]
+pub const fn home(role: Role) -> &'static str {
+    match role {
+        Role::Surgeon => "/surgeon",
+        Role::Operator => "/operator",
+        Role::Researcher => "/researcher",
+        Role::System => "/",
+    }
+}
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct EnterQuery {
+    /// The role's key.
+    key: String,
+}
+
+/// Lets a browser in: takes the key of a role's link, sets the role's cookie and goes to the role's page.
+#[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
+    (status = 303, description = "Let in: the role's cookie, and on to its page"),
+    (status = 403, description = "Not a key of this server, or of a session that has ended",
+     body = super::error::ErrorBody)))]
+async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
+    let key = query.key.trim();
+    let (role, token) = match (app.keys.role_of(key), app.keys.session_of(key)) {
+        (Some(role), _) => (role, app.keys.token(role)),
+        (None, Some(session)) if app.session_goes_on(session) => (Role::Surgeon, app.keys.session_token(session)),
+        (None, Some(_)) => return Err(Error::SessionOver),
+        (None, None) => return Err(Error::WrongKey),
+    };
+    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted());
+
+    // A browser is let in even if the disk is full. Then only the log records it.
+    match app.conductor.recorder(role).record(&Access::Entered).await {
+        Ok(_) => tracing::info!(role = role_name(role), "a browser was let in"),
+        Err(error) => {
+            tracing::error!(role = role_name(role), "a browser was let in and could not be recorded: {error}");
+        }
+    }
+    Ok((AppendHeaders([(SET_COOKIE, cookie)]), Redirect::to(home(role))))
+}
+
+/// The start page: redirects to the page of the role that the browser holds.
+#[utoipa::path(get, path = "/", tag = "roles", responses(
+    (status = 303, description = "On to the role's page"),
+    (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
+async fn start(Roles { held, .. }: Roles) -> Redirect {
+    // Somebody who holds more than one role works here, and is not a participant of the trial.
+    Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(enter)).routes(routes!(start))
+}

@@ -1,0 +1,112 @@
+//! The export of a whole study for the researcher's browser: starts it, reports its progress, and sends the file.
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Path, State};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::IntoResponse;
+use serde::Deserialize;
+use tokio::runtime::Handle;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::people::Acting;
+use super::roles::{ResearchReader, Researcher};
+use parfocal_records::store::export::ZipStream;
+use parfocal_results::study_export::{StudyExportError, StudyExportState, check};
+use parfocal_session::conductor::ConductError;
+
+impl From<StudyExportError> for Error {
+    fn from(error: StudyExportError) -> Self {
+        let text = error.to_string();
+        match error {
+            StudyExportError::NoStudy { .. } => Self::NotFound(text),
+            StudyExportError::NoSession(_) | StudyExportError::StillBlinded(_) => Self::Conflict(text),
+            StudyExportError::Session(error) => error.into(),
+            StudyExportError::Package(_)
+            | StudyExportError::Store(_)
+            | StudyExportError::Unwritable { .. }
+            | StudyExportError::NoRoom { .. }
+            | StudyExportError::Broken => Self::Storage(text),
+        }
+    }
+}
+
+/// What to export.
+#[derive(Debug, Deserialize, ToSchema)]
+struct ExportStudy {
+    /// Whether to include which policy ran in which setting; only after unblinding.
+    #[serde(default)]
+    unblinded: bool,
+}
+
+/// Begins to export all sessions of a study as one package, in the background. If an export is already being made, no
+/// other begins, and the answer gives the progress of that one.
+#[utoipa::path(post, path = "/api/researcher/studies/{study}/export", tag = "researcher",
+    params(("study" = String, Path)), request_body = ExportStudy, responses(
+    (status = 200, body = StudyExportState),
+    (status = 404, description = "No such study", body = ErrorBody),
+    (status = 409, description = "It has no session to export, or is not unblinded", body = ErrorBody)))]
+async fn start_study_export(
+    by: ResearchReader,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+    JsonBody(wanted): JsonBody<ExportStudy>,
+) -> Result<Json<StudyExportState>, Error> {
+    by.personally()?;
+    check(app.conductor.reader(), &study, wanted.unblinded).await?;
+    Ok(Json(app.study_exports.start(app.conductor.recorder(by.actor()), &study, wanted.unblinded)))
+}
+
+/// The state of the latest export of a study. A finished export is kept for an hour, unless a surgeon withdraws or
+/// words are erased.
+#[utoipa::path(get, path = "/api/researcher/studies/{study}/export", tag = "researcher",
+    params(("study" = String, Path)), responses((status = 200, body = StudyExportState)))]
+async fn study_export(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+) -> Result<Json<StudyExportState>, Error> {
+    by.personally()?;
+    let state = app.study_exports.state(app.conductor.reader(), &study).await;
+    Ok(Json(state.map_err(ConductError::from)?))
+}
+
+/// The finished export of a study as one ZIP file: the same as `parfocal export --study` writes.
+#[utoipa::path(get, path = "/api/researcher/studies/{study}/export.zip", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, description = "The file", content_type = "application/zip"),
+    (status = 404, description = "No export of it is finished", body = ErrorBody)))]
+async fn study_export_zip(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+) -> Result<impl IntoResponse, Error> {
+    by.personally()?;
+    let missing = || Error::NotFound("No export of this study is ready. Start one on the study's page.".to_owned());
+    let made = app.study_exports.made(app.conductor.reader(), &study).await.map_err(ConductError::from)?;
+    let made = made.ok_or_else(missing)?;
+
+    let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
+    let (zip, bytes) = ZipStream::new(name.clone());
+
+    // On a separate thread: compressing would delay the streams.
+    tokio::task::spawn_blocking(move || {
+        // This holds `made`, so its files stay until all of them are sent.
+        if let Err(error) = Handle::current().block_on(zip.send_folder(&made.folder)) {
+            tracing::warn!(%study, %error, "the download of a study's export was cut off");
+        }
+    });
+
+    let disposition = format!("attachment; filename=\"{name}.zip\"");
+    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
+    Ok((headers, Body::from_stream(bytes)))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(study_export, start_study_export)).routes(routes!(study_export_zip))
+}

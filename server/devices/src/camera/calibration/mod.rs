@@ -1,0 +1,189 @@
+//! Calibrations in files: TOML, with 16-bit pictures beside it for references per pixel.
+
+pub mod tables;
+
+use std::fs;
+use std::io::{Cursor, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use image::{ImageBuffer, ImageFormat, Luma};
+
+use parfocal_base::files::replace;
+use parfocal_imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
+
+/// Why a calibration, or a maker's table, cannot be used or saved. The message names the file, and says what to do.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct CalibrationFault(String);
+
+impl From<String> for CalibrationFault {
+    fn from(message: String) -> Self {
+        Self(message)
+    }
+}
+
+/// Name of the current calibration in its folder. Earlier ones stay beside it, by their version.
+const CURRENT: &str = "calibration.toml";
+
+/// Bits of a camera's samples, whatever its pixel format.
+const CAMERA_BITS: u8 = 10;
+
+/// Reads the calibration in the file `path`, or the current one of the folder `path`.
+///
+/// # Errors
+/// If it cannot be read, or is invalid.
+pub fn read(path: &Path) -> Result<Calibration, CalibrationFault> {
+    let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
+    let text = fs::read_to_string(&path)
+        .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
+
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let calibration = Calibration::from_toml_with(&text, |name| picture(folder, name));
+    Ok(calibration.map_err(|error| format!("calibration {}, {error}", path.display()))?)
+}
+
+/// The calibration of `path` if one is given, else that of a typical unit.
+///
+/// # Errors
+/// If it cannot be read, or is invalid.
+pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, CalibrationFault> {
+    path.map_or_else(|| Ok(Calibration::default()), read)
+}
+
+/// Refuses a calibration whose references per pixel do not fit frames of `size`. `of` names the frames in the message.
+///
+/// # Errors
+/// If they do not fit.
+pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
+    match (calibration.size(), size) {
+        (Some(taken), Some(size)) if taken != size => Err(format!(
+            "the calibration {} was taken at {}x{}, but {of} is {}x{}: take new references with \
+             `parfocal calibrate`, or set the camera to the size of the references",
+            calibration.title(),
+            taken.0,
+            taken.1,
+            size.0,
+            size.1
+        )
+        .into()),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a calibration that does not fit, in size or in scale, a camera with mosaics of `size` (`None` if it delivers
+/// no mosaics).
+///
+/// # Errors
+/// If it does not fit.
+pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
+    check_size(calibration, "the camera's picture", size)?;
+    if size.is_some() { check_scale(calibration) } else { Ok(()) }
+}
+
+/// Refuses a calibration whose bit depth is not that of the cameras' samples.
+///
+/// # Errors
+/// If it does not fit.
+pub fn check_scale(calibration: &Calibration) -> Result<(), CalibrationFault> {
+    if calibration.bit_depth != CAMERA_BITS {
+        return Err(format!(
+            "the calibration {} is for samples of {} bit, but parfocal converts every camera to {CAMERA_BITS} bit: \
+             give dark and white on that scale, and `bit_depth = {CAMERA_BITS}`",
+            calibration.title(),
+            calibration.bit_depth
+        )
+        .into());
+    }
+
+    Ok(())
+}
+
+fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
+    let path = folder.join(name);
+    let bytes = fs::read(&path).map_err(|error| format!("cannot read the picture {}: {error}", path.display()))?;
+    match decode(&bytes, true) {
+        Ok(Picture::Mosaic(frame)) => Ok(frame),
+        Ok(_) => Err(format!("{name} is not a 16-bit gray picture")),
+        Err(error) => Err(format!("{name}: {error}")),
+    }
+}
+
+/// The calibration that a new version in `folder` builds on: the current one, or a typical unit's
+/// if there is none yet.
+///
+/// # Errors
+/// If it cannot be read, or if it is missing while earlier versions are still there: a new one would take their names.
+pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
+    if folder.join(CURRENT).exists() {
+        return read(folder);
+    }
+
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let number = |name: &String| name.strip_prefix("calibration-")?.strip_suffix(".toml")?.parse::<u32>().ok();
+    let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(Calibration::default()) };
+
+    Err(format!(
+        "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, \
+         or give another folder",
+        folder.display()
+    )
+    .into())
+}
+
+/// Saves `calibration` in `folder` as the current one; the previous one stays there under its version's name. `changed`
+/// names the references that are new. Returns the file's path.
+///
+/// # Errors
+/// If the folder cannot be written.
+pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, CalibrationFault> {
+    let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
+    fs::create_dir_all(folder).map_err(failed)?;
+
+    let current = folder.join(CURRENT);
+    let before = match fs::read_to_string(&current) {
+        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+        before => before.map_err(failed)?,
+    };
+
+    let mut names = ["dark", "white"].map(|key| named(&before, key));
+    let references = [("dark", &calibration.dark), ("white", &calibration.white)];
+    for ((key, reference), name) in references.into_iter().zip(&mut names) {
+        if let Reference::PerPixel(frame) = reference
+            && (changed.contains(&key) || name.is_empty())
+        {
+            *name = format!("{key}-{}.tiff", calibration.version);
+            write_picture(&folder.join(name.as_str()), frame)?;
+        }
+    }
+
+    let text = calibration.to_toml(&names[0], &names[1]);
+
+    // The earlier calibration is kept under its version before the new one takes its place.
+    if !before.is_empty() {
+        let version = named(&before, "version");
+        replace(&folder.join(format!("calibration-{version}.toml")), before.as_bytes()).map_err(failed)?;
+    }
+
+    replace(&current, text.as_bytes()).map_err(failed)?;
+    Ok(current)
+}
+
+/// The text that `key` has in a calibration's TOML; empty if it has none.
+fn named(toml: &str, key: &str) -> String {
+    let table: toml::Table = toml::from_str(toml).unwrap_or_default();
+    table.get(key).and_then(toml::Value::as_str).unwrap_or_default().to_owned()
+}
+
+fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), CalibrationFault> {
+    let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
+    let size = |side: usize| u32::try_from(side).map_err(|_| failed(&"it is too large"));
+
+    let picture: Option<ImageBuffer<Luma<u16>, _>> =
+        ImageBuffer::from_raw(size(frame.width())?, size(frame.height())?, frame.samples());
+    let picture = picture.ok_or_else(|| failed(&"its size is wrong"))?;
+
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Tiff).map_err(|error| failed(&error))?;
+    Ok(replace(path, bytes.get_ref()).map_err(|error| failed(&error))?)
+}

@@ -1,0 +1,126 @@
+//! Videos, decoded by the `ffmpeg` program.
+
+use std::ffi::OsString;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use super::pnm::next_pnm;
+use parfocal_imaging::RgbImage;
+
+/// Why footage cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FootageError {
+    /// The file or folder does not exist, or may not be read.
+    #[error("cannot read {}: {reason}", path.display())]
+    Unreadable {
+        /// The file or folder.
+        path: PathBuf,
+        /// The reason, in words.
+        reason: String,
+    },
+    /// The decoder is missing.
+    #[error("cannot start `ffmpeg`, which decodes videos ({0}); install it, on Debian with `apt install ffmpeg`")]
+    NoDecoder(std::io::Error),
+    /// The folder holds no pictures.
+    #[error("there is no picture (PNG, JPEG or TIFF) in {}", .0.display())]
+    Empty(PathBuf),
+    /// The pictures are too small to hold a patch and a window that moves.
+    #[error("{} is {width}x{height} pixels, but at least {least}x{least} are needed", path.display())]
+    TooSmall {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Least width and height.
+        least: usize,
+    },
+}
+
+impl FootageError {
+    /// The picture or video `path` cannot be read, for `reason`.
+    #[must_use]
+    pub fn unreadable(path: &Path, reason: impl std::fmt::Display) -> Self {
+        Self::Unreadable { path: path.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// The pictures of a video in order of time, as an iterator; a damaged video ends where the damage begins.
+#[derive(Debug)]
+pub struct Video {
+    decoder: Child,
+    pictures: BufReader<ChildStdout>,
+}
+
+impl Video {
+    /// Starts decoding `path` at `fps` pictures a second, each scaled down to at most `width` x `height` pixels, with
+    /// its aspect ratio kept.
+    ///
+    /// # Errors
+    /// If the file or the decoder is missing, or the file holds no video.
+    pub fn open(path: &Path, fps: u32, width: usize, height: usize) -> Result<Self, FootageError> {
+        check(path)?;
+        let scale = format!(
+            "fps={fps},scale='min({width},iw)':'min({height},ih)':force_original_aspect_ratio=decrease:flags=area"
+        );
+
+        let mut decoder = ffmpeg(path)
+            .args(["-an", "-vf", &scale, "-f", "image2pipe", "-c:v", "ppm", "-"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(FootageError::NoDecoder)?;
+
+        let Some(pictures) = decoder.stdout.take() else {
+            return Err(FootageError::unreadable(path, "ffmpeg gives no output"));
+        };
+
+        Ok(Self { decoder, pictures: BufReader::with_capacity(1 << 20, pictures) })
+    }
+}
+
+impl Iterator for Video {
+    type Item = RgbImage;
+
+    fn next(&mut self) -> Option<RgbImage> {
+        let picture = next_pnm(&mut self.pictures).ok().flatten()?.into_rgb8();
+        let (width, height) = picture.dimensions();
+        RgbImage::new(width as usize, height as usize, picture.into_raw()).ok()
+    }
+}
+
+impl Drop for Video {
+    fn drop(&mut self) {
+        // These fail only if the decoder has already ended by itself.
+        let _ = self.decoder.kill();
+        let _ = self.decoder.wait();
+    }
+}
+
+/// Decodes one picture and drops it, to learn whether the decoder can read the file.
+fn check(path: &Path) -> Result<(), FootageError> {
+    std::fs::File::open(path).map_err(|error| FootageError::unreadable(path, error))?;
+    let tried = ffmpeg(path).args(["-an", "-frames:v", "1", "-f", "null", "-"]).output();
+    let tried = tried.map_err(FootageError::NoDecoder)?;
+    if tried.status.success() {
+        return Ok(());
+    }
+
+    let told = String::from_utf8_lossy(&tried.stderr);
+    let last = told.lines().last().unwrap_or("no reason given");
+    Err(FootageError::unreadable(path, format!("ffmpeg finds no video in it ({last})")))
+}
+
+/// The decoder with the file at `path` as its input; the caller adds what to do with it.
+#[must_use]
+pub fn ffmpeg(path: &Path) -> Command {
+    // The decoder would treat anything before a colon in a bare name as a protocol.
+    let mut name = OsString::from("file:");
+    name.push(path);
+
+    let mut command = Command::new("ffmpeg");
+    command.args(["-v", "error", "-nostdin", "-i"]).arg(name).stdin(Stdio::null());
+    command
+}

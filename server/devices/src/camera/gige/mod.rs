@@ -1,0 +1,142 @@
+//! GigE Vision and USB3 Vision cameras, through Aravis.
+//!
+//! A thread of its own talks to the camera: it unpacks each frame to the sensor's mosaic, leaves the latest for
+//! [`Camera::next_frame`], and looks for the camera again when it is lost.
+
+mod device;
+mod numbers;
+mod pixels;
+mod session;
+mod shared;
+mod timestamps;
+mod worker;
+
+use std::sync::{Arc, OnceLock, mpsc};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ::aravis::Aravis;
+
+use self::device::{Device, Setup};
+use self::shared::Shared;
+use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
+use parfocal_base::clock::Moment;
+use parfocal_base::priority::Place;
+
+/// A machine vision camera.
+pub struct GigeCamera {
+    size: (usize, usize),
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl GigeCamera {
+    /// Connects to the camera `source`: an identity as [`list`] gives it, or an address; with options
+    /// `format` (a pixel format), `width`, `height`, `packet` (bytes, instead of negotiating), `exposure`
+    /// (microseconds), `gain`. With `list` as the source, the error lists the cameras that answer.
+    ///
+    /// # Errors
+    /// [`CameraError::BadSource`], with the reason, if it cannot be used right now. It recovers from later failures by
+    /// itself.
+    pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
+        let setup = Setup::parse(source, settings.fps)?;
+        if setup.id == "list" {
+            return Err(CameraError::BadSource(listing()));
+        }
+
+        let (tell, told) = mpsc::channel();
+        let thread = std::thread::Builder::new()
+            .name("gige".into())
+            .spawn(move || {
+                // Opened here, so that Aravis's thread that receives packets inherits the priority.
+                parfocal_base::priority::raise_with_children(Place::Wire);
+                match Device::open(&setup) {
+                    Ok(device) => {
+                        let shared = Arc::new(Shared::new(settings.clock, &device));
+                        let _ = tell.send(Ok(((device.width, device.height), Arc::clone(&shared))));
+                        worker::run(&shared, &setup, device);
+                    }
+                    Err(error) => {
+                        let _ = tell.send(Err(format!("{}: {error}; {}", setup.id, listing())));
+                    }
+                }
+            })
+            .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
+
+        let opened = told.recv().unwrap_or_else(|_| Err("the camera's thread ended at once".to_owned()));
+        let (size, shared) = opened.map_err(CameraError::BadSource)?;
+        Ok(Self { size, shared, thread: Some(thread) })
+    }
+
+    /// When the last packet of the latest frame from [`Camera::next_frame`] had arrived. The time of the transfer,
+    /// which depends on the link, ends here. For measurements.
+    #[must_use]
+    pub fn whole_at(&self) -> Option<Moment> {
+        self.shared.whole_at()
+    }
+}
+
+impl Camera for GigeCamera {
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        self.shared.next_frame(timeout)
+    }
+
+    fn health(&self) -> CameraHealth {
+        self.shared.health()
+    }
+
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        Some(self.size)
+    }
+
+    fn controls(&self) -> Option<Controls> {
+        Some(self.shared.controls.clone())
+    }
+}
+
+impl Drop for GigeCamera {
+    fn drop(&mut self) {
+        // A thread that is looking for a lost camera ends by itself within seconds, so there is no need to wait for it.
+        let streaming = self.shared.stop();
+        if let Some(thread) = self.thread.take().filter(|_| streaming) {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A camera that can be opened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundCamera {
+    /// Identity, by which it can be opened.
+    pub id: String,
+    /// Maker and model.
+    pub model: String,
+    /// Network address or USB port.
+    pub address: String,
+}
+
+/// Every camera that answers, on every network interface and USB port. Takes about a second.
+#[must_use]
+pub fn list() -> Vec<FoundCamera> {
+    static ARAVIS: OnceLock<Option<std::sync::Mutex<Aravis>>> = OnceLock::new();
+    let aravis = ARAVIS.get_or_init(|| Aravis::initialize().ok().map(std::sync::Mutex::new));
+    let Some(aravis) = aravis else { return Vec::new() };
+    let devices = aravis.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_device_list();
+
+    let found = devices.into_iter().map(|device| FoundCamera {
+        id: device.id.to_string_lossy().into_owned(),
+        model: format!("{} {}", device.vendor.to_string_lossy(), device.model.to_string_lossy()),
+        address: device.address.to_string_lossy().into_owned(),
+    });
+    found.collect()
+}
+
+fn listing() -> String {
+    let found = list();
+    if found.is_empty() {
+        return "no camera answers: check power, cable and the network interface's address".into();
+    }
+
+    let one = |found: &FoundCamera| format!("gige:{} ({} at {})", found.id, found.model, found.address);
+    format!("cameras that answer: {}", found.iter().map(one).collect::<Vec<_>>().join(", "))
+}

@@ -1,0 +1,193 @@
+//! Streaming from a camera until it is lost: unpacks frames, counts lost ones, changes settings.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ::aravis::Buffer;
+
+use super::device::{Arrival, Device};
+use super::numbers::steps;
+use super::shared::{Shared, words};
+use super::timestamps::{Timestamps, arrival};
+use crate::camera::{Frame, FrameImage, MosaicPool, Setting};
+use parfocal_imaging::MosaicFrame;
+
+/// The thread checks for requests at least this often.
+const LOOK: Duration = Duration::from_millis(50);
+/// A camera that sends nothing for this long, beyond its exposure, counts as lost. A slow one may take the time of
+/// three frames.
+const SILENCE: Duration = Duration::from_millis(1500);
+
+/// Streaming from a camera until it is lost.
+pub(super) struct Session<'a> {
+    shared: &'a Shared,
+    device: Device,
+    /// Our number of the latest frame.
+    number: &'a mut u64,
+    /// The latest change of each setting. They are made again when a lost camera comes back, because it has forgotten
+    /// them.
+    changes: &'a mut Vec<(Setting, f64)>,
+    /// The camera's number of the latest frame.
+    seen: Option<u64>,
+    /// Exposure time of the camera; zero if it does not report it.
+    exposure: Duration,
+    /// Time between frames; zero if the camera does not report it.
+    period: Duration,
+    /// Whether only incomplete frames come.
+    torn: bool,
+    pool: MosaicPool,
+    timestamps: Timestamps,
+}
+
+impl<'a> Session<'a> {
+    /// Prepares streaming from `device`. Our frame numbers continue from `number`, and the earlier `changes` of
+    /// settings are made again.
+    pub fn new(shared: &'a Shared, device: Device, number: &'a mut u64, changes: &'a mut Vec<(Setting, f64)>) -> Self {
+        let pool = MosaicPool::new(device.width, device.height);
+        let mut session = Self {
+            shared,
+            device,
+            number,
+            changes,
+            seen: None,
+            exposure: Duration::ZERO,
+            period: Duration::ZERO,
+            torn: false,
+            pool,
+            timestamps: Timestamps::default(),
+        };
+
+        for (setting, value) in session.changes.clone() {
+            session.change(setting, value);
+        }
+
+        session.offer();
+        session
+    }
+
+    /// Streams until the camera is lost or the thread should end; returns the reason.
+    pub fn stream(mut self) -> String {
+        let mut last = self.shared.clock.now();
+        let mut whole = last;
+        while !self.shared.stopping() {
+            self.change_settings();
+
+            match self.device.wait(LOOK) {
+                Arrival::Whole(buffer) => {
+                    last = self.shared.clock.now();
+                    whole = last;
+                    self.tell_torn(false);
+                    self.deliver(&buffer);
+                    self.device.give_back(buffer);
+                }
+                Arrival::Incomplete(number) => {
+                    last = self.shared.clock.now();
+                    self.count(number);
+                    self.shared.lose(1);
+                    self.tell_torn(last.since(whole) > self.silence());
+                }
+                Arrival::Nothing if self.shared.clock.now().since(last) > self.silence() => {
+                    return "the camera sends no frames: check its power, cable and trigger".into();
+                }
+                Arrival::Nothing => {}
+            }
+
+            if self.device.is_lost() {
+                return "the camera is gone: check its power and cable".into();
+            }
+        }
+
+        "closed".into()
+    }
+
+    /// How long a working camera may send nothing.
+    fn silence(&self) -> Duration {
+        SILENCE.max(3 * self.period) + self.exposure
+    }
+
+    /// Reports when every frame that comes is incomplete, and when that is over.
+    fn tell_torn(&mut self, torn: bool) {
+        if torn != self.torn {
+            self.torn = torn;
+            let words = words(&self.device);
+            let why = "; every frame arrives with parts missing: larger packets, a larger receive buffer, or fewer \
+                       frames a second";
+            self.shared.set_condition(Ok(if torn { Arc::from(format!("{words}{why}")) } else { words }));
+        }
+    }
+
+    fn deliver(&mut self, buffer: &Buffer) {
+        let arrived = arrival(buffer.system_timestamp(), self.shared.clock.as_ref());
+        let now = self.shared.clock.now();
+
+        self.count(buffer.frame_id());
+        let exposed_at = self.timestamps.moment(buffer.timestamp(), arrived);
+
+        match self.mosaic(&buffer.image_data()) {
+            Some(mosaic) => {
+                let number = *self.number;
+                let exposure = self.exposure;
+                let image = FrameImage::Mosaic(mosaic);
+                self.shared.deliver(Frame { number, exposed_at, exposure, image, truth: None }, now);
+            }
+            None => self.shared.lose(1),
+        }
+    }
+
+    /// The mosaic of a frame's `bytes`; `None` if there are too few.
+    fn mosaic(&mut self, bytes: &[u8]) -> Option<Arc<MosaicFrame>> {
+        let Device { width, height, format, .. } = self.device;
+        let bytes = bytes.get(..format.bytes(width * height))?;
+
+        let mut samples = self.pool.blank();
+        format.unpack(bytes, &mut samples);
+        self.pool.frame(samples).ok()
+    }
+
+    /// Advances our number as far as the camera's; gaps are frames lost.
+    fn count(&mut self, camera_number: u64) {
+        let steps = steps(self.seen, camera_number);
+        *self.number += steps;
+        self.shared.lose(steps - 1);
+        self.seen = Some(camera_number);
+    }
+
+    fn change_settings(&mut self) {
+        let wanted = self.shared.controls.take();
+        if wanted.is_empty() {
+            return;
+        }
+        for (setting, value) in wanted {
+            self.change(setting, value);
+        }
+        self.offer();
+    }
+
+    fn change(&mut self, setting: Setting, value: f64) {
+        self.changes.retain(|(known, _)| *known != setting);
+        match self.device.change(setting, value) {
+            Ok(()) => self.changes.push((setting, value)),
+            Err(error) => {
+                tracing::warn!(?setting, value, %error, "the camera refused a setting");
+                self.shared.controls.refuse(setting, &error.to_string());
+            }
+        }
+    }
+
+    /// Publishes what can be changed, and notes the camera's exposure time.
+    fn offer(&mut self) {
+        let offers = self.device.offers();
+        let value = |setting| offers.iter().find(|one| one.setting == setting).map(|one| one.value);
+        let seconds = |value: f64| Duration::from_secs_f64(value.clamp(0.0, 1000.0));
+
+        let exposure = value(Setting::Exposure).map_or(Duration::ZERO, |micros| seconds(micros / 1e6));
+        self.period =
+            value(Setting::FrameRate).filter(|&rate| rate > 0.0).map_or(Duration::ZERO, |rate| seconds(1.0 / rate));
+
+        if exposure != self.exposure {
+            self.timestamps.forget();
+        }
+        self.exposure = exposure;
+        self.shared.controls.offer(offers);
+    }
+}

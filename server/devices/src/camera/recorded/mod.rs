@@ -1,0 +1,247 @@
+//! Recorded focal-time scans on disk: at each pose of the camera, one picture for each of several focal powers.
+//! `docs/scans.md` describes the format for others.
+
+mod folder;
+mod player;
+mod writing;
+
+pub use folder::{Damage, ScanFolder};
+pub use player::open as play;
+pub use writing::{Recording, Shot};
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use parfocal_base::FocalPower;
+use parfocal_imaging::{DecodeError, PATCH_SIDE, PatchArea};
+
+/// Name of the file that says what was to be recorded.
+pub const HEADER: &str = "scan.json";
+/// Name of the file that gets a line for each pose once the pose's pictures are stored.
+pub const POSES: &str = "poses.jsonl";
+/// Value of [`Header::format`].
+pub const FORMAT: &str = "parfocal-scan";
+/// Value of [`Header::version`].
+pub const VERSION: u32 = 1;
+/// Most poses of a scan: over an hour at 25 a second.
+pub const MOST_POSES: usize = 100_000;
+/// Least width and height of a picture, pixels.
+pub const LEAST_SIDE: usize = 64;
+
+/// The plan of a scan: what to record, and with which devices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Always [`FORMAT`].
+    pub format: String,
+    /// Always [`VERSION`].
+    pub version: u32,
+    /// The program that began it, and its version.
+    pub software: String,
+    /// Name of the camera, for people.
+    pub camera: String,
+    /// Name of the lens, for people, if one is known.
+    pub lens: Option<String>,
+    /// Whether the pictures are not of the real world.
+    pub simulated: bool,
+    /// Name and version of the sensor's calibration, if the pictures were made with one.
+    pub calibration: Option<String>,
+    /// Seed of everything drawn at random: the order of focal powers, and all of a simulation.
+    pub seed: u64,
+    /// In which order each pose's focal powers were taken.
+    pub order: Order,
+    /// Number of poses in the complete scan.
+    pub poses: usize,
+    /// The focal powers of each pose, in rising order.
+    pub focal_powers: Vec<FocalPower>,
+}
+
+/// In which order each pose's focal powers were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// The order of [`Pose::images`], drawn anew for each pose.
+    Random,
+    /// The order was not noted.
+    Unknown,
+}
+
+/// One pose as it is stored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// Its number, from 1.
+    pub pose: usize,
+    /// Width of its pictures, pixels.
+    pub width: usize,
+    /// Height of its pictures, pixels.
+    pub height: usize,
+    /// Upper left corner of the 32x32 patch at the centre of the content area, pixels from the left and from the top.
+    pub patch: (usize, usize),
+    /// The focal power of the stack at which the patch has the greatest mean gradient magnitude.
+    pub optimum: FocalPower,
+    /// The best focal power; `None` unless a simulation knows it.
+    pub truth: Option<FocalPower>,
+    /// Its pictures in the order in which they were taken.
+    pub images: Vec<Image>,
+}
+
+impl Pose {
+    /// The patch's place and size.
+    #[must_use]
+    pub const fn patch_area(&self) -> PatchArea {
+        PatchArea { x: self.patch.0, y: self.patch.1, width: PATCH_SIDE, height: PATCH_SIDE }
+    }
+}
+
+/// One stored picture: 8-bit gray PNG.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    /// Focal power it was taken at.
+    pub focal_power: FocalPower,
+    /// Its file, relative to the scan's folder.
+    pub file: String,
+    /// SHA-256 of the file, in hexadecimal.
+    pub sha256: String,
+}
+
+/// Why a scan cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanError {
+    /// There is no scan there.
+    #[error("{} is not a recorded scan: it has no {HEADER}", .0.display())]
+    NoScan(PathBuf),
+    /// A file cannot be read.
+    #[error("cannot read {}: {error}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The error.
+        error: io::Error,
+    },
+    /// The description of the scan is invalid.
+    #[error("{} does not describe a scan: {reason}", path.display())]
+    Nonsense {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Poses have not been recorded yet.
+    #[error("the scan {} is not complete: {} of {of} {} missing; run the command that began it again to continue",
+        path.display(), poses(missing), if missing.len() == 1 { "is" } else { "are" })]
+    Missing {
+        /// The scan's folder.
+        path: PathBuf,
+        /// Numbers of the missing poses.
+        missing: Vec<usize>,
+        /// Number of poses it should have.
+        of: usize,
+    },
+    /// A picture is not the one that was stored.
+    #[error(
+        "{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again",
+        .0.display()
+    )]
+    Checksum(PathBuf),
+    /// A picture cannot be decoded.
+    #[error("{}: {error}", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// The error.
+        error: DecodeError,
+    },
+    /// The folder holds something else.
+    #[error("{} is not empty and is not a scan; choose a new folder", .0.display())]
+    Occupied(PathBuf),
+    /// The folder holds a scan that was begun with other arguments.
+    #[error(
+        "{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder",
+        path.display()
+    )]
+    Other {
+        /// The folder.
+        path: PathBuf,
+        /// The difference, in words.
+        difference: String,
+    },
+    /// Another process records there.
+    #[error("another parfocal is recording into {}", .0.display())]
+    Busy(PathBuf),
+    /// The disk is full.
+    #[error("no space is left on the disk of {}: {kept} poses are saved; free some space and run the same command \
+        again to continue", path.display())]
+    Full {
+        /// The folder.
+        path: PathBuf,
+        /// Poses that are stored.
+        kept: usize,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {error}", path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// The error.
+        error: io::Error,
+    },
+}
+
+impl ScanError {
+    fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |error| Self::Unreadable { path, error }
+    }
+
+    fn nonsense(path: &Path, reason: impl std::fmt::Display) -> Self {
+        Self::Nonsense { path: path.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// Poses for people: `pose 3`, `poses 3, 7 to 9`.
+#[must_use]
+pub fn poses(of: &[usize]) -> String {
+    format!("{} {}", if of.len() == 1 { "pose" } else { "poses" }, numbers(of))
+}
+
+/// Numbers for people: `3, 7 to 9, 12`, at most a handful of them.
+fn numbers(of: &[usize]) -> String {
+    const MOST: usize = 6;
+
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &number in of {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == number => *last = number,
+            _ => runs.push((number, number)),
+        }
+    }
+
+    let name = |&(first, last): &(usize, usize)| match last - first {
+        0 => first.to_string(),
+        1 => format!("{first}, {last}"),
+        _ => format!("{first} to {last}"),
+    };
+
+    let more = runs.len().saturating_sub(MOST);
+    let named: Vec<_> = runs.iter().take(MOST).map(name).collect();
+    let rest = if more == 0 { String::new() } else { format!(" and {more} more") };
+
+    named.join(", ") + &rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_listed_as_ranges() {
+        assert_eq!(poses(&[3]), "pose 3");
+        assert_eq!(poses(&[3, 4]), "poses 3, 4");
+        assert_eq!(numbers(&[1, 2, 3, 7, 9, 10]), "1 to 3, 7, 9, 10");
+        assert_eq!(numbers(&[1, 3, 5, 7, 9, 11, 13]), "1, 3, 5, 7, 9, 11 and 1 more");
+    }
+}

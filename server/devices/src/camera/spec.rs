@@ -1,0 +1,54 @@
+//! From `--camera SPEC` to a camera.
+
+use std::path::{Path, PathBuf};
+
+use super::phantom::{PhantomCamera, PhantomScene};
+use super::{Camera, CameraError, CameraSettings, footage, recorded, replay};
+use parfocal_recording::CALIBRATION;
+
+/// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a
+/// white tile), `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder
+/// of images, `scan:DIR` with a recorded scan, `recording:DIR` with a hyperspectral recording, or `gige:ID`.
+///
+/// # Errors
+/// [`CameraError::BadSource`] if the camera is unknown, or its source cannot be used.
+pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
+    match spec.split_once(':') {
+        None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
+        Some(("phantom", name)) if PhantomScene::named(name).is_some() => {
+            Ok(Box::new(PhantomCamera::looking(PhantomScene::named(name).unwrap_or(PhantomScene::Hand), settings)))
+        }
+        Some(("footage", path)) if !path.is_empty() => match footage::open(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
+        Some(("scan", path)) if !path.is_empty() => match recorded::play(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
+        Some(("recording", path)) if !path.is_empty() => match replay::open(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
+        #[cfg(feature = "aravis")]
+        Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
+        #[cfg(not(feature = "aravis"))]
+        Some(("gige", _)) => Err(CameraError::BadSource(
+            "this build has no GigE Vision: install libaravis-dev and libusb-1.0-0-dev, then build with \
+             `--features aravis`"
+                .into(),
+        )),
+        _ => Err(CameraError::BadSource(format!(
+            "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and \
+             `phantom:dark` to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), \
+             `scan:DIR` (a recorded scan), `recording:DIR` (a hyperspectral recording) or `gige:ID` (`gige:list` lists \
+             them)"
+        ))),
+    }
+}
+
+/// The calibration that comes with the camera `spec`: a recording's own. `None` for all other cameras.
+#[must_use]
+pub fn own_calibration(spec: &str) -> Option<PathBuf> {
+    spec.strip_prefix("recording:").filter(|path| !path.is_empty()).map(|path| Path::new(path).join(CALIBRATION))
+}

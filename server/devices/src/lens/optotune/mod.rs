@@ -1,0 +1,201 @@
+//! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
+//!
+//! The caller's side only touches memory; a separate thread talks to the port. When the lens is dropped, that thread
+//! puts the driver into current mode at 0 mA, unless [`Settings::keep`] is set. The lens then relaxes to its resting
+//! focal power and does not warm up. [`let_go_of_all`] does the same before a process ends in another way. Only
+//! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
+
+pub mod codec;
+mod handshake;
+mod link;
+mod port;
+mod range;
+mod shared;
+mod status;
+mod trouble;
+mod worker;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+pub use handshake::Settings;
+use shared::Shared;
+
+use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::Clock;
+use parfocal_base::options::Options;
+use parfocal_base::priority::{self, Place};
+
+/// The simulated lens's figures, used until the lens is measured on the bench.
+const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
+
+/// Prefix of the serial numbers of emulated units (see [`super::emulator`]), which have no real lens.
+const EMULATED: &str = "EMUL";
+
+/// Longest wait for a device to identify itself. Long enough for a bad line with many repetitions.
+const CONNECT: Duration = Duration::from_secs(4);
+/// Longest wait for an answer.
+const ANSWER: Duration = Duration::from_millis(900);
+
+/// Longest wait for the driver's thread to remove the lens's current. With a silent driver it tries three times on the
+/// open connection, and three times on a new one.
+const LETTING_GO: Duration = Duration::from_secs(3);
+
+/// The open lenses. However the process ends, they must not be left under current.
+static OPEN: Mutex<Vec<Weak<Shared>>> = Mutex::new(Vec::new());
+
+/// Removes the current of every open lens, except of those that must stay where they are, and waits until that is done.
+/// The lenses accept no more commands.
+pub fn let_go_of_all() {
+    let open: Vec<_> = {
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        open.drain(..).filter_map(|shared| shared.upgrade()).collect()
+    };
+
+    // All are told before any is waited for, so that they do it at the same time.
+    for shared in &open {
+        shared.end();
+    }
+    for shared in &open {
+        shared.wait_ended(LETTING_GO);
+    }
+}
+
+/// A lens at a serial port.
+pub struct OptotuneLens {
+    shared: Arc<Shared>,
+    name: Arc<str>,
+    thread: Option<JoinHandle<()>>,
+    emulated: bool,
+}
+
+impl OptotuneLens {
+    /// Connects to the driver at `path`.
+    ///
+    /// # Errors
+    /// If the lens cannot be used right now. The error says why and what to do. The lens recovers from later failures
+    /// by itself.
+    pub fn connect(path: &Path, settings: Settings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+        let response = Arc::new(Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE));
+        let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
+        let shared = Arc::new(Shared::new(clock, response).map_err(system)?);
+
+        let theirs = shared.clone();
+        let path_of_thread = path.to_owned();
+        OPEN.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::downgrade(&shared));
+        let thread = std::thread::Builder::new()
+            .name("lens".into())
+            .spawn(move || {
+                priority::raise(Place::Wire);
+                worker::run(&theirs, &path_of_thread, &settings);
+                theirs.ended();
+            })
+            .map_err(system)?;
+
+        let mut lens = Self {
+            shared,
+            name: format!("Optotune lens at {}", path.display()).into(),
+            thread: Some(thread),
+            emulated: false,
+        };
+
+        lens.emulated = lens.shared.wait_connected(CONNECT)?.serial.starts_with(EMULATED);
+        Ok(lens)
+    }
+
+    /// Opens the lens of a specification. `device` is a path, or `auto` for the one driver that is plugged in. Options
+    /// are `min` and `max`, the dioptres to use, and `low` and `high`, the temperature limits in °C.
+    pub(super) fn open(
+        device: &str,
+        mut options: Options,
+        keep: bool,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self, LensError> {
+        let (low, high) = Settings::default().temperatures;
+        let settings = Settings {
+            min_dioptre: options.take("min")?,
+            max_dioptre: options.take("max")?,
+            temperatures: (options.take("low")?.unwrap_or(low), options.take("high")?.unwrap_or(high)),
+            keep,
+        };
+
+        options.finish()?;
+
+        let path = if device == "auto" { port::find(Path::new(port::BY_ID))? } else { PathBuf::from(device) };
+        Self::connect(&path, settings, clock)
+    }
+}
+
+impl Drop for OptotuneLens {
+    fn drop(&mut self) {
+        self.shared.end();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        open.retain(|shared| !std::ptr::eq(shared.as_ptr(), Arc::as_ptr(&self.shared)));
+    }
+}
+
+impl Lens for OptotuneLens {
+    fn set(&mut self, target: FocalPower) -> Result<(), LensError> {
+        self.shared.command(target)
+    }
+
+    fn measured(&self) -> Option<FocalPower> {
+        let connected = self.shared.state().device.is_ok();
+        connected.then(|| self.shared.response.focal_power_at(self.shared.clock.now()))
+    }
+
+    fn health(&self) -> LensHealth {
+        let state = self.shared.state();
+        let caution = state.device.as_ref().is_ok_and(|device| device.status.doubtful());
+
+        let (working, message) = match (&state.device, &state.refusal) {
+            (Ok(_), None) => (true, state.message.clone()),
+            (Ok(_), Some(refusal)) => (false, refusal.clone()),
+            (Err(trouble), _) => (false, Arc::from(format!("{trouble}; trying again"))),
+        };
+
+        LensHealth {
+            name: self.name.clone(),
+            simulated: self.emulated,
+            working,
+            caution,
+            message,
+            line_errors: self.shared.line_errors(),
+        }
+    }
+
+    fn info(&mut self) -> Result<LensInfo, LensError> {
+        let device = self.shared.refresh(ANSWER)?;
+        Ok(LensInfo {
+            driver: "Optotune Lens Driver 4".into(),
+            firmware: device.firmware,
+            serial: device.serial,
+            min_dioptre: device.range.min_dioptre(),
+            max_dioptre: device.range.max_dioptre(),
+            temperature_celsius: Some(device.temperature),
+            mode: status::mode_name(device.mode).into(),
+            status: device.status.words(),
+            line_errors: self.shared.line_errors(),
+        })
+    }
+
+    fn dynamics(&self) -> LensDynamics {
+        DYNAMICS
+    }
+
+    fn optics(&self) -> Arc<dyn Optics> {
+        self.shared.response.clone()
+    }
+
+    fn read_back(&mut self) -> Result<FocalPower, LensError> {
+        let device = self.shared.refresh(ANSWER)?;
+        Ok(device.range.focal_power(device.read_back))
+    }
+}

@@ -1,0 +1,254 @@
+//! The thread that talks to the driver: connects, sends commands, takes readings between them, and reconnects.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::codec::{Reply, Request};
+use super::handshake::{self, Settings};
+use super::link::{Link, SentCommand};
+use super::port::Port;
+use super::shared::{Device, Shared};
+use super::trouble::Trouble;
+use crate::lens::LensError;
+use parfocal_base::clock::Moment;
+
+/// Wait before the first attempt to reconnect. It doubles up to [`BACKOFF_MOST`].
+const BACKOFF_FIRST: Duration = Duration::from_millis(50);
+/// Longest wait between attempts: short enough that the lens is usable within a second after its recovery.
+const BACKOFF_MOST: Duration = Duration::from_millis(400);
+/// Time between two readings. Each value is read every third time.
+const READING_EVERY: Duration = Duration::from_millis(200);
+/// The values read in turn.
+const READINGS: [Request; 3] = [Request::Status, Request::FocalPower, Request::Temperature];
+/// All values, in the order in which a refresh reads them.
+const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower];
+/// How long a due reading waits for a command. If it is made right after a command, its reply arrives before the next
+/// command.
+const GAP_PATIENCE: Duration = Duration::from_millis(60);
+/// Longest time after a command that counts as right after it.
+const GAP: Duration = Duration::from_millis(5);
+/// How often a command is sent again before it counts as refused.
+const RESENDS: u32 = 2;
+
+/// Serves the device at `path` until it must stop. Then removes the lens's current.
+pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
+    let mut backoff = BACKOFF_FIRST;
+    loop {
+        let mut link = None;
+        let trouble = catch_unwind(AssertUnwindSafe(|| attend(shared, path, settings, &mut link, &mut backoff)))
+            .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
+        shared.lost(trouble.into());
+
+        // If the end was requested while the port was open, the open connection is used to remove the current.
+        if shared.stop_within(Duration::ZERO) {
+            return let_go(shared, path, settings, link);
+        }
+
+        // Close the port, so that others and the next attempt can open it.
+        drop(link);
+        if shared.stop_within(backoff) {
+            return let_go(shared, path, settings, None);
+        }
+
+        backoff = (backoff * 2).min(BACKOFF_MOST);
+    }
+}
+
+/// Connects and sends commands until that fails. Leaves the connection in `link`.
+fn attend<'a>(
+    shared: &'a Shared,
+    path: &Path,
+    settings: &Settings,
+    link: &mut Option<Link<'a>>,
+    backoff: &mut Duration,
+) -> Trouble {
+    let link = match Port::open(path) {
+        Ok(port) => link.insert(Link::new(port, shared)),
+        Err(error) => return error.into(),
+    };
+
+    match connect(shared, path, settings, link) {
+        Ok(mut session) => {
+            *backoff = BACKOFF_FIRST;
+            session.serve()
+        }
+        Err(trouble) => trouble,
+    }
+}
+
+/// Sets zero current at the end, unless the lens must stay where it is. `link` is the connection, if it is still open.
+fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>) {
+    // Never send anything to a device that is not a lens driver.
+    if settings.keep || !shared.state().greeted {
+        return;
+    }
+    if link.is_some_and(|link| close(link).is_ok()) {
+        return;
+    }
+
+    // A new connection may still work, and the lens may still be under current.
+    let afresh = Port::open(path).map_err(|error| error.to_string());
+    if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {
+        tracing::warn!(error, "could not confirm that the lens is without current after closing");
+    }
+}
+
+fn close(mut link: Link) -> Result<(), String> {
+    match catch_unwind(AssertUnwindSafe(|| link.close())) {
+        Ok(told) => told.map_err(|error| error.to_string()),
+        Err(_) => Err("its driver failed".to_owned()),
+    }
+}
+
+fn connect<'a, 'b>(
+    shared: &'a Shared,
+    path: &Path,
+    settings: &'b Settings,
+    link: &'b mut Link<'a>,
+) -> Result<Session<'a, 'b>, Trouble> {
+    let mut device = handshake::perform(link, settings, path)?;
+
+    // After a reconnection the lens goes to the latest command. A new lens stays where it is.
+    let last = shared.state().last;
+    match last {
+        Some(power) => {
+            device.read_back = device.range.raw(power);
+            link.send_focal_power(device.range, device.read_back);
+        }
+        None => shared.response.command(shared.clock.now(), device.range.focal_power(device.read_back)),
+    }
+
+    link.follow_commands(device.range);
+    shared.connected(device.clone(), words(&device, settings, shared.line_errors()));
+
+    let next_reading = shared.clock.now() + READING_EVERY;
+    Ok(Session { shared, settings, link, device, next_reading, turn: 0, unmet: 0 })
+}
+
+/// A working connection.
+struct Session<'a, 'b> {
+    shared: &'a Shared,
+    settings: &'b Settings,
+    link: &'b mut Link<'a>,
+    device: Device,
+    next_reading: Moment,
+    turn: usize,
+    /// How many times in a row the read-back differed from the command.
+    unmet: u32,
+}
+
+impl Session<'_, '_> {
+    /// Sends commands and takes readings until the connection ends.
+    fn serve(&mut self) -> Trouble {
+        loop {
+            if let Err(trouble) = self.step() {
+                return trouble;
+            }
+        }
+    }
+
+    fn step(&mut self) -> Result<(), Trouble> {
+        let now = self.shared.clock.now();
+        let due = now >= self.next_reading;
+        self.link.pump(if due { self.next_reading + GAP_PATIENCE } else { self.next_reading })?;
+
+        if self.shared.state().refresh {
+            return self.read_everything();
+        }
+
+        let now = self.shared.clock.now();
+        let behind_command = self.link.sent().is_some_and(|sent| now.since(sent.at) < GAP);
+        if now >= self.next_reading + GAP_PATIENCE || (now >= self.next_reading && behind_command) {
+            self.next_reading = now + READING_EVERY;
+            self.turn = (self.turn + 1) % READINGS.len();
+            self.read(READINGS[self.turn])?;
+            self.publish();
+        }
+        Ok(())
+    }
+
+    fn read_everything(&mut self) -> Result<(), Trouble> {
+        for request in KINDS {
+            self.read(request)?;
+        }
+
+        self.publish();
+        self.shared.refreshed();
+        Ok(())
+    }
+
+    /// Reads the value of `request`. If the lens is gone, or the driver lost its settings, the connection ends.
+    fn read(&mut self, request: Request) -> Result<(), Trouble> {
+        let sent = self.link.sent();
+        if let Some(error) = self.link.stray_error() {
+            tracing::warn!(%error, "the lens driver did not accept a command");
+        }
+
+        match self.link.ask(request)? {
+            Reply::Status(bits) => self.device.status.0 = bits,
+            Reply::Mode(mode) => self.device.mode = mode,
+            Reply::Temperature(sixteenths) => self.device.temperature = f64::from(sixteenths) / 16.0,
+            Reply::FocalPower(raw) => {
+                self.device.read_back = raw;
+                self.compare(sent, raw);
+            }
+            _ => {}
+        }
+
+        if self.device.status.without_lens() || self.device.status.restarted() {
+            let why = "the driver lost its lens or was restarted, and is being set up again";
+            return Err(LensError::Gone(why.into()).into());
+        }
+        Ok(())
+    }
+
+    /// Sends the last command again if the device did not accept it.
+    fn compare(&mut self, sent: Option<SentCommand>, read_back: i16) {
+        // A command sent in the meantime makes the comparison meaningless.
+        let Some(last) = self.link.sent().filter(|&last| Some(last) == sent) else { return };
+        if last.raw == read_back {
+            self.unmet = 0;
+        } else {
+            self.unmet += 1;
+            // The next reading is the status, which may say why. Then the focal power is read again.
+            self.turn = READINGS.len() - 1;
+            self.link.send_focal_power(self.device.range, last.raw);
+        }
+    }
+
+    fn publish(&self) {
+        // No dioptres here: they would show the operator of a blinded session how the policy moves.
+        let refusal = (self.unmet > RESENDS)
+            .then(|| Arc::from("it does not go where it is sent: restart the driver or check the lens"));
+
+        let mut state = self.shared.state();
+        state.device = Ok(self.device.clone());
+        state.message = words(&self.device, self.settings, self.shared.line_errors());
+        state.refusal = refusal;
+    }
+}
+
+/// Describes the state of a connected device in one sentence.
+fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
+    let Device { status, temperature, range, .. } = device;
+    let line = match line_errors {
+        0 => String::new(),
+        1 => "; 1 error on its line so far".to_owned(),
+        many => format!("; {many} errors on its line so far: if they continue, check its USB cable"),
+    };
+
+    let (low, high) = settings.temperatures;
+    if status.doubtful() {
+        return Arc::from(format!(
+            "follows commands, but at {temperature:.1} °C the focal power is unreliable ({}): let the lens get \
+             between {low:.0} and {high:.0} °C{line}",
+            status.words().join("; ")
+        ));
+    }
+
+    let min = range.min_dioptre();
+    let max = range.max_dioptre();
+    Arc::from(format!("follows commands between {min:.2} and {max:.2} dpt, at {temperature:.1} °C{line}"))
+}

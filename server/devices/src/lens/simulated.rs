@@ -1,0 +1,268 @@
+//! The simulated lens: behaves like a tunable lens, deterministic for a given clock, and fails on request.
+
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::response::Response;
+use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::Clock;
+use parfocal_base::options::Options;
+
+/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019). A command takes 2 ms through
+/// USB and driver.
+const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
+
+/// Half-width of the hysteresis, as a share of the range: 0.02 of 5 dioptres.
+const PLAY: f64 = 0.004;
+
+/// Dioptres at focal power 0 and 1: a lens without an offset lens.
+const DIOPTRES: (f64, f64) = (5.0, 10.0);
+
+/// A lens without hardware.
+pub struct SimulatedLens {
+    clock: Arc<dyn Clock>,
+    dynamics: LensDynamics,
+    /// The true focal power, with hysteresis.
+    glass: Arc<Response>,
+    /// The focal power as a driver can know it. A driver cannot sense hysteresis, so this model has none.
+    known: Response,
+    faults: SimulatedFaults,
+    name: Arc<str>,
+}
+
+/// A fault of a simulated lens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimulatedFault {
+    /// No fault.
+    #[default]
+    None,
+    /// Commands are accepted, but get lost.
+    Drops,
+    /// Commands pile up: the driver accepts none.
+    Stalls,
+    /// The driver answers every command with an error.
+    Refuses,
+    /// The device does not answer.
+    Gone,
+}
+
+impl SimulatedFault {
+    /// All faults, in the order of their numbers in [`SimulatedFaults`].
+    const ALL: [Self; 5] = [Self::None, Self::Drops, Self::Stalls, Self::Refuses, Self::Gone];
+
+    /// Name in the specification and in JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Drops => "drops",
+            Self::Stalls => "stalls",
+            Self::Refuses => "refuses",
+            Self::Gone => "gone",
+        }
+    }
+}
+
+impl FromStr for SimulatedFault {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
+            format!("unknown fault '{name}': choose from {}", names.join(", "))
+        })
+    }
+}
+
+/// A switch for a simulated lens's faults. Clone it to set faults from any thread at any time.
+#[derive(Debug, Clone, Default)]
+pub struct SimulatedFaults(Arc<AtomicU8>);
+
+impl SimulatedFaults {
+    /// Switches to `fault`, which applies from the next call of the lens on.
+    pub fn set(&self, fault: SimulatedFault) {
+        self.0.store(fault as u8, Ordering::Relaxed);
+    }
+
+    /// The current fault.
+    #[must_use]
+    pub fn get(&self) -> SimulatedFault {
+        SimulatedFault::ALL.get(usize::from(self.0.load(Ordering::Relaxed))).copied().unwrap_or_default()
+    }
+}
+
+impl SimulatedLens {
+    /// A lens at rest in the middle of its range.
+    #[must_use]
+    pub fn new(clock: Arc<dyn Clock>) -> Self {
+        Self::moving(DYNAMICS, clock)
+    }
+
+    /// The same with other `dynamics`.
+    #[must_use]
+    pub fn moving(dynamics: LensDynamics, clock: Arc<dyn Clock>) -> Self {
+        Self {
+            clock,
+            dynamics,
+            glass: Arc::new(Response::new(dynamics, PLAY, FocalPower::MIDDLE)),
+            known: Response::new(dynamics, 0.0, FocalPower::MIDDLE),
+            faults: SimulatedFaults::default(),
+            name: Arc::from("simulated lens"),
+        }
+    }
+
+    /// Opens the lens with a specification's `options`: `fault`, the initial fault; `delay` and `settling` in
+    /// milliseconds.
+    pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+        let fault = options.take::<SimulatedFault>("fault")?;
+        let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
+
+        let dynamics = LensDynamics {
+            delay: millis(options.take("delay")?, DYNAMICS.delay),
+            settling: millis(options.take("settling")?, DYNAMICS.settling),
+        };
+        options.finish()?;
+
+        let lens = Self::moving(dynamics, clock);
+        lens.faults.set(fault.unwrap_or_default());
+        Ok(lens)
+    }
+
+    fn failure(&self) -> Option<LensError> {
+        match self.faults.get() {
+            SimulatedFault::None | SimulatedFault::Drops => None,
+            SimulatedFault::Stalls => Some(LensError::Stalled("commands pile up (simulated fault)".into())),
+            SimulatedFault::Refuses => {
+                Some(LensError::Refused("error reply to every command (simulated fault)".into()))
+            }
+            SimulatedFault::Gone => Some(LensError::Gone("unplugged (simulated fault)".into())),
+        }
+    }
+}
+
+impl Lens for SimulatedLens {
+    fn set(&mut self, target: FocalPower) -> Result<(), LensError> {
+        if let Some(failure) = self.failure() {
+            return Err(failure);
+        }
+        if self.faults.get() != SimulatedFault::Drops {
+            let now = self.clock.now();
+            self.glass.command(now, target);
+            self.known.command(now, target);
+        }
+
+        Ok(())
+    }
+
+    fn measured(&self) -> Option<FocalPower> {
+        (self.faults.get() != SimulatedFault::Gone).then(|| self.known.focal_power_at(self.clock.now()))
+    }
+
+    fn health(&self) -> LensHealth {
+        let failure = self.failure();
+        let message = match (&failure, self.faults.get()) {
+            (Some(failure), _) => failure.to_string(),
+            (None, SimulatedFault::Drops) => "commands get lost on the way (simulated fault)".into(),
+            (None, _) => "follows commands; no real glass moves".into(),
+        };
+
+        let name = self.name.clone();
+        let working = failure.is_none();
+        LensHealth { name, simulated: true, working, caution: false, message: message.into(), line_errors: 0 }
+    }
+
+    fn info(&mut self) -> Result<LensInfo, LensError> {
+        match self.failure() {
+            Some(failure @ LensError::Gone(_)) => Err(failure),
+            failure => Ok(LensInfo {
+                driver: "simulated".into(),
+                firmware: env!("CARGO_PKG_VERSION").into(),
+                serial: "none".into(),
+                min_dioptre: DIOPTRES.0,
+                max_dioptre: DIOPTRES.1,
+                temperature_celsius: None,
+                mode: "focal power".into(),
+                status: failure.iter().map(ToString::to_string).collect(),
+                line_errors: 0,
+            }),
+        }
+    }
+
+    fn dynamics(&self) -> LensDynamics {
+        self.dynamics
+    }
+
+    fn optics(&self) -> Arc<dyn Optics> {
+        self.glass.clone()
+    }
+
+    fn faults(&self) -> Option<SimulatedFaults> {
+        Some(self.faults.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parfocal_base::clock::ManualClock;
+
+    fn lens() -> (SimulatedLens, Arc<ManualClock>) {
+        let clock = Arc::new(ManualClock::new(jiff::Timestamp::UNIX_EPOCH));
+        (SimulatedLens::new(clock.clone()), clock)
+    }
+
+    fn settled(lens: &SimulatedLens, clock: &ManualClock) -> f64 {
+        clock.advance(Duration::from_secs(1));
+        lens.optics().focal_power_at(clock.now()).get()
+    }
+
+    #[test]
+    fn follows_commands_and_reports_what_a_driver_can_know() {
+        let (mut lens, clock) = lens();
+        lens.set(FocalPower::MAX).unwrap();
+        assert!((settled(&lens, &clock) - 0.996).abs() < 1e-9, "the glass lags by the play");
+        assert!((lens.measured().unwrap().get() - 1.0).abs() < 1e-9, "the driver cannot see that");
+        assert!(lens.health().working && lens.health().simulated);
+    }
+
+    #[test]
+    fn drops_take_the_command_and_move_nothing() {
+        let (mut lens, clock) = lens();
+        lens.faults().unwrap().set(SimulatedFault::Drops);
+
+        assert_eq!(lens.set(FocalPower::MAX), Ok(()));
+        assert!((settled(&lens, &clock) - 0.5).abs() < 1e-9);
+        assert!(lens.health().message.contains("lost"));
+    }
+
+    #[test]
+    fn each_failing_fault_says_so_leaves_the_glass_and_heals() {
+        for (fault, expected) in [
+            (SimulatedFault::Stalls, "the lens does not accept commands"),
+            (SimulatedFault::Refuses, "the lens refused"),
+            (SimulatedFault::Gone, "the lens does not answer"),
+        ] {
+            let (mut lens, clock) = lens();
+            let faults = lens.faults().unwrap();
+            faults.set(fault);
+
+            let error = lens.set(FocalPower::MAX).unwrap_err();
+            assert!(error.to_string().starts_with(expected), "{error}");
+            assert!(!lens.health().working);
+            assert!((settled(&lens, &clock) - 0.5).abs() < 1e-9);
+            assert_eq!(lens.measured().is_none(), fault == SimulatedFault::Gone);
+            assert_eq!(lens.info().is_err(), fault == SimulatedFault::Gone);
+
+            faults.set(SimulatedFault::None);
+            lens.set(FocalPower::MIN).unwrap();
+            assert!((settled(&lens, &clock) - 0.004).abs() < 1e-9);
+            assert!(lens.health().working);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Lens specifications, as given on the command line: `KIND` or `KIND:DEVICE`, optionally followed by
+//! `?NAME=VALUE&…`.
+
+use std::sync::Arc;
+
+use super::emulated::EmulatedLens;
+use super::optotune::OptotuneLens;
+use super::simulated::SimulatedLens;
+use super::{Lens, LensError};
+use parfocal_base::clock::Clock;
+use parfocal_base::options::Options;
+
+/// Opens the lens that `spec` names:
+///
+/// - `simulated`, with the options `fault` (see [`super::SimulatedFault`]), `delay` and `settling` (milliseconds);
+/// - `emulated`, with the options `latency`, `delay`, `settling`, `hysteresis`, `temperature` and `fault` (see
+///   [`super::emulator::Model`]);
+/// - `optotune:auto` or `optotune:/dev/...`, with the options `min` and `max`, the dioptres to use, and `low` and
+///   `high`, the temperature limits in °C.
+///
+/// # Errors
+/// If the specification is invalid, or its device cannot be used. The error says what to do.
+pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
+    opened(spec, false, clock)
+}
+
+/// Like [`open`], for moving a lens by hand: the lens keeps its state when it is opened, and its focal power when it is
+/// dropped.
+///
+/// # Errors
+/// If [`open`] would fail.
+pub fn open_to_stay(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
+    opened(spec, true, clock)
+}
+
+fn opened(spec: &str, keep: bool, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
+    let (device, options) = Options::split(spec)?;
+    match device.split_once(':') {
+        None if device == "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
+        None if device == "emulated" => Ok(Box::new(EmulatedLens::open(options, clock)?)),
+        Some(("optotune", port)) if !port.is_empty() => Ok(Box::new(OptotuneLens::open(port, options, keep, clock)?)),
+        _ => Err(LensError::BadSpec(format!(
+            "unknown lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::SimulatedFault;
+    use parfocal_base::clock::SystemClock;
+
+    fn message(spec: &str) -> String {
+        open(spec, Arc::new(SystemClock)).err().unwrap().to_string()
+    }
+
+    #[test]
+    fn opens_a_simulated_lens_with_its_fault() {
+        let fault = |spec| open(spec, Arc::new(SystemClock)).unwrap().faults().unwrap().get();
+        assert_eq!(fault("simulated"), SimulatedFault::None);
+        assert_eq!(fault("simulated?fault=stalls"), SimulatedFault::Stalls);
+        let slow = open("simulated?delay=20&settling=60", Arc::new(SystemClock)).unwrap().dynamics();
+        assert_eq!((slow.delay.as_millis(), slow.settling.as_millis()), (20, 60));
+    }
+
+    #[test]
+    fn a_bad_specification_says_what_is_wrong_with_it() {
+        for spec in ["magic", "optotune:"] {
+            assert!(message(spec).contains("'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"));
+        }
+        assert!(message("simulated?fault=fire").contains("choose from none, drops"));
+        assert!(message("emulated?fault=fire").contains("choose from none, garbage"));
+        assert!(message("emulated?hysteresis=9").contains("must be from 0 to 5 dpt"));
+        assert!(message("simulated?size=3").contains("unknown option 'size'; there are: fault, delay, settling"));
+    }
+}

@@ -1,0 +1,315 @@
+//! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and
+//! how each policy does there compared with the MGM hill-climber.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::report::figure;
+use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
+use crate::scans::stack::drift::{StackCourse, StackScans};
+use crate::scans::stack::source::{ScaledStack, StackSource, UnfitStack};
+use parfocal_autofocus::Registry;
+use parfocal_base::files::replace;
+use parfocal_base::notices::tell;
+use parfocal_base::statistics::bootstrap_statistic;
+use parfocal_base::{BlurRate, PolicyName};
+
+/// The policy that all others are compared with.
+pub const BASELINE: &str = "mgm-hill-climber";
+/// Seeds of the courses, one scan each.
+pub const SEEDS: usize = 3;
+/// First of the seeds by default.
+pub const FIRST_SEED: u64 = 31;
+
+/// A stack at one scale, ready to be scanned.
+#[derive(Debug)]
+struct Item {
+    stack: String,
+    scale: &'static str,
+    planes: usize,
+    scans: StackScans,
+    /// The optic's blur rate that the policies get, if any.
+    blur: Option<BlurRate>,
+}
+
+/// Which blur rate of the optic the policies get.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BlurKnowledge {
+    /// No rate.
+    Nothing,
+    /// This rate, for every stack.
+    Rate(BlurRate),
+    /// The rate measured on each stack.
+    Measured,
+}
+
+/// Makes [`SEEDS`] courses over `source` at each scale.
+fn items(source: &StackSource, first_seed: u64, told: BlurKnowledge) -> Result<Vec<Item>, UnfitStack> {
+    let item = |scaled: ScaledStack| {
+        let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
+        let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
+        let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
+        let scans = StackScans(courses.ok_or_else(too_small)?);
+        let blur = match told {
+            BlurKnowledge::Nothing => None,
+            BlurKnowledge::Rate(rate) => Some(rate),
+            BlurKnowledge::Measured => scaled.blur_rate(),
+        };
+        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur })
+    };
+
+    let (scaled, doubts) = source.at_scales()?;
+    for doubt in doubts {
+        tell(format_args!("note: {doubt}"));
+    }
+    scaled.into_iter().map(item).collect()
+}
+
+/// How the policies did on one stack at one scale.
+#[derive(Debug, Clone, Serialize)]
+pub struct StackResult {
+    /// The stack's folder's name.
+    pub stack: String,
+    /// `s` or `l`: about 500 or 1000 pixels wide.
+    pub scale: &'static str,
+    /// Number of planes in the range.
+    pub planes: usize,
+    /// The optic's blur rate that the policies got, if any: pixels per unit of focal power.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blur: Option<f64>,
+    /// One row for each policy, the oracle first.
+    pub rows: Vec<Row>,
+}
+
+/// A policy compared with the MGM hill-climber, over all stacks and scales.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Standing {
+    /// The policy.
+    pub policy: String,
+    /// Geometric mean of its mean absolute error divided by the hill-climber's.
+    pub ratio: f64,
+    /// 95 % bootstrap interval of that over stacks.
+    pub ratio_interval: (f64, f64),
+    /// Number of stacks and scales on which its error is greater than the hill-climber's.
+    pub worse_on: usize,
+    /// Mean share in focus.
+    pub in_focus: f64,
+    /// Its changes of direction a second divided by the hill-climber's.
+    pub turns: f64,
+    /// The stack and scale where it does worst compared with the hill-climber.
+    pub worst: String,
+}
+
+/// The benchmark's figures.
+#[derive(Debug, Clone, Serialize)]
+pub struct StackReport {
+    /// First of the seeds.
+    pub seed: u64,
+    /// One result for each stack and scale.
+    pub stacks: Vec<StackResult>,
+    /// One standing for each policy.
+    pub standings: Vec<Standing>,
+}
+
+/// Evaluates `policies`, the oracle and the baseline on the stacks of `sources`. `seed` is the first of the courses'
+/// seeds.
+///
+/// # Errors
+/// If a stack cannot be read or scanned, or a policy cannot run.
+pub fn evaluate_stacks(
+    registry: &Registry,
+    policies: &[PolicyName],
+    sources: &[StackSource],
+    seed: u64,
+    told: BlurKnowledge,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
+    let mut policies = policies.to_vec();
+    let baseline = PolicyName::new(BASELINE);
+    if !policies.contains(&baseline) {
+        policies.insert(0, baseline);
+    }
+
+    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, told)).collect::<Result<_, _>>()?;
+    let mut stacks = Vec::new();
+    let mut all = Vec::new();
+
+    for item in items.into_iter().flatten() {
+        let registry = if item.blur.is_some() { registry.clone().knowing(item.blur) } else { registry.clone() };
+        let outcomes = evaluate(&registry, &policies, &item.scans, progress)?;
+
+        let rows = outcomes.iter().map(Outcome::row).collect();
+        let blur = item.blur.map(BlurRate::get);
+        stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, blur, rows });
+        all.push(outcomes);
+    }
+
+    let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks)).collect();
+    Ok((StackReport { seed, stacks, standings }, all))
+}
+
+/// Why the benchmark ended without figures.
+#[derive(Debug, thiserror::Error)]
+pub enum StackReportError {
+    /// A stack cannot be used.
+    #[error(transparent)]
+    Stack(#[from] UnfitStack),
+    /// A policy cannot run.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+}
+
+/// The standing of `policy`; `None` if a row is missing.
+fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
+    let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
+    let pairs: Vec<(Row, Row)> =
+        stacks.iter().map(|result| Some((row(result, policy)?, row(result, BASELINE)?))).collect::<Option<_>>()?;
+
+    let logs: Vec<f64> = pairs.iter().map(|(own, base)| (own.mae / base.mae).ln()).collect();
+    let count = logs.len().max(1) as f64;
+    let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
+    let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
+
+    Some(Standing {
+        policy: policy.to_owned(),
+        ratio: (logs.iter().sum::<f64>() / count).exp(),
+        ratio_interval: ratio_interval(stacks, &logs),
+        worse_on: logs.iter().filter(|log| **log > 0.0).count(),
+        in_focus: pairs.iter().map(|(own, _)| own.in_focus).sum::<f64>() / count,
+        turns: turns(|pair| pair.0.reversals) / turns(|pair| pair.1.reversals).max(1e-9),
+        worst: format!("{}-{}", stacks[worst].stack, stacks[worst].scale),
+    })
+}
+
+/// The 95 % percentile-bootstrap interval of the geometric mean, drawing whole stacks: the two scales
+/// of a stack are not independent.
+fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
+    let mut groups: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (result, log) in stacks.iter().zip(logs) {
+        match groups.iter_mut().find(|group| group.0 == result.stack) {
+            Some(group) => group.1.push(*log),
+            None => groups.push((&result.stack, vec![*log])),
+        }
+    }
+
+    let geometric_mean = |drawn: &[usize]| {
+        let logs: Vec<f64> = drawn.iter().flat_map(|&group| groups[group].1.iter().copied()).collect();
+        Some((logs.iter().sum::<f64>() / logs.len() as f64).exp())
+    };
+
+    bootstrap_statistic(groups.len(), 1, geometric_mean).unwrap_or((0.0, 0.0))
+}
+
+impl StackReport {
+    /// Writes `stacks.json`, `stacks.md`, and a figure of the first scan's paths for each stack and
+    /// scale into `folder`.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, outcomes: &[Vec<Outcome>], folder: &Path) -> std::io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        replace(&folder.join("stacks.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
+        replace(&folder.join("stacks.md"), self.markdown().as_bytes())?;
+
+        for (result, outcomes) in self.stacks.iter().zip(outcomes) {
+            let name = format!("{}-{}.svg", result.stack, result.scale);
+            replace(&folder.join(name), figure(outcomes, 0).as_bytes())?;
+        }
+
+        Ok(())
+    }
+
+    /// The figures as Markdown: one row for each stack and scale, then each policy compared with the MGM hill-climber.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let Some(first) = self.stacks.first() else { return String::new() };
+        let names: Vec<&str> = first.rows.iter().map(|row| row.policy.as_str()).collect();
+        let mut text = format!("| MAE / in focus | {} |\n|{}\n", names.join(" | "), "---|".repeat(names.len() + 1));
+
+        for result in &self.stacks {
+            let cells: Vec<String> =
+                result.rows.iter().map(|row| format!("{:.3} / {:.0} %", row.mae, 100.0 * row.in_focus)).collect();
+            let _ = writeln!(text, "| {} {} | {} |", result.stack, result.scale, cells.join(" | "));
+        }
+
+        let _ = write!(
+            text,
+            "\n| compared with {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | \
+             in focus, mean | turns |\n\
+             |---|---|---|---|---|---|---|\n"
+        );
+
+        for standing in self.standings.iter().filter(|standing| standing.policy != ORACLE) {
+            let _ = writeln!(
+                text,
+                "| {} | {:.2} | {:.2}–{:.2} | {} of {} | {} | {:.1} % | {:.2} |",
+                standing.policy,
+                standing.ratio,
+                standing.ratio_interval.0,
+                standing.ratio_interval.1,
+                standing.worse_on,
+                self.stacks.len(),
+                standing.worst,
+                100.0 * standing.in_focus,
+                standing.turns,
+            );
+        }
+
+        let _ = writeln!(
+            text,
+            "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; \
+             pictures between two planes are mixed.",
+            self.seed,
+            self.seed.wrapping_add(SEEDS as u64 - 1)
+        );
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn result(stack: &str, scale: &'static str, maes: [f64; 2]) -> StackResult {
+        let row = |policy: &str, mae: f64| Row {
+            policy: policy.to_owned(),
+            frames: 1,
+            mae,
+            sd: 0.0,
+            in_focus: 0.5,
+            travel: 0.0,
+            reversals: 6.0,
+            mae_interval: (mae, mae),
+            in_focus_interval: (0.5, 0.5),
+            scan_mae: vec![mae],
+        };
+        StackResult {
+            stack: stack.to_owned(),
+            scale,
+            planes: 9,
+            blur: None,
+            rows: vec![row(BASELINE, maes[0]), row("own", maes[1])],
+        }
+    }
+
+    #[test]
+    fn a_standing_is_the_geometric_mean_of_ratios() {
+        let stacks = [
+            result("a", "s", [0.1, 0.05]),
+            result("a", "l", [0.1, 0.2]),
+            result("b", "s", [0.2, 0.1]),
+            result("b", "l", [0.2, 0.1]),
+        ];
+        let own = standing("own", &stacks).unwrap();
+        // Ratios 1/2, 2, 1/2, 1/2.
+        assert!((own.ratio - 0.5f64.sqrt()).abs() < 1e-12);
+        assert_eq!((own.worse_on, own.worst.as_str()), (1, "a-l"));
+        assert!((own.turns - 1.0).abs() < 1e-12);
+        // Whole stacks are drawn: the least mean is that of b alone, the greatest that of a alone.
+        assert!((own.ratio_interval.0 - 0.5).abs() < 1e-12 && (own.ratio_interval.1 - 1.0).abs() < 1e-12);
+    }
+}

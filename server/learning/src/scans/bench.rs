@@ -1,0 +1,126 @@
+//! Recordings of a bench as scenes to train on: focal-time scans and focal stacks. Some are kept for validation.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::planes::PlaneStack;
+use super::recorded::RecordedScan;
+use super::relief::{Distance, StackScene};
+use super::simulated::Scene;
+use super::stack::source::{ScaledStack, StackSource, UnfitStack};
+use parfocal_devices::camera::recorded::{HEADER, ScanError, ScanFolder};
+
+/// One folder in this many is kept for validation.
+const KEPT_OF: usize = 5;
+/// In training, the number of planes that make the range varies by these factors (least, most), because lenses differ
+/// in how far they reach.
+const REACH: (f64, f64) = (0.75, 1.3);
+
+/// Scenes of a bench.
+#[derive(Debug, Clone)]
+pub struct BenchScenes {
+    /// Scenes to train on.
+    pub training: Vec<Scene>,
+    /// Scenes to validate on: those of every fifth folder, or the training scenes if there are fewer than five folders.
+    pub validation: Vec<Scene>,
+    /// Folders kept for validation, as the caller named them.
+    pub kept: Vec<String>,
+    /// Warnings about the pictures, as text for people.
+    pub doubts: Vec<String>,
+    /// SHA-256 of all pictures as they are used, in hexadecimal.
+    pub sha256: String,
+}
+
+/// Why a bench's recordings cannot be trained on.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// There is no such folder.
+    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or of focal stacks (pictures)")]
+    NoFolder(String),
+    /// A recorded scan cannot be read.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// A recorded scan has only one pose.
+    #[error("the scan {0} has only one pose; to use its pictures as a focal stack, name the folder that holds them")]
+    OnePose(String),
+    /// A focal stack cannot be used.
+    #[error(transparent)]
+    Stack(#[from] UnfitStack),
+}
+
+impl BenchScenes {
+    /// Reads the recordings in `folders`. Each is a recorded scan or a focal stack. For a stack, `DIR:PLANES` says how
+    /// many planes make the range 0..=1.
+    ///
+    /// # Errors
+    /// If a folder is missing, or what is in it cannot be used.
+    pub fn read(folders: &[String]) -> Result<Self, BenchError> {
+        let mut hash = Sha256::new();
+        let mut doubts = Vec::new();
+        let recordings: Vec<Vec<Scene>> =
+            folders.iter().map(|folder| recording(folder, &mut hash, &mut doubts)).collect::<Result<_, _>>()?;
+
+        let is_kept = |index: usize| index % KEPT_OF == KEPT_OF - 1;
+        let scenes = |kept: bool| -> Vec<Scene> {
+            let chosen = recordings.iter().enumerate().filter(|(index, _)| is_kept(*index) == kept);
+            chosen.flat_map(|(_, scenes)| scenes.clone()).collect()
+        };
+
+        let training = scenes(false);
+        let kept: Vec<String> =
+            folders.iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, folder)| folder.clone()).collect();
+        let validation = if kept.is_empty() { training.clone() } else { scenes(true) };
+
+        Ok(Self { training, validation, kept, doubts, sha256: hex::encode(hash.finalize()) })
+    }
+}
+
+/// The scenes of one folder.
+fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Result<Vec<Scene>, BenchError> {
+    if Path::new(folder).join(HEADER).exists() {
+        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, &|| ())?;
+        if scan.poses().len() < 2 {
+            return Err(BenchError::OnePose(folder.to_owned()));
+        }
+        scan.digest(hash);
+        return Ok(vec![Scene::Recorded(Arc::new(scan))]);
+    }
+
+    let source = StackSource::parse(folder);
+    if !source.folder.is_dir() {
+        return Err(BenchError::NoFolder(folder.to_owned()));
+    }
+
+    let (scaled, doubtful) = source.at_scales()?;
+    doubts.extend(doubtful);
+
+    let mut scenes: Vec<StackScene> = Vec::new();
+    for ScaledStack { planes, pictures, .. } in scaled {
+        // A stack that is small enough is the same at both scales.
+        if scenes.iter().any(|scene| scene.planes.size() == pictures.size()) {
+            continue;
+        }
+
+        let (first, last) = pictures.range();
+        if planes < 3 || planes as f64 > last - first + 1.0 {
+            return Err(UnfitStack::TooSmall { folder: source.folder, planes }.into());
+        }
+
+        pictures.digest(hash);
+        scenes.push(scene(planes, Arc::unwrap_or_clone(pictures)));
+    }
+    Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())
+}
+
+/// A photographed stack in which about `planes` planes make the range of focal power.
+fn scene(planes: usize, pictures: PlaneStack) -> StackScene {
+    let (first, last) = pictures.range();
+    let reach = |factor: f64| (factor * planes.saturating_sub(1) as f64).clamp(1.0, last - first);
+    StackScene {
+        slopes: (reach(REACH.0), reach(REACH.1)),
+        planes: pictures,
+        distance: Distance::Following { spacing: 1.0 },
+    }
+}

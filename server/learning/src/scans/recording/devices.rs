@@ -1,0 +1,154 @@
+//! A bench of real devices: a camera, a lens, and a person or a command that moves the camera to the next pose.
+
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+use std::{fmt, io};
+
+use super::{PosePictures, PoseSource, RecordError};
+use parfocal_base::FocalPower;
+use parfocal_base::clock::{Clock, Moment};
+use parfocal_devices::camera::recorded::LEAST_SIDE;
+use parfocal_devices::camera::{Camera, CameraError, FrameImage};
+use parfocal_devices::lens::Lens;
+use parfocal_imaging::{GrayImage, PatchArea, Reconstructor, RgbImage, content_area, rgb_to_gray};
+
+/// Longest wait for a frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// Largest allowed difference between the focal power that was set and the one read back: twice the hysteresis of a
+/// tunable lens.
+const TOLERANCE: f64 = 0.01;
+
+/// What moves the camera to its next pose.
+pub enum Stepper {
+    /// A person, who is asked for each pose and confirms when the camera is there.
+    Asked(Box<dyn FnMut(usize) -> Result<(), StepperError> + Send>),
+    /// A shell command in which `{pose}` stands for the pose's number.
+    Command(String),
+}
+
+/// Why the camera was not moved.
+#[derive(Debug, thiserror::Error)]
+pub enum StepperError {
+    /// Nobody is there to move the camera.
+    #[error("nobody confirmed pose {0}: the input has ended; use --stepper if nobody can press Enter")]
+    Unattended(usize),
+    /// Recording was stopped.
+    #[error("stopped before pose {0}")]
+    Stopped(usize),
+    /// The command cannot be started.
+    #[error("cannot start the stepper's shell: {0}")]
+    NotStarted(io::Error),
+    /// The command reported a failure.
+    #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to continue")]
+    Failed {
+        /// Pose that it should have reached.
+        pose: usize,
+        /// Exit status of the command.
+        status: ExitStatus,
+    },
+}
+
+impl fmt::Debug for Stepper {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Asked(_) => f.write_str("Asked"),
+            Self::Command(command) => f.debug_tuple("Command").field(command).finish(),
+        }
+    }
+}
+
+impl Stepper {
+    /// Moves the camera to `pose` and waits until it is there.
+    fn go(&mut self, pose: usize) -> Result<(), StepperError> {
+        match self {
+            Self::Asked(ask) => ask(pose),
+            Self::Command(command) => {
+                let command = command.replace("{pose}", &pose.to_string());
+                let mut shell = Command::new("sh");
+                let status = shell.args(["-c", &command]).stdin(Stdio::null()).stdout(io::stderr()).status();
+                let status = status.map_err(StepperError::NotStarted)?;
+                if status.success() { Ok(()) } else { Err(StepperError::Failed { pose, status }) }
+            }
+        }
+    }
+}
+
+/// Camera, lens and stepper.
+pub struct Devices {
+    /// Takes the pictures.
+    pub camera: Box<dyn Camera>,
+    /// Is set to each focal power.
+    pub lens: Box<dyn Lens>,
+    /// Makes gray pictures from mosaics.
+    pub reconstructor: Reconstructor,
+    /// Moves the camera to the next pose.
+    pub stepper: Stepper,
+    /// Source of time.
+    pub clock: Arc<dyn Clock>,
+}
+
+impl PoseSource for Devices {
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<PosePictures, RecordError> {
+        self.stepper.go(pose)?;
+        let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;
+        let Some(GrayImage { width, height, .. }) = pictures.first() else { return Err(RecordError::TooSmall(0, 0)) };
+        let width = *width;
+        let height = *height;
+
+        if let Some(other) = pictures.iter().find(|picture| (picture.width, picture.height) != (width, height)) {
+            let reason = format!("its pictures changed from {width}x{height} to {}x{}", other.width, other.height);
+            return Err(CameraError::Failed(reason).into());
+        }
+
+        let too_small = |_| RecordError::TooSmall(width, height);
+        if width < LEAST_SIDE || height < LEAST_SIDE {
+            return Err(RecordError::TooSmall(width, height));
+        }
+
+        let area = pictures.first().and_then(content_area::detect);
+        let patch = PatchArea::central(width, height, area.as_ref()).map_err(too_small)?;
+        Ok(PosePictures { pictures, patch, truth: None })
+    }
+}
+
+impl Devices {
+    /// Sets the lens to `power` and takes the first picture whose exposure began after the lens had settled.
+    fn picture(&mut self, power: FocalPower) -> Result<GrayImage, RecordError> {
+        self.lens.set(power)?;
+        let dynamics = self.lens.dynamics();
+
+        // After four times the settling time, 1/160 000 of the step remains.
+        let settled = self.clock.now() + dynamics.delay + dynamics.settling * 4;
+        let image = self.frame_since(settled)?;
+        let reached = self.lens.read_back()?;
+
+        if reached.distance(power) > TOLERANCE {
+            return Err(RecordError::Astray { asked: power.get(), reached: reached.get() });
+        }
+
+        Ok(self.gray(&image))
+    }
+
+    /// The first frame whose exposure began at `moment` or later.
+    fn frame_since(&mut self, moment: Moment) -> Result<FrameImage, RecordError> {
+        let asked = self.clock.now();
+        loop {
+            let waited = self.clock.now().since(asked);
+            let left = TIMEOUT.checked_sub(waited).ok_or(CameraError::Timeout(TIMEOUT))?;
+            let frame = self.camera.next_frame(left)?;
+            if frame.exposed_at >= moment + frame.exposure {
+                return Ok(frame.image);
+            }
+        }
+    }
+
+    fn gray(&mut self, image: &FrameImage) -> GrayImage {
+        let mut gray = GrayImage::default();
+        match image {
+            FrameImage::Mosaic(mosaic) => self.reconstructor.reconstruct(mosaic, &mut RgbImage::default(), &mut gray),
+            FrameImage::Rgb(rgb) => rgb_to_gray(rgb, &mut gray),
+        }
+        gray
+    }
+}

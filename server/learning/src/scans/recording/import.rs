@@ -1,0 +1,255 @@
+//! Imports a scan: a folder of pictures named by pose and focal power, recorded by any program.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::import_error::ImportError;
+use super::{PosePictures, shot};
+use parfocal_base::FocalPower;
+use parfocal_devices::camera::footage::picture_reader;
+use parfocal_devices::camera::recorded::{
+    FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
+};
+use parfocal_imaging::{DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
+
+/// The scan in a folder: for each pose number, a file for each focal power, in rising order.
+#[derive(Debug)]
+pub struct Imported {
+    poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>>,
+}
+
+impl Imported {
+    /// Searches `folder` and the folders directly in it. Reads and compares names, but does not open pictures yet.
+    ///
+    /// # Errors
+    /// If names make no sense, or poses or focal powers are missing.
+    pub fn look(folder: &Path) -> Result<Self, ImportError> {
+        let mut poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>> = BTreeMap::new();
+        for path in files(folder)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match parse(&name) {
+                None => {}
+                Some(Err(reason)) => return Err(ImportError::Name { path, reason }),
+                Some(Ok((pose, power))) => poses.entry(pose).or_default().push((power, path)),
+            }
+        }
+
+        for stack in poses.values_mut() {
+            stack.sort_by(|a, b| a.0.get().total_cmp(&b.0.get()));
+            if let Some(pair) = stack.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+                let reason = format!("{} is of the same pose and focal power", pair[0].1.display());
+                return Err(ImportError::Name { path: pair[1].1.clone(), reason });
+            }
+        }
+
+        let (Some(&first), Some(&last)) = (poses.keys().next(), poses.keys().next_back()) else {
+            return Err(ImportError::Empty(folder.to_owned()));
+        };
+
+        let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
+        if !missing.is_empty() {
+            return Err(ImportError::MissingPoses { folder: folder.to_owned(), missing });
+        }
+
+        if poses.len() > MOST_POSES {
+            return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
+        }
+
+        let imported = Self { poses };
+        imported.check_powers()?;
+        Ok(imported)
+    }
+
+    fn check_powers(&self) -> Result<(), ImportError> {
+        let powers = self.powers();
+        if let [one] = powers[..] {
+            return Err(ImportError::OnePower(one.get()));
+        }
+        for (&pose, stack) in &self.poses {
+            let lacks = |power: &&FocalPower| !stack.iter().any(|(have, _)| have == *power);
+            if let Some(power) = powers.iter().find(lacks) {
+                return Err(ImportError::MissingPower { pose, power: power.get() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Every focal power of any pose, rising.
+    fn powers(&self) -> Vec<FocalPower> {
+        let mut powers: Vec<FocalPower> = self.poses.values().flatten().map(|(power, _)| *power).collect();
+        powers.sort_by(|a, b| a.get().total_cmp(&b.get()));
+        powers.dedup();
+        powers
+    }
+
+    /// Number of poses.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether there is no pose.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+    }
+}
+
+/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds already must show the
+/// same pictures. `progress` is called after each pose.
+///
+/// # Errors
+/// If a picture cannot be used, `out` holds another scan, or it cannot be written.
+pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
+    let header = Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
+        camera: camera.to_owned(),
+        lens: None,
+        simulated: false,
+        calibration: None,
+        seed: 0,
+        order: Order::Unknown,
+        poses: imported.len(),
+        focal_powers: imported.powers(),
+    };
+
+    let mut reader = Reader { reconstructor: Reconstructor::default(), first: None };
+    // Checks all sizes before anything is written.
+    imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
+
+    let mut recording = Recording::open(out, &header)?;
+    for (pose, stack) in (1..).zip(imported.poses.values()) {
+        let powers: Vec<FocalPower> = stack.iter().map(|(power, _)| *power).collect();
+        let pictures = stack.iter().map(|(_, path)| reader.read(path)).collect::<Result<Vec<_>, _>>()?;
+
+        if recording.folder().poses().contains_key(&pose) {
+            if !shows(recording.folder(), pose, &pictures)? {
+                let difference = format!("with other pictures of pose {pose}");
+                return Err(ScanError::Other { path: out.to_owned(), difference }.into());
+            }
+        } else {
+            let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
+            recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
+        }
+        progress();
+    }
+    Ok(())
+}
+
+/// Whether the stored pictures of `pose` equal `pictures`, which are in order of rising focal power.
+fn shows(scan: &ScanFolder, pose: usize, pictures: &[GrayImage]) -> Result<bool, ScanError> {
+    let Some(stored) = scan.poses().get(&pose) else { return Ok(false) };
+    for (power, picture) in scan.header().focal_powers.iter().zip(pictures) {
+        let Some(image) = stored.images.iter().find(|image| image.focal_power == *power) else { return Ok(false) };
+        let kept = scan.picture(stored, image)?;
+
+        // Levels are rounded when they are stored.
+        let mut levels = kept.data.iter().zip(&picture.data);
+        let alike = levels.all(|(kept, level)| (kept - level).abs() <= 0.5);
+        if (kept.width, kept.height) != (picture.width, picture.height) || !alike {
+            return Ok(false);
+        }
+    }
+
+    Ok(true)
+}
+
+/// The patch in the content area that the first picture shows.
+fn patch(pictures: &[GrayImage]) -> Option<PatchArea> {
+    let first = pictures.first()?;
+    PatchArea::central(first.width, first.height, content_area::detect(first).as_ref()).ok()
+}
+
+/// Reads pictures and checks that all are of one size.
+struct Reader {
+    reconstructor: Reconstructor,
+    first: Option<(PathBuf, (usize, usize))>,
+}
+
+impl Reader {
+    /// Compares a picture's size with the first one's. Reads only the beginning of the file.
+    fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
+        let damaged = |error: image::ImageError| ImportError::Picture {
+            path: path.to_owned(),
+            error: DecodeError::Damaged(error.to_string()),
+        };
+        let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
+        let (width, height) = picture_reader(path).map_err(unreadable)?.into_dimensions().map_err(damaged)?;
+        self.check(path, (width as usize, height as usize))
+    }
+
+    fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), ImportError> {
+        if size.0 < LEAST_SIDE || size.1 < LEAST_SIDE {
+            return Err(ImportError::TooSmall { path: path.to_owned(), size });
+        }
+
+        match &self.first {
+            None => self.first = Some((path.to_owned(), size)),
+            Some((first, first_size)) if *first_size != size => {
+                let first = first.clone();
+                let other = path.to_owned();
+                return Err(ImportError::Sizes { first, size: *first_size, other, other_size: size });
+            }
+            Some(_) => {}
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
+        let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let picture = decode(&bytes, false).map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+        Ok(picture.into_gray(&mut self.reconstructor))
+    }
+}
+
+/// The files in `folder` and in the folders directly in it, sorted.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
+    let entries = |folder: &Path| -> Result<Vec<PathBuf>, ImportError> {
+        let unreadable = |error| ImportError::Unreadable { path: folder.to_owned(), error };
+        let entries = std::fs::read_dir(folder).map_err(unreadable)?;
+        entries.map(|entry| entry.map(|entry| entry.path()).map_err(unreadable)).collect()
+    };
+
+    let (folders, mut files): (Vec<_>, Vec<_>) = entries(folder)?.into_iter().partition(|path| path.is_dir());
+    for folder in folders {
+        files.extend(entries(&folder)?);
+    }
+
+    files.sort();
+    Ok(files)
+}
+
+/// Pose and focal power of a name like `pose0001_f0.350.png`; `None` for any other file.
+fn parse(name: &str) -> Option<Result<(usize, FocalPower), String>> {
+    let (stem, extension) = name.rsplit_once('.')?;
+    if !["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
+        return None;
+    }
+
+    let (pose, power) = stem.strip_prefix("pose")?.split_once("_f")?;
+    let number = pose.parse::<usize>().map_err(|_| format!("'{pose}' is not the number of a pose"));
+    let power = power
+        .parse::<f64>()
+        .map_err(|_| format!("'{power}' is not a focal power"))
+        .and_then(|value| FocalPower::new(value).map_err(|error| error.to_string()));
+    Some(number.and_then(|number| power.map(|power| (number, power))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_pose_and_focal_power() {
+        let parsed = |name| parse(name).map(|parsed| parsed.map(|(pose, power)| (pose, power.get())));
+        assert_eq!(parsed("pose0012_f0.350.png"), Some(Ok((12, 0.35))));
+        assert_eq!(parsed("pose3_f1.TIFF"), Some(Ok((3, 1.0))));
+        assert_eq!(parsed("notes.txt"), None);
+        assert_eq!(parsed("overview.png"), None);
+        assert!(parsed("pose1_f1.5.png").unwrap().unwrap_err().contains("from 0 to 1"));
+        assert!(parsed("poseA_f0.5.png").unwrap().unwrap_err().contains("is not the number of a pose"));
+    }
+}

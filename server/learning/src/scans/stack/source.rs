@@ -1,0 +1,130 @@
+//! Focal stacks named on the command line, and their pictures at the scales at which they are used.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::check::check;
+use super::optics::Optics;
+use super::{FocalStack, Plane, StackError};
+use crate::scans::planes::{PlaneStack, PlanesError};
+use parfocal_base::BlurRate;
+use parfocal_imaging::{GrayImage, in_blocks};
+
+/// The two scales: names, and the width in pixels to which a stack's pictures are reduced as nearly as possible. It is
+/// unknown how soft a lens's best picture is on the sensor, so each stack is used at both.
+const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
+/// Least number of planes in a range, if the number is not given.
+const LEAST_PLANES: usize = 6;
+
+/// Why a focal stack cannot be scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum UnfitStack {
+    /// It cannot be read, or its pictures are not a stack.
+    #[error(transparent)]
+    Stack(#[from] StackError),
+    /// Its pictures are too few or too small, or differ in size.
+    #[error("{} is not a focal stack: {source}", folder.display())]
+    Planes {
+        /// The stack's folder.
+        folder: PathBuf,
+        /// What is wrong with its pictures.
+        source: PlanesError,
+    },
+    /// It has fewer planes than the range needs, or is too small.
+    #[error("{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
+             pixels", folder.display())]
+    TooSmall {
+        /// The stack's folder.
+        folder: PathBuf,
+        /// Planes of the range.
+        planes: usize,
+    },
+}
+
+/// A focal stack's folder, and how many of its pictures make the range 0..=1 of a scan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StackSource {
+    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
+    pub folder: PathBuf,
+    /// Planes of the range; if it is `None`, two fifths of the stack's, but at least 6.
+    pub planes: Option<usize>,
+}
+
+/// A stack's pictures at one scale.
+#[derive(Debug, Clone)]
+pub struct ScaledStack {
+    /// `s` or `l`: about 500 or 1000 pixels wide.
+    pub scale: &'static str,
+    /// Planes that make the range 0..=1.
+    pub planes: usize,
+    /// The pictures; their positions count the planes from 0.
+    pub pictures: Arc<PlaneStack>,
+    /// The same pictures, to measure the blur rate.
+    stack: FocalStack,
+}
+
+impl ScaledStack {
+    /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
+    #[must_use]
+    pub fn blur_rate(&self) -> Option<BlurRate> {
+        let rate = Optics::of_focus(&self.stack).blur_per_unit?;
+        BlurRate::new(rate * (self.planes - 1) as f64)
+    }
+}
+
+impl StackSource {
+    /// The source that `DIR` or `DIR:PLANES` names.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
+        match split {
+            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes) },
+            None => Self { folder: text.into(), planes: None },
+        }
+    }
+
+    /// The folder's name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
+    }
+
+    /// Reads the stack and reduces it to each of the scales. Also returns warnings about its pictures, as text for
+    /// people. A scan is possible despite them.
+    ///
+    /// # Errors
+    /// If the stack cannot be read, or its pictures are not a stack.
+    pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
+        let stack = FocalStack::load(&self.folder, None, 1)?;
+        let doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
+        let planes = self.planes.unwrap_or((2 * stack.planes().len() / 5).max(LEAST_PLANES)).max(1);
+        let (width, _) = stack.size();
+
+        let scaled = |(scale, wide): (&'static str, usize)| {
+            let side = ((width as f64 / wide as f64).round() as usize).max(1);
+            let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
+            let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
+
+            let unfit = |source| UnfitStack::Planes { folder: self.folder.clone(), source };
+            let pictures = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
+
+            let plane = |(at, picture): (f32, GrayImage)| Plane { name: at.to_string(), position: at.into(), picture };
+            let stack = FocalStack::new(numbered.into_iter().map(plane).collect())?;
+            Ok(ScaledStack { scale, planes, pictures, stack })
+        };
+        let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, UnfitStack>>()?;
+        let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
+        Ok((scaled, doubts.into_iter().map(named).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_may_say_how_many_planes_make_the_range() {
+        assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
+        assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
+    }
+}

@@ -1,0 +1,156 @@
+//! The folder of a training. It belongs to one training and one process at a time, and is never left with an incomplete
+//! file under its final name.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::checkpoint::{CHECKPOINT, Checkpoint};
+use crate::training::error::TrainError;
+use parfocal_base::files;
+
+const LOCK: &str = ".lock";
+
+/// A training's folder.
+#[derive(Debug)]
+pub(super) struct RunFolder {
+    path: PathBuf,
+    /// Holds the lock until it is dropped.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Locks a new or empty folder for a new training.
+    ///
+    /// # Errors
+    /// If it holds anything, another process is training there, or it cannot be written.
+    pub fn begin(path: &Path) -> Result<Self, TrainError> {
+        let unwritable = |source| TrainError::writing(path, source);
+        fs::create_dir_all(path).map_err(unwritable)?;
+        let was_locked_before = path.join(LOCK).exists();
+        let lock = lock(path)?;
+
+        let foreign = |entry: fs::DirEntry| {
+            let name = entry.file_name();
+            name != LOCK && !files::is_partial(&name.to_string_lossy())
+        };
+
+        if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {
+            if !was_locked_before {
+                // Leave no file of ours in a folder with other files.
+                let _ = fs::remove_file(path.join(LOCK));
+            }
+
+            let path = path.to_owned();
+            let ours = path.join(CHECKPOINT).exists();
+            return Err(if ours { TrainError::Begun(path) } else { TrainError::Occupied(path) });
+        }
+
+        Ok(Self { path: path.to_owned(), _lock: lock })
+    }
+
+    /// Locks the folder of a training that is resumed, and reads its checkpoint. Removes partial files that a killed
+    /// process left.
+    ///
+    /// # Errors
+    /// If there is no checkpoint, it cannot be used, or another process is training there.
+    pub fn go_on(path: &Path) -> Result<(Self, Checkpoint<'static>), TrainError> {
+        if !path.join(CHECKPOINT).exists() {
+            return Err(TrainError::NothingToResume(path.to_owned()));
+        }
+
+        let lock = lock(path)?;
+        let unwritable = |source| TrainError::writing(path, source);
+
+        for entry in fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok) {
+            if files::is_partial(&entry.file_name().to_string_lossy()) {
+                fs::remove_file(entry.path()).map_err(unwritable)?;
+            }
+        }
+
+        let checkpoint = Checkpoint::read(&path.join(CHECKPOINT))?;
+        Ok((Self { path: path.to_owned(), _lock: lock }, checkpoint))
+    }
+
+    /// The folder's path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes or replaces file `name`.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
+        let path = self.path.join(name);
+        files::replace(&path, bytes).map_err(|source| TrainError::writing(&path, source))
+    }
+
+    /// Writes or replaces the checkpoint.
+    pub fn save(&self, checkpoint: &Checkpoint<'_>) -> Result<(), TrainError> {
+        let path = self.path.join(CHECKPOINT);
+        checkpoint.write(&path).map_err(|source| TrainError::writing(&path, source))
+    }
+
+    /// Reads file `name`.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, TrainError> {
+        let path = self.path.join(name);
+        fs::read(&path).map_err(|source| TrainError::Unreadable { path, source })
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, TrainError> {
+    let path = folder.join(LOCK);
+    let failed = |source: io::Error| TrainError::writing(&path, source);
+    let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(TrainError::Busy(folder.to_owned())),
+        Err(TryLockError::Error(error)) => Err(failed(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_one_trainings_and_one_processes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let run = RunFolder::begin(&path).unwrap();
+        assert!(RunFolder::begin(&path).unwrap_err().to_string().contains("another training is running in"));
+        run.save(&Checkpoint::default()).unwrap();
+        assert!(RunFolder::go_on(&path).unwrap_err().to_string().contains("another training is running in"));
+        drop(run);
+        assert!(RunFolder::begin(&path).unwrap_err().to_string().contains("already holds a training"));
+        let half = path.join(".checkpoint.safetensors.partial");
+        fs::write(&half, "half").unwrap();
+        RunFolder::go_on(&path).unwrap();
+        assert!(!half.exists());
+    }
+
+    #[test]
+    fn files_of_others_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("MODEL_CARD.md"), "mine").unwrap();
+        assert!(RunFolder::begin(folder.path()).unwrap_err().to_string().contains("holds other files"));
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+        assert!(RunFolder::go_on(folder.path()).unwrap_err().to_string().contains("no checkpoint to continue from"));
+        // A training that was refused for its footage leaves only the lock file. The folder can be used again.
+        fs::remove_file(folder.path().join("MODEL_CARD.md")).unwrap();
+        drop(RunFolder::begin(folder.path()).unwrap());
+        RunFolder::begin(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn a_full_disk_is_reported_with_advice() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = |path: &Path| TrainError::writing(path, io::ErrorKind::StorageFull.into()).to_string();
+        let file = folder.path().join("curves.csv");
+        let error = told(&file);
+        assert!(error.contains("curves.csv") && error.contains("make room, then start again"), "{error}");
+        fs::write(folder.path().join(CHECKPOINT), "").unwrap();
+        for path in [&file, folder.path()] {
+            assert!(told(path).contains("make room, then continue from the last checkpoint with --resume"));
+        }
+    }
+}

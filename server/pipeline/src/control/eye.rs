@@ -1,0 +1,54 @@
+//! The eye: makes what policies see of a frame, from a mosaic or a colour picture.
+
+use super::pilot::HoldReason;
+use parfocal_autofocus::FieldOfView;
+use parfocal_base::step::Hold;
+use parfocal_devices::camera::FrameImage;
+use parfocal_imaging::{ContentArea, Patch, PatchArea, Reconstructor, View, rgb_patch, rgb_view};
+
+/// Finds the patch, and reconstructs only the part of the picture that a policy uses.
+pub struct Eye {
+    reconstructor: Reconstructor,
+}
+
+impl Eye {
+    /// An eye for colour pictures, and for mosaics of the camera for which `reconstructor` is calibrated.
+    #[must_use]
+    pub const fn new(reconstructor: Reconstructor) -> Self {
+        Self { reconstructor }
+    }
+
+    /// Place of the patch in `image`: at the centre of `content`, or of the picture if there is no content area.
+    ///
+    /// # Errors
+    /// If the picture is smaller than a patch.
+    pub fn find(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<PatchArea, HoldReason> {
+        let (width, height) = match image {
+            FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
+            FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
+        };
+
+        PatchArea::central(width, height, content).map_err(|error| {
+            HoldReason::new(Hold::CameraFailed, &format!("the camera's picture cannot be used: {error}"))
+        })
+    }
+
+    /// Reconstructs the patch of `image` at `area`.
+    #[must_use]
+    pub fn patch(&self, image: &FrameImage, area: PatchArea) -> Patch {
+        match image {
+            FrameImage::Mosaic(mosaic) => self.reconstructor.gray_patch(mosaic, area),
+            FrameImage::Rgb(rgb) => rgb_patch(rgb, area),
+        }
+    }
+
+    /// Reconstructs what a policy with the field of view `field` sees of `image`, whose patch is at `area`.
+    #[must_use]
+    pub fn look(&self, image: &FrameImage, area: PatchArea, field: FieldOfView) -> View {
+        match (field, image) {
+            (FieldOfView::Patch, _) => View::from(self.patch(image, area)),
+            (FieldOfView::Wide, FrameImage::Mosaic(mosaic)) => self.reconstructor.gray_view(mosaic, area),
+            (FieldOfView::Wide, FrameImage::Rgb(rgb)) => rgb_view(rgb, area),
+        }
+    }
+}

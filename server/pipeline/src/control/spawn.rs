@@ -1,0 +1,293 @@
+//! The loop's thread: starts it, passes frames to the stepper, publishes the results, and ends it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use std::{io, thread};
+
+use tokio::sync::{mpsc, watch};
+
+use super::eye::Eye;
+use super::pilot::HoldReason;
+use super::runner::guarded;
+use super::source::Source;
+use super::stepper::Stepper;
+use super::tap::Tap;
+use super::window::LatencyWindow;
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot};
+use parfocal_autofocus::Registry;
+use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::priority::{self, Place, Standing};
+use parfocal_base::step::Hold;
+use parfocal_base::step::StepRecord;
+use parfocal_devices::camera::{Camera, CameraOffer, Controls, Frame};
+use parfocal_devices::lens::{Lens, LensDynamics};
+use parfocal_imaging::Reconstructor;
+
+/// Longest wait for a frame before the loop looks for commands.
+const TICK: Duration = Duration::from_millis(20);
+/// Time without a frame after which the camera counts as failed.
+const NO_FRAME: Duration = Duration::from_millis(300);
+/// Status is published this often, and at every change.
+const STATUS_INTERVAL: Duration = Duration::from_millis(200);
+/// Longest wait, at the end, for a camera that does not answer.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// The parts of the loop.
+pub struct Rig {
+    /// The source of frames.
+    pub camera: Box<dyn Camera>,
+    /// The lens to move.
+    pub lens: Box<dyn Lens>,
+    /// Reconstructs the patch from a mosaic.
+    pub reconstructor: Reconstructor,
+    /// The policies that can be put in charge.
+    pub registry: Registry,
+    /// The clock for latencies and time limits.
+    pub clock: Arc<dyn Clock>,
+}
+
+/// How the loop runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// Time between two frames. It is also the longest wait for a policy's answer.
+    pub frame_period: Duration,
+    /// Capacity of the telemetry channel, in records. Further records are dropped.
+    pub telemetry_capacity: usize,
+    /// The measured dynamics of the lens; `None` to use those that its driver assumes.
+    pub dynamics: Option<LensDynamics>,
+}
+
+/// The running loop. Dropping it ends the loop and its camera, and waits for both. The lens is released first. A camera
+/// that hangs is waited for at most one second.
+pub struct ControlLoop {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl ControlLoop {
+    /// Starts the loop. The lens stays where it is until a command comes. Also returns the handle for the rest of the
+    /// server, and the telemetry; records that are not taken in time are dropped and counted.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
+        let Rig { camera, lens, reconstructor, registry, clock } = rig;
+        let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
+        let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period)
+            .moving(dynamics);
+
+        let controls = camera.controls();
+        let source = Source::start(camera)?;
+
+        let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));
+        let (commands_in, commands) = mpsc::unbounded_channel();
+        let frames = Arc::new(LatestSlot::default());
+        let stop = Arc::new(AtomicBool::new(false));
+
+        let tap = Tap::default();
+        let outlets = Outlets { telemetry, frames: frames.clone(), tap: tap.clone() };
+        let worker = Worker::new(stepper, source, clock, outlets, controls.clone());
+        let status = worker.status.subscribe();
+        let handle = ControlHandle { commands: commands_in, status, frames, camera: controls, tap };
+
+        let stopping = stop.clone();
+        let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
+
+        Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
+    }
+}
+
+impl ControlLoop {
+    /// Ends the loop, just like dropping it.
+    pub fn stop(self) {
+        drop(self);
+    }
+}
+
+impl Drop for ControlLoop {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the control loop ended by a panic");
+        }
+    }
+}
+
+/// The outputs of the loop. None of them makes it wait.
+struct Outlets {
+    telemetry: mpsc::Sender<StepRecord>,
+    frames: Arc<LatestSlot<ControlledFrame>>,
+    tap: Tap,
+}
+
+/// The state of the loop's thread.
+struct Worker {
+    stepper: Stepper,
+    source: Source,
+    clock: Arc<dyn Clock>,
+    outlets: Outlets,
+    /// Read only for the status.
+    controls: Option<Controls>,
+    status: watch::Sender<Arc<ControlStatus>>,
+    published_at: Moment,
+    last_frame_at: Moment,
+    /// Why there are no usable frames: none come, or they are too small for a patch.
+    camera_fault: Option<HoldReason>,
+    /// Whether the policy caused the present hold, and since when the lens has been held for such a cause.
+    held_since: Option<(bool, Moment)>,
+    window: LatencyWindow,
+    steps: u64,
+    telemetry_dropped: u64,
+    /// Scheduling priority of the loop's thread.
+    priority: Standing,
+}
+
+impl Worker {
+    fn new(
+        stepper: Stepper,
+        source: Source,
+        clock: Arc<dyn Clock>,
+        outlets: Outlets,
+        controls: Option<Controls>,
+    ) -> Self {
+        let now = clock.now();
+        let first = ControlStatus {
+            at: now,
+            camera: source.health(),
+            camera_offer: CameraOffer::default(),
+            lens: stepper.lens_health(),
+            policy: None,
+            focal_power: stepper.focal_power(),
+            held: None,
+            held_for: Duration::ZERO,
+            message: None,
+            steps_per_second: 0.0,
+            steps: 0,
+            telemetry_dropped: 0,
+            latency_p50_micros: 0,
+            latency_p99_micros: 0,
+            priority: Standing::Ordinary,
+        };
+
+        Self {
+            stepper,
+            source,
+            clock,
+            outlets,
+            controls,
+            status: watch::Sender::new(Arc::new(first)),
+            published_at: now,
+            last_frame_at: now,
+            camera_fault: None,
+            held_since: None,
+            window: LatencyWindow::default(),
+            steps: 0,
+            telemetry_dropped: 0,
+            priority: Standing::Ordinary,
+        }
+    }
+
+    fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
+        self.priority = priority::raise(Place::Loop);
+        while !stop.load(Ordering::Relaxed) {
+            let frame = self.source.frames.take(TICK);
+            while let Ok(command) = commands.try_recv() {
+                self.stepper.obey(command);
+            }
+            // The last line of defence: if a frame causes a panic, the loop continues with the next one.
+            if let Err(panic) = guarded(|| self.turn(frame)) {
+                tracing::error!(panic, "a step of the control loop failed");
+            }
+        }
+
+        let Self { stepper, source, outlets, .. } = self;
+        // First, because a camera that hangs must not keep the lens under current.
+        drop(stepper);
+        outlets.frames.close();
+        if !source.stop(FAREWELL) {
+            tracing::warn!("the camera does not respond; its thread was abandoned");
+        }
+    }
+
+    fn turn(&mut self, frame: Option<Frame>) {
+        match frame {
+            Some(frame) => self.step(frame),
+            None => self.wait_on(),
+        }
+        self.publish();
+    }
+
+    fn step(&mut self, frame: Frame) {
+        self.last_frame_at = self.clock.now();
+
+        match self.stepper.step(frame) {
+            Ok(controlled) => {
+                self.camera_fault = None;
+                self.steps += 1;
+                self.window.add(self.last_frame_at, controlled.record.latency_micros);
+
+                if self.outlets.telemetry.try_send(controlled.record.clone()).is_err() {
+                    self.telemetry_dropped += 1;
+                }
+                self.outlets.tap.offer(&controlled);
+                self.outlets.frames.put(controlled);
+            }
+            Err(reason) => self.camera_fault = Some(reason),
+        }
+    }
+
+    fn wait_on(&mut self) {
+        self.stepper.idle();
+        if self.clock.now().since(self.last_frame_at) >= NO_FRAME {
+            let message = format!("no frame comes from the camera; the lens is held: {}", self.source.health().message);
+            self.camera_fault = Some(HoldReason::new(Hold::CameraFailed, &message));
+        }
+    }
+
+    /// Publishes the status if it is due, or if something changed that people must see at once.
+    fn publish(&mut self) {
+        let now = self.clock.now();
+        let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
+        self.held_since = reason.map(|reason| {
+            let caused_by_policy = reason.hold.caused_by_policy();
+            self.held_since.filter(|held| held.0 == caused_by_policy).unwrap_or((caused_by_policy, now))
+        });
+        let held = reason.map(|reason| reason.hold);
+        let message = reason.map(|reason| reason.message.clone());
+
+        let changed = {
+            let last = self.status.borrow();
+            last.held != held || last.message != message || last.policy.as_ref() != self.stepper.policy()
+        };
+        if !changed && now.since(self.published_at) < STATUS_INTERVAL {
+            return;
+        }
+
+        self.published_at = now;
+        let figures = self.window.figures(now);
+        let mut camera = self.source.health();
+        camera.working &= held != Some(Hold::CameraFailed);
+
+        self.status.send_replace(Arc::new(ControlStatus {
+            at: now,
+            camera,
+            camera_offer: self.controls.as_ref().map(Controls::offered).unwrap_or_default(),
+            lens: self.stepper.lens_health(),
+            policy: self.stepper.policy().cloned(),
+            focal_power: self.stepper.focal_power(),
+            held,
+            held_for: self.held_since.map_or(Duration::ZERO, |(_, since)| now.since(since)),
+            message,
+            steps_per_second: figures.steps as f64,
+            steps: self.steps,
+            telemetry_dropped: self.telemetry_dropped,
+            latency_p50_micros: figures.p50,
+            latency_p99_micros: figures.p99,
+            priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
+        }));
+    }
+}

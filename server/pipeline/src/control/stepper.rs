@@ -1,0 +1,241 @@
+//! One step of the loop: frame -> patch -> policy -> lens command. Has no thread except the policy's.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::advice::Advice;
+use super::attribution::Attribution;
+use super::eye::Eye;
+use super::pilot::{HoldReason, Pilot};
+use super::runner::guarded;
+use super::{Command, ControlledFrame, Drive};
+use parfocal_autofocus::{Observation, Registry};
+use parfocal_base::FocalPower;
+use parfocal_base::PolicyName;
+use parfocal_base::clock::Clock;
+use parfocal_base::ids::SegmentId;
+use parfocal_base::step::Hold;
+use parfocal_base::step::StepRecord;
+use parfocal_devices::camera::Frame;
+use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth};
+use parfocal_imaging::{ContentArea, PatchArea};
+
+/// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation that runs faster than
+/// real time.
+pub struct Stepper {
+    clock: Arc<dyn Clock>,
+    lens: Box<dyn Lens>,
+    eye: Eye,
+    pilot: Pilot,
+    attribution: Attribution,
+    drive: Drive,
+    /// Whether a frame was exposed after the lens had reached the policy's start. Until then the policy is not asked.
+    placed: bool,
+    segment: Option<SegmentId>,
+    content_area: Option<ContentArea>,
+    /// The last focal power that the lens accepted.
+    asked: FocalPower,
+    /// The focal power to command next. Differs from `asked` only while the lens does not accept commands.
+    wanted: FocalPower,
+    /// Why the lens did not accept the last command; `None` if it did.
+    lens_fault: Option<HoldReason>,
+    /// Why the last step held the lens instead of following a policy; `None` if it did not.
+    step_hold: Option<HoldReason>,
+}
+
+impl Stepper {
+    /// A loop that holds `lens` where it is until a command comes. Waits for a policy at most `patience` per frame.
+    #[must_use]
+    pub fn new(lens: Box<dyn Lens>, eye: Eye, registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
+        let start = lens.measured().unwrap_or(FocalPower::MIDDLE);
+        Self {
+            attribution: Attribution::new(lens.dynamics(), start),
+            pilot: Pilot::new(registry, clock.clone(), patience),
+            clock,
+            lens,
+            eye,
+            drive: Drive::Manual(start),
+            placed: false,
+            segment: None,
+            content_area: None,
+            asked: start,
+            wanted: start,
+            lens_fault: None,
+            step_hold: None,
+        }
+    }
+
+    /// Uses `dynamics`, the measured dynamics of the lens, instead of those that its driver assumes.
+    #[must_use]
+    pub fn moving(mut self, dynamics: LensDynamics) -> Self {
+        self.attribution = Attribution::new(dynamics, self.asked);
+        self
+    }
+
+    /// Carries out `command`. Drive and segment change together, between two frames.
+    pub fn obey(&mut self, command: Command) {
+        match command {
+            Command::ContentArea(area) => self.content_area = area,
+            Command::Drive { drive, segment } => {
+                self.segment = segment;
+                self.change_driver(drive);
+                self.tell_lens();
+            }
+        }
+    }
+
+    fn change_driver(&mut self, drive: Drive) {
+        self.wanted = match &drive {
+            Drive::Manual(power) => *power,
+            Drive::Hold { at } => at.unwrap_or(self.asked),
+            Drive::Policy { start, .. } => start.unwrap_or(self.asked),
+        };
+        let policy = match &drive {
+            Drive::Policy { name, .. } => Some(name.clone()),
+            Drive::Manual(_) | Drive::Hold { .. } => None,
+        };
+
+        self.step_hold = None;
+        self.placed = false;
+        self.drive = drive;
+        self.pilot.engage(policy);
+    }
+
+    /// Takes one step on `frame`.
+    ///
+    /// # Errors
+    /// If the picture is too small for a patch. Nothing is commanded then.
+    pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
+        // While the lens is disconnected, its focal power is unknown.
+        let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
+        let patch = self.eye.find(&frame.image, self.content_area.as_ref())?;
+
+        let asks = self.asks_policy(&frame);
+        let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
+        let outcome = match asks {
+            Ok(true) => self.ask(&frame, patch).map(Some),
+            Ok(false) => Ok(None),
+            Err(reason) => Err(reason),
+        };
+        let advice = self.act(outcome);
+
+        let record = StepRecord {
+            frame: frame.number,
+            exposed_at: frame.exposed_at,
+            segment: self.segment,
+            policy,
+            asked: self.asked,
+            measured,
+            metric: advice.as_ref().and_then(|advice| advice.metric),
+            policy_micros: advice.as_ref().map_or(0, |advice| micros(advice.took)),
+            latency_micros: micros(self.clock.now().since(frame.exposed_at)),
+            held: self.hold_reason().map(|reason| reason.hold),
+            optimal: frame.truth.map(|truth| truth.optimal),
+        };
+
+        let belief = advice.and_then(|advice| advice.belief);
+        Ok(ControlledFrame { frame, patch, content_area: self.content_area, record, belief })
+    }
+
+    /// Called while no frames come. Repeats the command to the lens, so that the slider works without a camera, and a
+    /// lens that is back is noticed.
+    pub fn idle(&mut self) {
+        self.tell_lens();
+    }
+
+    /// Whether to ask the policy about `frame`.
+    ///
+    /// # Errors
+    /// If the lens must be held instead.
+    fn asks_policy(&mut self, frame: &Frame) -> Result<bool, HoldReason> {
+        match &self.drive {
+            Drive::Manual(_) => return Ok(false),
+            Drive::Hold { .. } => return Err(HoldReason::new(Hold::Paused, "paused on request")),
+            Drive::Policy { .. } => {}
+        }
+
+        if let Some(fault) = &self.lens_fault {
+            // Frames from a lens that does not move would mislead the policy.
+            return Err(fault.clone());
+        }
+
+        self.placed = self.placed || self.attribution.settled(frame.middle());
+        Ok(self.placed)
+    }
+
+    /// Asks the policy about `frame`, whose patch is at `patch`. Makes the view only now, and only as wide as the
+    /// policy needs.
+    fn ask(&mut self, frame: &Frame, patch: PatchArea) -> Result<Advice, HoldReason> {
+        let view = self.eye.look(&frame.image, patch, self.pilot.field_of_view());
+        let focal_power = self.attribution.focal_power(frame.middle());
+        self.pilot.ask(&Observation { view: &view, focal_power })
+    }
+
+    /// Commands the lens according to `outcome`. If the lens must be held, remembers the reason.
+    fn act(&mut self, outcome: Result<Option<Advice>, HoldReason>) -> Option<Advice> {
+        let (advice, hold) = match outcome {
+            Ok(advice) => (advice, None),
+            Err(reason) => (None, Some(reason)),
+        };
+
+        self.step_hold = hold;
+        if let Some(advice) = &advice {
+            self.wanted = advice.target;
+        }
+
+        self.tell_lens();
+        if advice.is_some() {
+            // Advice that the lens did not accept is not repeated later, when its frame is long past.
+            self.wanted = self.asked;
+        }
+        advice
+    }
+
+    fn tell_lens(&mut self) {
+        let failure = match guarded(|| self.lens.set(self.wanted)) {
+            Ok(Ok(())) => {
+                self.asked = self.wanted;
+                self.attribution.commanded(self.clock.now(), self.wanted);
+                None
+            }
+            Ok(Err(error)) => Some(error),
+            Err(panic) => Some(LensError::Gone(format!("its driver failed: {panic}"))),
+        };
+
+        match (&failure, &self.lens_fault) {
+            (Some(error), None) => tracing::warn!(%error, "the lens does not accept commands"),
+            (None, Some(_)) => tracing::info!("the lens accepts commands again"),
+            _ => (),
+        }
+
+        self.lens_fault = failure.map(|error| HoldReason::new(Hold::LensFailed, &format!("{error}; trying again")));
+    }
+
+    /// The lens's health.
+    #[must_use]
+    pub fn lens_health(&self) -> LensHealth {
+        self.lens.health()
+    }
+
+    /// The last focal power that the lens accepted.
+    #[must_use]
+    pub const fn focal_power(&self) -> FocalPower {
+        self.asked
+    }
+
+    /// The policy that drives the lens, if any.
+    #[must_use]
+    pub const fn policy(&self) -> Option<&PolicyName> {
+        self.pilot.policy()
+    }
+
+    /// Why the lens is held; `None` if it is not.
+    #[must_use]
+    pub fn hold_reason(&self) -> Option<&HoldReason> {
+        self.lens_fault.as_ref().or(self.step_hold.as_ref())
+    }
+}
+
+fn micros(duration: Duration) -> u32 {
+    u32::try_from(duration.as_micros()).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,109 @@
+//! The thread that makes the pictures of one larger size, while it has viewers. It takes the latest
+//! frame whenever it is done with one, so neither the smallest size nor the loop waits for it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::outlet::Outlet;
+use super::studio::Studio;
+use crate::control::{ControlledFrame, LatestSlot};
+use parfocal_base::clock::{Clock, Moment};
+use parfocal_imaging::{Developer, Size};
+
+/// Longest wait for a frame before checking whether more will come.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Least time between the exposures of two pictures at [`Size::Full`], for 25 a second. At a camera's own rate they
+/// would keep most of a core busy. Their number would then depend on what else the machine does, such as running a
+/// policy.
+const FULL_INTERVAL: Duration = Duration::from_millis(38);
+
+/// The thread of one larger size; ends when dropped.
+pub(super) struct Larger {
+    slot: Arc<LatestSlot<ControlledFrame>>,
+    outlet: Outlet,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Larger {
+    /// Starts the thread for `size`, which publishes its pictures through `outlet`.
+    ///
+    /// # Errors
+    /// If the system cannot create a thread or an encoder.
+    pub(super) fn start(
+        developer: Developer,
+        size: Size,
+        outlet: Outlet,
+        clock: Arc<dyn Clock>,
+    ) -> std::io::Result<Self> {
+        let slot = Arc::<LatestSlot<ControlledFrame>>::default();
+        let studio = Studio::new(developer, size).map_err(std::io::Error::other)?;
+        let worker = Worker { slot: Arc::clone(&slot), outlet: outlet.clone(), clock, studio, last: None };
+
+        let name = format!("imaging-{}", size.name());
+        let thread = std::thread::Builder::new().name(name).spawn(move || worker.run())?;
+        Ok(Self { slot, outlet, thread: Some(thread) })
+    }
+
+    /// Hands `frame` over if this size has viewers; never waits.
+    pub(super) fn offer(&self, frame: &ControlledFrame) {
+        if self.outlet.is_watched() {
+            self.slot.put(frame.clone());
+        }
+    }
+}
+
+impl Drop for Larger {
+    fn drop(&mut self) {
+        self.slot.close();
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+struct Worker {
+    slot: Arc<LatestSlot<ControlledFrame>>,
+    outlet: Outlet,
+    clock: Arc<dyn Clock>,
+    studio: Studio,
+    /// When the last frame that became a picture was exposed.
+    last: Option<Moment>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        parfocal_base::priority::lower_further();
+        while !self.slot.is_closed() {
+            let Some(frame) = self.slot.take(PATIENCE) else { continue };
+            // Its last viewer may have left meanwhile.
+            if !self.outlet.is_watched() || !self.is_due(&frame) {
+                continue;
+            }
+
+            // One bad picture must not end the live view.
+            if catch_unwind(AssertUnwindSafe(|| self.make(frame))).is_err() {
+                tracing::error!("a larger picture could not be made; continuing with the next");
+            }
+        }
+    }
+
+    fn is_due(&self, frame: &ControlledFrame) -> bool {
+        let exposed = frame.frame.exposed_at;
+        let early = |last| self.studio.size() == Size::Full && exposed.since(last) < FULL_INTERVAL;
+        !self.last.is_some_and(early)
+    }
+
+    fn make(&mut self, frame: ControlledFrame) {
+        self.last = Some(frame.frame.exposed_at);
+        let began = self.clock.now();
+        let step = frame.record.clone();
+
+        self.studio.develop(&frame.frame.image);
+        match self.studio.encode(frame) {
+            Ok(frame) => self.outlet.publish(frame),
+            Err(error) => tracing::error!(%error, "a larger picture could not be encoded"),
+        }
+        self.outlet.note_time(&step, self.clock.now().since(began));
+    }
+}

@@ -1,0 +1,111 @@
+//! Live: the imaging threads. They prepare each frame once for all viewers of a size. A slow viewer misses frames but
+//! delays nobody.
+
+mod area;
+mod counts;
+mod follow;
+mod larger;
+mod lead;
+mod outlet;
+mod picture;
+mod studio;
+mod thread;
+
+pub use area::AreaWatch;
+pub use counts::Counts;
+pub use follow::Follower;
+pub use picture::{EncodedFrame, Insight, Picture};
+pub use thread::{DETECT_EVERY, start};
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use tokio::sync::watch;
+
+use lead::{Lead, Leaders};
+use parfocal_imaging::Size;
+
+/// The latest frame of one size.
+type Latest = watch::Receiver<Option<Arc<EncodedFrame>>>;
+
+/// The viewers' source of frames. Clone freely.
+#[derive(Debug, Clone)]
+pub struct LiveHandle {
+    /// Indexed by [`Size`], up to the largest size of the camera's pictures.
+    frames: Arc<[Latest]>,
+    counts: Arc<Counts>,
+    leaders: watch::Sender<Leaders>,
+}
+
+impl LiveHandle {
+    /// Joins the viewers of `size`, or of the largest size if that is smaller. A size without viewers is not made.
+    #[must_use]
+    pub fn watch(&self, size: Size) -> Watcher {
+        self.join(size, false)
+    }
+
+    /// Joins the viewers of `size` as a leading one: a [`Follower`] gets the largest size that any leading viewer has.
+    #[must_use]
+    pub fn lead(&self, size: Size) -> Watcher {
+        self.join(size, true)
+    }
+
+    fn join(&self, size: Size, leads: bool) -> Watcher {
+        let size = size.min(self.largest());
+        self.counts.of(size).viewers.fetch_add(1, Ordering::Relaxed);
+        let mut frames = self.frames[size as usize].clone();
+
+        // A frame made earlier is stale by the time somebody joins.
+        frames.mark_unchanged();
+
+        let lead = leads.then(|| Lead::new(size, self.leaders.clone()));
+        Watcher { size, frames, counts: Arc::clone(&self.counts), _lead: lead }
+    }
+
+    /// The largest size of the camera's pictures.
+    #[must_use]
+    pub fn largest(&self) -> Size {
+        Size::ALL[self.frames.len() - 1]
+    }
+
+    /// Counts of the imaging threads' work so far.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+}
+
+/// One viewer among those of a size; leaves when dropped.
+#[derive(Debug)]
+pub struct Watcher {
+    size: Size,
+    frames: Latest,
+    counts: Arc<Counts>,
+    /// Set for a leading viewer.
+    _lead: Option<Lead>,
+}
+
+impl Watcher {
+    /// The size of its frames.
+    #[must_use]
+    pub const fn size(&self) -> Size {
+        self.size
+    }
+
+    /// The latest frame not seen yet, waiting for one if needed; `None` once the imaging thread has
+    /// ended. Dropping the future loses nothing.
+    pub async fn next(&mut self) -> Option<Arc<EncodedFrame>> {
+        loop {
+            self.frames.changed().await.ok()?;
+            if let Some(frame) = self.frames.borrow_and_update().clone() {
+                return Some(frame);
+            }
+        }
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.counts.of(self.size).viewers.fetch_sub(1, Ordering::Relaxed);
+    }
+}

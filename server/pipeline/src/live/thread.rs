@@ -1,0 +1,127 @@
+//! The imaging thread: takes the loop's latest frame, makes the picture at the size of the cells, hands the
+//! frame on to the larger sizes, and looks for the content area.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use super::area::AreaWatch;
+use super::larger::Larger;
+use super::outlet::Outlet;
+use super::studio::Studio;
+use super::{Counts, LiveHandle};
+use crate::control::{Command, ControlHandle, ControlledFrame};
+use parfocal_base::clock::Clock;
+use parfocal_imaging::{Developer, Size, content_area};
+
+/// Frames from one search for the content area to the next. The area moves slowly, as the eyepiece slips in a hand.
+pub const DETECT_EVERY: u64 = 10;
+
+/// Longest wait for a frame before checking whether more will come.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Starts the thread, and one for each larger size up to `largest`; they end when the loop closes its slot.
+///
+/// # Errors
+/// If the system cannot create a thread or an encoder.
+pub fn start(
+    control: ControlHandle,
+    developer: &Developer,
+    largest: Size,
+    clock: &Arc<dyn Clock>,
+) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
+    let counts = Arc::new(Counts::default());
+    let outlet = |size| {
+        let (sender, frames) = watch::channel(None);
+        (Outlet::new(size, sender, Arc::clone(&counts)), frames)
+    };
+
+    let (cells, latest) = outlet(Size::Cell);
+    let mut frames = vec![latest];
+    let mut larger = Vec::new();
+    for size in Size::ALL.into_iter().filter(|size| (Size::Half..=largest).contains(size)) {
+        let (outlet, latest) = outlet(size);
+        frames.push(latest);
+        larger.push(Larger::start(developer.clone(), size, outlet, Arc::clone(clock))?);
+    }
+
+    let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
+    let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts), leaders: watch::Sender::default() };
+    let worker = Worker {
+        control,
+        outlet: cells,
+        counts,
+        clock: Arc::clone(clock),
+        studio,
+        larger,
+        areas: AreaWatch::default(),
+        looked: None,
+    };
+    let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
+
+    Ok((handle, thread))
+}
+
+struct Worker {
+    control: ControlHandle,
+    outlet: Outlet,
+    counts: Arc<Counts>,
+    clock: Arc<dyn Clock>,
+    studio: Studio,
+    larger: Vec<Larger>,
+    areas: AreaWatch,
+    /// Number of the frame in which the content area was last looked for.
+    looked: Option<u64>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        parfocal_base::priority::lower();
+        while !self.control.frames.is_closed() {
+            let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
+
+            // One bad picture must not end the live view.
+            if catch_unwind(AssertUnwindSafe(|| self.turn(&frame))).is_err() {
+                tracing::error!("a picture could not be made; continuing with the next");
+            }
+        }
+    }
+
+    fn turn(&mut self, frame: &ControlledFrame) {
+        self.counts.note_step(&frame.record);
+        let watched = self.outlet.is_watched();
+
+        // We count from the last search: if frames come faster than this thread takes them, every multiple of ten could
+        // be among those that it misses.
+        let number = frame.frame.number;
+        let detect = self.looked.is_none_or(|looked| number.abs_diff(looked) >= DETECT_EVERY);
+
+        let began = self.clock.now();
+        let image = frame.frame.image.clone();
+        if watched || detect {
+            self.studio.develop(&image);
+        }
+
+        // The picture leaves first: its viewers wait neither for a larger size nor for the detection.
+        if watched {
+            match self.studio.encode(frame.clone()) {
+                Ok(frame) => self.outlet.publish(frame),
+                Err(error) => tracing::error!(%error, "a picture could not be encoded"),
+            }
+            self.counts.note_picture(Size::Cell, &frame.record, self.clock.now().since(began));
+        }
+        for larger in &self.larger {
+            larger.offer(frame);
+        }
+
+        if detect {
+            self.looked = Some(number);
+            if let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
+                self.control.send(Command::ContentArea(news));
+            }
+        }
+    }
+}

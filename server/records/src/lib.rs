@@ -1,0 +1,7 @@
+//! What is kept: the database of a site, the exports of its sessions, and the personal accounts.
+//!
+//! [`store`] is everything that is SQLite, and the only place with SQL; it decides nothing. [`accounts`] makes and
+//! changes personal accounts and says who is signed in, by the rules of `parfocal_trial::account`.
+
+pub mod accounts;
+pub mod store;

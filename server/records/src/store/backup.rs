@@ -1,0 +1,274 @@
+//! Makes and restores backups of a database. A backup can be made while a server writes, and is verified before it gets
+//! its name.
+
+use std::fs::{DirBuilder, File};
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use tempfile::NamedTempFile;
+
+use super::export::verify::{Check, Verdict};
+use super::lock::FolderLock;
+use super::schema::DATABASE;
+use super::verify::checks;
+use super::{Access, Head, Reader, Recorder, StoreError};
+use parfocal_base::clock::Clock;
+use parfocal_base::files::{make_private, sync_folder_of};
+
+/// What SQLite adds to a database's name for the files of its log.
+const LOG_SUFFIXES: [&str; 2] = ["-wal", "-shm"];
+
+/// Why nothing was backed up or restored.
+#[derive(Debug, thiserror::Error)]
+pub enum BackupError {
+    /// The file to write exists already.
+    #[error("{} exists; choose a new name", .0.display())]
+    Exists(PathBuf),
+    /// A file could not be read or written.
+    #[error("cannot use {}: {error}", .path.display())]
+    File {
+        /// Path of the file.
+        path: PathBuf,
+        /// The error of the file system.
+        error: std::io::Error,
+    },
+    /// The copy does not verify.
+    #[error("{what} does not verify: {problem}; nothing was changed")]
+    Unsound {
+        /// Path of the backup.
+        what: String,
+        /// The first problem found, in words.
+        problem: String,
+    },
+    /// The database failed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+    /// Another program reads the database that is to be replaced.
+    #[error("another program has the database {} open; close it and try again; nothing was changed", .0.display())]
+    Open(PathBuf),
+}
+
+impl BackupError {
+    fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        |error| Self::File { path: path.to_owned(), error }
+    }
+}
+
+/// A backup that was made.
+#[derive(Debug, Clone, Serialize)]
+pub struct Backup {
+    /// Path of its file.
+    pub file: PathBuf,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// Head of its chain, `NUMBER:HASH`.
+    pub head: String,
+}
+
+/// How the chain of a backup relates to the chain of the database that it replaces.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "relation", rename_all = "kebab-case")]
+pub enum Relation {
+    /// There was no database, or its chain cannot be read.
+    Nothing,
+    /// Both chains have the same rows.
+    Same,
+    /// The backup has all rows of the database, and more.
+    Later,
+    /// The database has all rows of the backup, and more.
+    Earlier {
+        /// Rows of the database that the backup does not have.
+        rows: i64,
+    },
+    /// The chains have different histories.
+    Apart {
+        /// Number of the first row that differs, from 1.
+        row: i64,
+    },
+}
+
+/// The result of a restore.
+#[derive(Debug, Clone, Serialize)]
+pub struct Restored {
+    /// Head of the backup's chain, `NUMBER:HASH`.
+    pub backup: String,
+    /// Head of the replaced database's chain; `None` if there was no readable one.
+    pub replaced: Option<String>,
+    /// Path where the replaced database is kept; `None` if there was none.
+    pub kept: Option<PathBuf>,
+    /// How the two chains relate.
+    #[serde(flatten)]
+    pub relation: Relation,
+}
+
+/// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The copy
+/// gets its name only when it is verified and on disk.
+///
+/// # Errors
+/// If `out` exists or cannot be written, the database cannot be read, or the copy does not verify.
+pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<Backup, BackupError> {
+    if out.exists() {
+        return Err(BackupError::Exists(out.to_owned()));
+    }
+
+    let copy = temporary_beside(out)?;
+    let recorder = Recorder::open(folder, clock).await?;
+    recorder.record(&Access::BackedUp).await?;
+    let copied = recorder.reader().copy_to(copy.path()).await;
+    recorder.close().await;
+    copied?;
+
+    let head = verified(copy.path(), &out.display().to_string()).await?;
+    let bytes = copy.as_file().metadata().map_err(BackupError::file(out))?.len();
+    synced(copy.path())?;
+    copy.persist_noclobber(out).map_err(|error| match error.error.kind() {
+        std::io::ErrorKind::AlreadyExists => BackupError::Exists(out.to_owned()),
+        _ => BackupError::File { path: out.to_owned(), error: error.error },
+    })?;
+    sync_folder_of(out);
+    Ok(Backup { file: out.to_owned(), bytes, head: head.to_string() })
+}
+
+/// Replaces the database of data folder `folder` by the backup `file`. The replaced database is kept beside it.
+///
+/// # Errors
+/// If a server uses the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
+pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
+    DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
+    let _lock = FolderLock::of(folder)?;
+    let database = folder.join(DATABASE);
+
+    let copy = temporary_beside(&database)?;
+    std::fs::copy(file, copy.path()).map_err(BackupError::file(file))?;
+    make_private(copy.path()).map_err(BackupError::file(copy.path()))?;
+    let head = verified(copy.path(), &file.display().to_string()).await?;
+
+    let there = database.exists();
+    let present = if there { readable(&database).await } else { None };
+    let relation = relation(present.as_ref(), copy.path(), &head).await?;
+    let replaced = match &present {
+        Some(reader) => Some(reader.head().await?),
+        None => None,
+    };
+    if let Some(reader) = present {
+        reader.close().await;
+    }
+
+    let recorder = Recorder::open_file(copy.path(), Arc::clone(&clock)).await?;
+    recorder.record(&Access::Restored { replaced: replaced.clone() }).await?;
+    recorder.close().await;
+    synced(copy.path())?;
+
+    let kept = if there { Some(set_aside(&database, clock.wall()).await?) } else { None };
+    if let Err(error) = copy.persist(&database) {
+        if let Some(kept) = &kept {
+            put_back(&database, kept);
+        }
+        return Err(BackupError::File { path: database, error: error.error });
+    }
+    sync_folder_of(&database);
+    let replaced = replaced.map(|head| head.to_string());
+    Ok(Restored { backup: head.to_string(), replaced, kept, relation })
+}
+
+/// Opens the database `file`; `None` if this version cannot read it.
+async fn readable(file: &Path) -> Option<Reader> {
+    let reader = Reader::open_checked(file).await.ok()?;
+    if reader.head().await.is_ok() { Some(reader) } else { None }
+}
+
+/// How the chain in `backup`, whose head is `head`, relates to the one that `present` reads.
+async fn relation(present: Option<&Reader>, backup: &Path, head: &Head) -> Result<Relation, BackupError> {
+    let Some(present) = present else { return Ok(Relation::Nothing) };
+    let ours = present.hashes().await?;
+    let reader = Reader::open_checked(backup).await?;
+    let theirs = reader.hashes().await?;
+    reader.close().await;
+
+    if let Some(place) = ours.iter().zip(&theirs).position(|(ours, theirs)| ours != theirs) {
+        return Ok(Relation::Apart { row: place as i64 + 1 });
+    }
+    Ok(match ours.len() as i64 - head.number {
+        0 => Relation::Same,
+        ..0 => Relation::Later,
+        rows => Relation::Earlier { rows },
+    })
+}
+
+/// Gives the database a second, dated name beside it, and returns that. The new database can then replace it in one
+/// step.
+async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupError> {
+    // Moves the log into the file, so that one file holds everything. A damaged database keeps its log.
+    let folded = Reader::fold_log(database).await;
+    let log = sibling(database, "-wal");
+    if folded.is_ok() && log.metadata().is_ok_and(|log| log.len() > 0) {
+        return Err(BackupError::Open(database.to_owned()));
+    }
+
+    let stamp = now.strftime("%Y%m%dT%H%M%SZ");
+    let name = |number: u32| match number {
+        0 => database.with_file_name(format!("parfocal-replaced-{stamp}.db")),
+        _ => database.with_file_name(format!("parfocal-replaced-{stamp}-{number}.db")),
+    };
+    // Several restores within a second are possible; a hundred are not.
+    let kept = (0..100).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
+
+    std::fs::hard_link(database, &kept).map_err(BackupError::file(&kept))?;
+    for suffix in LOG_SUFFIXES {
+        match std::fs::rename(sibling(database, suffix), sibling(&kept, suffix)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                put_back(database, &kept);
+                return Err(BackupError::File { path: kept, error });
+            }
+            _ => {}
+        }
+    }
+    sync_folder_of(&kept);
+    Ok(kept)
+}
+
+/// Undoes [`set_aside`], as far as the disk lets it. What cannot be moved back stays beside the database as `kept`.
+fn put_back(database: &Path, kept: &Path) {
+    let moved = |suffix| sibling(kept, suffix).exists();
+    let back = |suffix| std::fs::rename(sibling(kept, suffix), sibling(database, suffix));
+    if LOG_SUFFIXES.into_iter().filter(|&suffix| moved(suffix)).all(|suffix| back(suffix).is_ok()) {
+        // The database itself was never gone: `kept` is a second name of it.
+        let _ = std::fs::remove_file(kept);
+    }
+}
+
+/// The path of the file whose name is that of `path` and then `suffix`.
+fn sibling(path: &Path, suffix: &str) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(name + suffix)
+}
+
+/// Verifies the copy at `path` and returns its head. Errors call it `what`.
+async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
+    let snapshot = Reader::open_snapshot(path).await?;
+    let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {
+        Check { verdict: Verdict::Failed(problem), .. } => Some(problem),
+        _ => None,
+    });
+    let head = snapshot.head().await;
+    snapshot.close().await;
+
+    match problem {
+        Some(problem) => Err(BackupError::Unsound { what: what.to_owned(), problem }),
+        None => Ok(head?),
+    }
+}
+
+/// A temporary file beside `path`. It is removed unless it is renamed.
+fn temporary_beside(path: &Path) -> Result<NamedTempFile, BackupError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let builder = tempfile::Builder::new().prefix(".parfocal-backup-").tempfile_in(folder);
+    builder.map_err(BackupError::file(folder))
+}
+
+fn synced(path: &Path) -> Result<(), BackupError> {
+    File::open(path).and_then(|file| file.sync_all()).map_err(BackupError::file(path))
+}

@@ -1,0 +1,112 @@
+//! Consents: what participants agreed to before their sessions.
+
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::actors::name_actor;
+use super::values::{begin, nanoseconds, parsed, stamp};
+use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::ids::SessionId;
+use parfocal_trial::account::Actor;
+use parfocal_trial::consent::{Consent, Medium};
+use parfocal_trial::role::Role;
+
+/// A consent read back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredConsent {
+    /// Order of the record in the database.
+    pub number: i64,
+    /// Number of the run that recorded it.
+    pub run: i64,
+    /// Role of the person who recorded it.
+    pub by: Role,
+    /// When it was recorded.
+    pub stamp: Stamp,
+    /// What was consented to, when and how.
+    pub consent: Consent,
+}
+
+impl Store {
+    /// Records a consent for `session`. It is on disk when this returns.
+    ///
+    /// # Errors
+    /// If the disk or database fails.
+    pub async fn keep_consent(
+        &self,
+        session: SessionId,
+        consent: &Consent,
+        by: &Actor,
+        stamp: Stamp,
+    ) -> Result<(), StoreError> {
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let kept = insert_consent(&mut connection, self.inner.run, session, consent, by, stamp).await;
+        turn.end(connection, &kept);
+        kept
+    }
+}
+
+async fn insert_consent(
+    connection: &mut SqliteConnection,
+    run: i64,
+    session: SessionId,
+    consent: &Consent,
+    by: &Actor,
+    stamp: Stamp,
+) -> Result<(), StoreError> {
+    let wall = stamp.wall.to_string();
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO consents (session, text_version, given_on, obtained_by, medium, role, run, wall, monotonic_ns)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(session.to_string())
+    .bind(&consent.text_version)
+    .bind(consent.given_on.to_string())
+    .bind(&consent.obtained_by)
+    .bind(consent.medium.name())
+    .bind(by.role.name())
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(stamp.at))
+    .execute(&mut *transaction)
+    .await?;
+
+    let number = done.last_insert_rowid().to_string();
+    chain::append(&mut transaction, "consent", &number, &wall).await?;
+    name_actor(&mut transaction, by.account.as_ref(), "consent", &number, Some(session), &wall).await?;
+    Ok(transaction.commit().await?)
+}
+
+impl Reader {
+    /// The consents for `session`, in the order in which they were recorded. The latest counts.
+    ///
+    /// # Errors
+    /// If the database fails or holds data that this version cannot read.
+    pub async fn consents(&self, session: SessionId) -> Result<Vec<StoredConsent>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM consents WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(consent).collect()
+    }
+}
+
+fn consent(row: &SqliteRow) -> Result<StoredConsent, StoreError> {
+    let medium: String = row.try_get("medium")?;
+    let role: String = row.try_get("role")?;
+    let unknown = |what: &str| StoreError::Damaged(format!("a consent has the unknown {what}"));
+
+    Ok(StoredConsent {
+        number: row.try_get("number")?,
+        run: row.try_get("run")?,
+        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        stamp: stamp(row)?,
+        consent: Consent {
+            text_version: row.try_get("text_version")?,
+            given_on: parsed(row, "given_on")?,
+            obtained_by: row.try_get("obtained_by")?,
+            medium: Medium::named(&medium).ok_or_else(|| unknown(&format!("medium '{medium}'")))?,
+        },
+    })
+}

@@ -1,0 +1,168 @@
+//! Corrections: rows beside the original records, which stay unchanged.
+
+use std::collections::BTreeMap;
+
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::actors::name_actor;
+use super::values::{begin, nanoseconds, parsed, stamp};
+use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_trial::account::AccountName;
+use parfocal_trial::correction::{Field, Subject};
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::role::Role;
+
+/// A correction to be recorded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Correction {
+    /// Session of the corrected record.
+    pub session: SessionId,
+    /// Kind of the corrected record.
+    pub subject: Subject,
+    /// The key of the answer or comment, or the session's id.
+    pub record: String,
+    /// Which field of the record is corrected.
+    pub field: Field,
+    /// The value so far.
+    pub old: String,
+    /// The right value.
+    pub new: String,
+    /// Reason that the person gave.
+    pub reason: String,
+    /// Role of the person who corrects.
+    pub by: Role,
+    /// When it is recorded.
+    pub stamp: Stamp,
+}
+
+/// A correction read back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredCorrection {
+    /// Order of the record in the database.
+    pub number: i64,
+    /// Number of the run that recorded it.
+    pub run: i64,
+    /// The correction. Its texts are empty if they were erased.
+    pub correction: Correction,
+}
+
+/// The latest correction of each field of each record of a session.
+#[derive(Debug, Clone, Default)]
+pub struct Latest(BTreeMap<(Subject, String, Field), String>);
+
+impl Latest {
+    /// Takes the `corrections` of a session, in the order in which they were recorded.
+    #[must_use]
+    pub fn of(corrections: &[StoredCorrection]) -> Self {
+        let entry = |StoredCorrection { correction, .. }: &StoredCorrection| {
+            ((correction.subject, correction.record.clone(), correction.field), correction.new.clone())
+        };
+        Self(corrections.iter().map(entry).collect())
+    }
+
+    /// The session's right participant; `None` if that was not corrected.
+    #[must_use]
+    pub fn participant(&self, session: SessionId) -> Option<&str> {
+        self.get(Subject::Session, session.to_string(), Field::Participant)
+    }
+
+    /// The right value of the answer with this key; `None` if it was not corrected.
+    #[must_use]
+    pub fn value(&self, answer: &IdempotencyKey) -> Option<AnswerValue> {
+        serde_json::from_str(self.get(Subject::Answer, answer.to_string(), Field::Value)?).ok()
+    }
+
+    /// The note on an answer or a comment, if it has one that was not erased.
+    #[must_use]
+    pub fn note(&self, subject: Subject, key: &IdempotencyKey) -> Option<&str> {
+        self.get(subject, key.to_string(), Field::Note).filter(|note| !note.is_empty())
+    }
+
+    fn get(&self, subject: Subject, record: String, field: Field) -> Option<&str> {
+        self.0.get(&(subject, record, field)).map(String::as_str)
+    }
+}
+
+impl Store {
+    /// Records a correction. `account` is `None` if nobody was signed in. It is on disk when this returns.
+    ///
+    /// # Errors
+    /// If the disk or database fails.
+    pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let corrected = insert_correction(&mut connection, self.inner.run, correction, account).await;
+        turn.end(connection, &corrected);
+        corrected
+    }
+}
+
+async fn insert_correction(
+    connection: &mut SqliteConnection,
+    run: i64,
+    correction: &Correction,
+    account: Option<&AccountName>,
+) -> Result<(), StoreError> {
+    let wall = correction.stamp.wall.to_string();
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO corrections (session, subject, record, field, old_value, new_value, reason, role, run, wall,
+             monotonic_ns)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(correction.session.to_string())
+    .bind(correction.subject.name())
+    .bind(&correction.record)
+    .bind(correction.field.name())
+    .bind(&correction.old)
+    .bind(&correction.new)
+    .bind(&correction.reason)
+    .bind(correction.by.name())
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(correction.stamp.at))
+    .execute(&mut *transaction)
+    .await?;
+
+    let number = done.last_insert_rowid().to_string();
+    chain::append(&mut transaction, "correction", &number, &wall).await?;
+    let session = Some(correction.session);
+    name_actor(&mut transaction, account, "correction", &number, session, &wall).await?;
+    Ok(transaction.commit().await?)
+}
+
+impl Reader {
+    /// The corrections of `session`, in the order in which they were recorded.
+    ///
+    /// # Errors
+    /// If the database fails or holds data that this version cannot read.
+    pub async fn corrections(&self, session: SessionId) -> Result<Vec<StoredCorrection>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM corrections WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(correction).collect()
+    }
+}
+
+fn correction(row: &SqliteRow) -> Result<StoredCorrection, StoreError> {
+    let subject: String = row.try_get("subject")?;
+    let field: String = row.try_get("field")?;
+    let role: String = row.try_get("role")?;
+    let unknown = |what: &str| StoreError::Damaged(format!("a correction has the unknown {what}"));
+
+    let correction = Correction {
+        session: parsed(row, "session")?,
+        subject: Subject::named(&subject).ok_or_else(|| unknown(&format!("subject '{subject}'")))?,
+        record: row.try_get("record")?,
+        field: Field::named(&field).ok_or_else(|| unknown(&format!("field '{field}'")))?,
+        old: row.try_get("old_value")?,
+        new: row.try_get("new_value")?,
+        reason: row.try_get("reason")?,
+        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        stamp: stamp(row)?,
+    };
+    Ok(StoredCorrection { number: row.try_get("number")?, run: row.try_get("run")?, correction })
+}

@@ -1,0 +1,325 @@
+//! The database of a data folder, opened for writing by one process.
+
+use std::collections::BTreeMap;
+use std::fs::DirBuilder;
+use std::io::ErrorKind;
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
+use tokio::sync::Mutex;
+
+use parfocal_base::clock::Moment;
+use parfocal_base::files::make_private;
+use parfocal_base::{BlurRate, PolicyName};
+
+use super::counts::Counts;
+use super::lock::{FolderLock, LOCK};
+use super::schema::{DATABASE, MIGRATOR, check_names};
+use super::scrub::scrub;
+use super::values::{begin, nanoseconds};
+use super::writes::{Turn, WriteKind, Writes};
+use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
+
+/// A start of the server, and what it ran with.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// When the server started, by the wall clock.
+    pub wall: Timestamp,
+    /// When the server started, by the monotonic clock.
+    pub at: Moment,
+    /// Description of the camera.
+    pub camera: String,
+    /// Description of the lens.
+    pub lens: String,
+    /// The sensor's calibration, by its title.
+    pub calibration: String,
+    /// How fast the optic blurs, as the policies know it; `None` if they do not.
+    pub blur: Option<BlurRate>,
+    /// SHA-256 of each learned policy's weights, by the policy's name.
+    pub weights: BTreeMap<PolicyName, String>,
+    /// The seed given on the command line, if any.
+    pub seed: Option<u64>,
+}
+
+/// The database of a data folder, held by this process alone. Clone freely.
+#[derive(Clone, Debug)]
+pub struct Store {
+    pub(super) inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+pub(super) struct Inner {
+    /// The data folder.
+    pub(super) folder: PathBuf,
+    pub(super) trial: SqlitePool,
+    pub(super) telemetry: SqlitePool,
+    pub(super) checkpoints: SqlitePool,
+    pub(super) reader: Reader,
+    /// `SQLite` lets one connection write at a time, and the others poll. This queue is fair and wakes the next writer
+    /// at once.
+    turn: Mutex<()>,
+    pub(super) run: i64,
+    /// When this run began.
+    pub(super) started: Stamp,
+    pub(super) telemetry_counts: Counts,
+    pub(super) writes: Writes,
+    /// Released when dropped, or by the kernel however the process ends.
+    _lock: FolderLock,
+}
+
+impl Store {
+    /// Opens the data folder `folder` and records the start of `run`. Creates the folder and the database if they do
+    /// not exist, and brings an older database up to date.
+    ///
+    /// # Errors
+    /// If another server uses the folder, the database is from a newer version, or the disk cannot be written.
+    pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
+        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
+        made.map_err(|error| StoreError::folder(folder, &error))?;
+
+        let lock = FolderLock::of(folder)?;
+        keep_private(folder);
+
+        let file = folder.join(DATABASE);
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            // A connection of its own makes checkpoints, between batches of telemetry. So none falls on a comment's
+            // commit, and nobody waits for one.
+            .pragma("wal_autocheckpoint", "0");
+
+        // What people say is flushed to the disk at each commit; telemetry may lose its last seconds to a power cut.
+        let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
+        check_names(&trial).await?;
+        MIGRATOR.run(&trial).await?;
+
+        let relaxed = options.synchronous(SqliteSynchronous::Normal);
+        let telemetry = connect(relaxed.clone()).await?;
+        let checkpoints = connect(relaxed).await?;
+
+        let reader = Reader::open_file(&file).await?;
+        let started = Stamp { wall: run.wall, at: run.at };
+        let run = begin_run(&trial, run).await?;
+        // A server that was killed while it erased words may have left copies of them.
+        if let Err(error) = scrub(&trial).await {
+            tracing::warn!("copies of erased words may remain in the database's files: {error}");
+        }
+
+        let inner = Inner {
+            folder: folder.to_owned(),
+            trial,
+            telemetry,
+            checkpoints,
+            reader,
+            turn: Mutex::new(()),
+            run,
+            started,
+            telemetry_counts: Counts::default(),
+            writes: Writes::default(),
+            _lock: lock,
+        };
+
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
+    /// Number of this start of the server, from 1.
+    #[must_use]
+    pub fn run(&self) -> i64 {
+        self.inner.run
+    }
+
+    /// The reader of the same database.
+    #[must_use]
+    pub fn reader(&self) -> &Reader {
+        &self.inner.reader
+    }
+
+    /// How much telemetry was written or lost since the start of the server.
+    #[must_use]
+    pub fn telemetry_counts(&self) -> &Counts {
+        &self.inner.telemetry_counts
+    }
+
+    /// Closes the database. What was acknowledged is on disk even without this.
+    pub async fn close(&self) {
+        self.inner.reader.close().await;
+        self.inner.checkpoints.close().await;
+        self.inner.telemetry.close().await;
+        self.inner.trial.close().await;
+    }
+
+    /// How long writes took, and whether they failed, since the start of the server.
+    #[must_use]
+    pub fn writes(&self) -> &Writes {
+        &self.inner.writes
+    }
+
+    /// The data folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.inner.folder
+    }
+
+    /// Waits for the turn to write records.
+    pub(super) async fn turn(&self) -> Turn<'_> {
+        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Records)
+    }
+
+    /// Waits for the turn to write telemetry.
+    pub(super) async fn telemetry_turn(&self) -> Turn<'_> {
+        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Telemetry)
+    }
+
+    /// Records that a device started or stopped working.
+    ///
+    /// # Errors
+    /// If the disk or database fails.
+    pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let recorded = insert_device_event(&mut connection, self.inner.run, event).await;
+        turn.end(connection, &recorded);
+        recorded
+    }
+
+    /// Adds participant `code`. A participant that exists already stays as it is.
+    ///
+    /// # Errors
+    /// If the disk or database fails.
+    pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let added = insert_participant(&mut connection, code, &wall.to_string()).await;
+        turn.end(connection, &added);
+        added
+    }
+
+    /// Limits the database to `pages` pages, so that tests can simulate a full disk.
+    #[doc(hidden)]
+    pub async fn limit_pages(&self, pages: u32) -> Result<(), StoreError> {
+        let pragma = sqlx::AssertSqlSafe(format!("PRAGMA max_page_count = {pages}"));
+        sqlx::query(pragma).execute(&self.inner.trial).await?;
+        Ok(())
+    }
+}
+
+async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
+    // One connection that stays open, so that its settings and prepared statements are kept.
+    let pool = SqlitePoolOptions::new()
+        .max_connections(1)
+        .min_connections(1)
+        .acquire_timeout(Duration::from_secs(5))
+        .idle_timeout(None)
+        .max_lifetime(None)
+        .test_before_acquire(false);
+
+    Ok(pool.connect_with(options).await?)
+}
+
+/// Records the start of a run. Before that, chains what an earlier version recorded, and the telemetry that the run
+/// before left unchained.
+async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
+    let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
+    let wall = run.wall.to_string();
+
+    let mut connection = trial.acquire().await?;
+    let mut transaction = begin(&mut connection).await?;
+    chain::adopt(&mut transaction, &wall).await?;
+    seal_what_was_left(&mut transaction, &wall).await?;
+
+    let done = sqlx::query(
+        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, blur, weights, seed)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(&wall)
+    .bind(nanoseconds(run.at))
+    .bind(env!("CARGO_PKG_VERSION"))
+    .bind(&run.camera)
+    .bind(&run.lens)
+    .bind(&run.calibration)
+    .bind(run.blur.map(BlurRate::get))
+    .bind(weights)
+    .bind(run.seed.map(u64::cast_signed))
+    .execute(&mut *transaction)
+    .await?;
+
+    let number = done.last_insert_rowid();
+    chain::append(&mut transaction, "run", &number.to_string(), &wall).await?;
+    transaction.commit().await?;
+    Ok(number)
+}
+
+/// Chains the telemetry that the latest run left unchained. A session under way has an event in every run, so the
+/// sessions with an event in the latest run are enough.
+async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Result<(), StoreError> {
+    let sessions = sqlx::query_scalar("SELECT DISTINCT session FROM events WHERE run = (SELECT max(run) FROM events)");
+    let sessions: Vec<String> = sessions.fetch_all(&mut *connection).await?;
+    for session in sessions {
+        chain::seal(connection, &session, wall, false).await?;
+    }
+    Ok(())
+}
+
+async fn insert_device_event(
+    connection: &mut SqliteConnection,
+    run: i64,
+    event: &DeviceEvent,
+) -> Result<(), StoreError> {
+    let wall = event.wall.to_string();
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(event.at))
+    .bind(&event.device)
+    .bind(event.working)
+    .bind(&event.message)
+    .execute(&mut *transaction)
+    .await?;
+
+    let number = done.last_insert_rowid().to_string();
+    chain::append(&mut transaction, "device", &number, &wall).await?;
+    Ok(transaction.commit().await?)
+}
+
+async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall: &str) -> Result<(), StoreError> {
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
+        .bind(code)
+        .bind(wall)
+        .execute(&mut *transaction)
+        .await?;
+
+    if done.rows_affected() == 1 {
+        chain::append(&mut transaction, "participant", code, wall).await?;
+    }
+    Ok(transaction.commit().await?)
+}
+
+/// Keeps other accounts of the machine out of the folder and its files, which hold seeds, policies and what surgeons
+/// said. Earlier versions let every account read them. If the rights cannot be changed, the server runs all the same
+/// and logs a warning.
+fn keep_private(folder: &Path) {
+    let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));
+    for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {
+        match make_private(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => tracing::warn!(
+                "other accounts of this machine may be able to read {}, which holds trial data ({error}); \
+                 ask its owner to remove their access, or choose a folder of your own with --data-dir",
+                path.display()
+            ),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Erasure of words: from their record, from the free pages of the file, and from its log. The record and its hash
+//! stay. The salt of the hash is deleted, so that nobody can test which words had that hash.
+
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::actors::name_actor;
+use super::scrub::scrub;
+use super::values::{begin, nanoseconds, parsed, stamp};
+use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::ids::SessionId;
+use parfocal_trial::account::AccountName;
+use parfocal_trial::erasure::Erasable;
+use parfocal_trial::role::Role;
+
+/// An erasure to be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Erasure {
+    /// Session of the record.
+    pub session: SessionId,
+    /// Kind of the record.
+    pub subject: Erasable,
+    /// The record's key, as in the chain.
+    pub record: String,
+    /// Reason that the person gave.
+    pub reason: String,
+    /// Role of the person who erases.
+    pub by: Role,
+    /// When it is recorded.
+    pub stamp: Stamp,
+}
+
+/// An erasure read back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredErasure {
+    /// Order of the record in the database.
+    pub number: i64,
+    /// Number of the run that recorded it.
+    pub run: i64,
+    /// What was erased, by whom and why.
+    pub erasure: Erasure,
+}
+
+impl Store {
+    /// Erases the words of all `erasures`, or of none. Words that were erased before stay so. When this returns, the
+    /// words are nowhere in the database's files.
+    ///
+    /// # Errors
+    /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
+    /// free pages of the file or in its log, until the same words are erased again or the server starts again.
+    pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let erased = insert_erasures(&mut connection, self.inner.run, erasures, account).await;
+        turn.end(connection, &erased);
+        erased?;
+        scrub(&self.inner.trial).await
+    }
+}
+
+async fn insert_erasures(
+    connection: &mut SqliteConnection,
+    run: i64,
+    erasures: &[Erasure],
+    account: Option<&AccountName>,
+) -> Result<(), StoreError> {
+    // Deleted content is overwritten with zeros. The setting stays with this connection; the others do not need it.
+    sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
+    let mut transaction = begin(connection).await?;
+    for erasure in erasures {
+        insert_erasure(&mut transaction, run, erasure, account).await?;
+    }
+    Ok(transaction.commit().await?)
+}
+
+async fn insert_erasure(
+    connection: &mut SqliteConnection,
+    run: i64,
+    erasure: &Erasure,
+    account: Option<&AccountName>,
+) -> Result<(), StoreError> {
+    let wall = erasure.stamp.wall.to_string();
+    let known = "SELECT number FROM erasures WHERE subject = ? AND record = ?";
+    let known: Option<i64> = sqlx::query_scalar(known)
+        .bind(erasure.subject.name())
+        .bind(&erasure.record)
+        .fetch_optional(&mut *connection)
+        .await?;
+    if let Some(known) = known {
+        // The words were erased before, but the files may still hold copies: scrub them once more.
+        return note_unfinished(connection, known).await;
+    }
+
+    let done = sqlx::query(
+        "INSERT INTO erasures (session, subject, record, reason, role, run, wall, monotonic_ns)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(erasure.session.to_string())
+    .bind(erasure.subject.name())
+    .bind(&erasure.record)
+    .bind(&erasure.reason)
+    .bind(erasure.by.name())
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(erasure.stamp.at))
+    .execute(&mut *connection)
+    .await?;
+    let number = done.last_insert_rowid();
+
+    let emptied = match erasure.subject {
+        Erasable::Answer => "UPDATE answers SET value = '\"\"' WHERE key = ?",
+        Erasable::Comment => "UPDATE comments SET text = '' WHERE key = ?",
+        Erasable::Correction => {
+            "UPDATE corrections SET old_value = '', new_value = '', reason = '' WHERE CAST(number AS TEXT) = ?"
+        }
+        Erasable::Event => {
+            "UPDATE events SET payload = json_set(payload, '$.reason', '') WHERE session || '/' || number = ?"
+        }
+        Erasable::StudyEvent => "UPDATE study_events SET reason = '' WHERE study || '/' || number = ?",
+    };
+    sqlx::query(emptied).bind(&erasure.record).execute(&mut *connection).await?;
+    if erasure.subject == Erasable::Comment {
+        let silenced = sqlx::query("UPDATE voice_pieces SET audio = NULL WHERE comment = ?");
+        silenced.bind(&erasure.record).execute(&mut *connection).await?;
+    }
+
+    sqlx::query("DELETE FROM chain_salts WHERE number = (SELECT number FROM chain WHERE kind = ? AND key = ?)")
+        .bind(erasure.subject.name())
+        .bind(&erasure.record)
+        .execute(&mut *connection)
+        .await?;
+    note_unfinished(connection, number).await?;
+    let key = number.to_string();
+    chain::append(connection, "erasure", &key, &wall).await?;
+    name_actor(connection, account, "erasure", &key, Some(erasure.session), &wall).await?;
+    Ok(())
+}
+
+async fn note_unfinished(connection: &mut SqliteConnection, number: i64) -> Result<(), StoreError> {
+    sqlx::query("INSERT INTO unfinished_erasures (number) VALUES (?) ON CONFLICT DO NOTHING")
+        .bind(number)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+impl Reader {
+    /// The erasures in `session`, in the order in which they were made.
+    ///
+    /// # Errors
+    /// If the database fails or holds data that this version cannot read.
+    pub async fn erasures(&self, session: SessionId) -> Result<Vec<StoredErasure>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM erasures WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(erasure).collect()
+    }
+}
+
+fn erasure(row: &SqliteRow) -> Result<StoredErasure, StoreError> {
+    let subject: String = row.try_get("subject")?;
+    let role: String = row.try_get("role")?;
+    let unknown = |what: &str| StoreError::Damaged(format!("an erasure has the unknown {what}"));
+
+    let erasure = Erasure {
+        session: parsed(row, "session")?,
+        subject: Erasable::named(&subject).ok_or_else(|| unknown(&format!("subject '{subject}'")))?,
+        record: row.try_get("record")?,
+        reason: row.try_get("reason")?,
+        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        stamp: stamp(row)?,
+    };
+    Ok(StoredErasure { number: row.try_get("number")?, run: row.try_get("run")?, erasure })
+}

@@ -1,0 +1,500 @@
+//! The blinded part of an export. Its types have no field for a policy, the order, the seed, or a reason that may name
+//! them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use serde_json::{Map, Value, json};
+
+use super::ExportError;
+use super::description::{
+    AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
+    ScoreRow, SegmentRow, SessionRow, WithdrawalRow,
+};
+use super::folder::Folder;
+use super::scores::Scored;
+use super::study::ExportedStudy;
+use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
+use crate::store::remarks::said_columns;
+use crate::store::sessions::StoredSession;
+use crate::store::values::nanoseconds;
+use crate::store::{
+    Answer, Comment, DeviceEvent, Erasure, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
+    StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
+};
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_trial::erasure::Erasable;
+use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::grace::Grace;
+use parfocal_trial::instruments::sus;
+use parfocal_trial::phase::SessionStatus;
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::remark::WaitClock;
+use parfocal_trial::standing::Standing;
+
+/// The beginning of an export's description of itself.
+const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, \
+    comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json \
+    holds all tables but telemetry and policy_steps.";
+
+/// A session without anything that unblinding reveals.
+pub struct Blinded {
+    line: SessionLine,
+    run: i64,
+    monotonic_ns: i64,
+    protocol_toml: String,
+    protocol_sha256: String,
+    /// `None` if this version cannot read it. Then the questions have no text.
+    protocol: Option<Protocol>,
+    algorithm: &'static str,
+    commitment: String,
+    segments: Vec<SegmentId>,
+    events: Vec<(i64, Event)>,
+    pub(super) comments: Vec<(i64, Comment)>,
+    /// The recordings of voice comments.
+    pub(super) voice: BTreeMap<IdempotencyKey, Recorded>,
+    answers: Vec<(i64, Answer)>,
+    pub(super) corrections: Vec<StoredCorrection>,
+    consents: Vec<StoredConsent>,
+    erasures: Vec<StoredErasure>,
+    withdrawals: Vec<Withdrawal>,
+    clocks: RunClocks,
+    grace: Grace,
+    study: Option<ExportedStudy>,
+}
+
+impl Blinded {
+    /// The blinded part of `stored`.
+    pub async fn of(reader: &Reader, stored: StoredSession) -> Result<Self, StoreError> {
+        let session = stored.made.session;
+        let lines = reader.sessions(true).await?;
+        let line = lines.into_iter().find(|line| line.session == session);
+        let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
+
+        let clocks = reader.run_clocks().await?;
+
+        // Nothing that reveals the policies gets past this point.
+        let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
+
+        Ok(Self {
+            line,
+            run: stored.run,
+            monotonic_ns: nanoseconds(stored.made.stamp.at),
+            grace: stored.grace(&clocks),
+            clocks,
+            protocol: stored.protocol().ok(),
+            protocol_toml: stored.made.protocol_toml,
+            protocol_sha256: stored.made.protocol_sha256,
+            algorithm: stored.made.algorithm.name(),
+            commitment: stored.made.commitment,
+            segments: stored.made.segments.into_iter().map(|(segment, _)| segment).collect(),
+            events: stored.events.into_iter().map(blind).collect(),
+            comments: reader.comments(session).await?,
+            voice: reader.voice(session).await?,
+            answers: reader.answers(session).await?,
+            corrections: reader.corrections(session).await?,
+            consents: reader.consents(session).await?,
+            erasures: reader.erasures(session).await?,
+            withdrawals: reader.withdrawals(session).await?,
+            study: ExportedStudy::of(reader, session).await?,
+        })
+    }
+
+    /// Whether the session is practice.
+    pub const fn practice(&self) -> bool {
+        self.line.practice
+    }
+
+    pub(super) const fn session(&self) -> SessionId {
+        self.line.session
+    }
+
+    /// Writes all its files except the description. `recordings` are the session's recordings.
+    pub async fn write(
+        &self,
+        reader: &Reader,
+        recordings: &[RecordingRow],
+        folder: &mut Folder,
+    ) -> Result<(), ExportError> {
+        let mut copies = Map::new();
+        let runs = reader.export_runs(self.session()).await?;
+        let devices = reader.device_events(self.session()).await?;
+        let own = self.own_rows(&runs, &devices);
+
+        copy(folder, &mut copies, &runs).await?;
+        copy(folder, &mut copies, &[self.session_row()]).await?;
+        copy(folder, &mut copies, &self.segment_rows()).await?;
+        copy(folder, &mut copies, &self.comment_rows()).await?;
+        copy(folder, &mut copies, &self.answer_rows()).await?;
+        copy(folder, &mut copies, &self.event_rows()).await?;
+        copy(folder, &mut copies, &device_rows(devices)).await?;
+        copy(folder, &mut copies, recordings).await?;
+        copy(folder, &mut copies, &reader.export_accesses(self.session()).await?).await?;
+        copy(folder, &mut copies, &self.score_rows()).await?;
+        copy(folder, &mut copies, &self.correction_rows()).await?;
+        copy(folder, &mut copies, &self.consent_rows()).await?;
+        copy(folder, &mut copies, &self.erasure_rows()).await?;
+        copy(folder, &mut copies, &self.withdrawal_rows()).await?;
+        let study = self.study.as_ref();
+        copy(folder, &mut copies, &ExportedStudy::study_rows(study)).await?;
+        copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
+        copy(folder, &mut copies, ExportedStudy::event_rows(study)).await?;
+        copy(folder, &mut copies, &reader.export_actors(self.session()).await?).await?;
+        let voice = self.write_voice(reader, folder).await?;
+        copy(folder, &mut copies, &voice).await?;
+        copy(folder, &mut copies, &self.voice_piece_rows()).await?;
+        folder.json("session.json", &Value::Object(copies)).await?;
+
+        folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
+        if let Some(study) = study {
+            folder.file("study.toml", study.definition().as_bytes()).await?;
+        }
+
+        let mut chain = folder.begin()?;
+        reader.export_chain(async |row| chain.row(&own.told_of(row)).await).await?;
+        chain.end().await?;
+
+        let mut telemetry = folder.begin()?;
+        reader.export_telemetry(self.session(), async |row| telemetry.row(&row).await).await?;
+        telemetry.end().await
+    }
+
+    /// The description of the whole export, without its tables.
+    pub fn package(&self, unblinded: bool, head: &Head) -> Value {
+        let name = super::folder::folder_name(self.session(), unblinded);
+        json!({
+            "profile": "tabular-data-package",
+            "name": name,
+            "title": format!("Usability trial of autofocus policies: session {}", self.session()),
+            "description": format!("{ABOUT} {TEXTS_IN_CSV}"),
+            "parfocal": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "format": FORMAT,
+                "practice": self.line.practice,
+                "blinded": !unblinded,
+                "unblinded": self.unblinded(),
+                "study": self.study.as_ref().map(ExportedStudy::name),
+                "study_definition_sha256": self.study.as_ref().map(ExportedStudy::definition_sha256),
+                "chain": { "number": head.number, "hash": head.hash },
+            },
+        })
+    }
+
+    /// The rows of the chain that the export shows whole.
+    fn own_rows(&self, runs: &[RunRow], devices: &[(i64, i64, DeviceEvent)]) -> OwnRows {
+        let unblinding = |(_, event): &&(i64, Event)| matches!(event.kind, EventKind::Unblinded { .. });
+        let key = |(_, event): &(i64, Event)| format!("{}/{}", self.session(), event.number);
+        OwnRows {
+            session: self.session().to_string(),
+            runs: runs.iter().map(|row| row.run.to_string()).collect(),
+            devices: devices.iter().map(|(number, ..)| number.to_string()).collect(),
+            unblindings: self.events.iter().filter(unblinding).map(key).collect(),
+            study: self.study.iter().flat_map(ExportedStudy::keys).collect(),
+        }
+    }
+
+    /// Whether the session has not ended.
+    pub fn under_way(&self) -> bool {
+        self.line.status == SessionStatus::UnderWay
+    }
+
+    fn unblinded(&self) -> &'static str {
+        match (self.line.unblinded, self.line.emergency) {
+            (false, _) => "no",
+            (true, false) => "after-end",
+            (true, true) if self.ended_before_unblinding() => "emergency-after-end",
+            (true, true) => "while-under-way",
+        }
+    }
+
+    fn ended_before_unblinding(&self) -> bool {
+        let before = self.events.iter().take_while(|(_, event)| !matches!(event.kind, EventKind::Unblinded { .. }));
+        before.into_iter().any(|(_, event)| matches!(event.kind, EventKind::Completed | EventKind::Aborted { .. }))
+    }
+
+    pub(super) fn setting(&self, segment: Option<SegmentId>) -> Option<usize> {
+        self.segments.iter().position(|&known| Some(known) == segment).map(|position| position + 1)
+    }
+
+    fn session_row(&self) -> SessionRow {
+        let line = &self.line;
+        SessionRow {
+            session: line.session,
+            participant: line.participant.clone(),
+            protocol: line.protocol.clone(),
+            protocol_sha256: self.protocol_sha256.clone(),
+            practice: line.practice,
+            algorithm: self.algorithm,
+            commitment: self.commitment.clone(),
+            wall: line.created,
+            run: self.run,
+            monotonic_ns: self.monotonic_ns,
+            status: line.status,
+            settings: line.settings,
+            finished_settings: line.finished_settings,
+            comments: line.comments,
+            unblinded: self.unblinded(),
+            counts_until: self.grace.until(),
+        }
+    }
+
+    fn segment_rows(&self) -> Vec<SegmentRow> {
+        let row = |(&segment, setting): (&SegmentId, usize)| {
+            let events = self.events.iter().map(|(_, event)| event);
+            let of_it = || events.clone().filter(move |event| event.kind.segment() == Some(segment));
+            let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
+            let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
+
+            SegmentRow {
+                session: self.session(),
+                setting,
+                segment,
+                started: started.map(|event| event.wall),
+                finished: finished.map(|event| event.wall),
+                finished_by: finished.map(|event| event.by),
+                inspected_seconds: finished.and_then(|event| event.kind.inspected_ms()).map(seconds),
+            }
+        };
+
+        self.segments.iter().zip(1..).map(row).collect()
+    }
+
+    fn comment_rows(&self) -> Vec<CommentRow> {
+        let row = |((run, comment), number): (&(i64, Comment), usize)| {
+            let (kind, text) = said_columns(&comment.said);
+
+            CommentRow {
+                number,
+                key: comment.key,
+                session: comment.session,
+                setting: self.setting(comment.segment),
+                segment: comment.segment,
+                kind,
+                text: text.map(str::to_owned),
+                frame: comment.frame,
+                frame_run: comment.frame_run,
+                wall: comment.stamp.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(comment.stamp.at),
+                client_millis: comment.origin.client_millis,
+                waited_ms: comment.origin.waited_millis,
+                waited_by: comment.origin.waited_by.map(WaitClock::name),
+                device: comment.origin.device,
+                sequence: comment.origin.sequence,
+                late: comment.late,
+                erased: self.erased(Erasable::Comment, &comment.key.to_string()),
+            }
+        };
+
+        self.comments.iter().zip(1..).map(row).collect()
+    }
+
+    fn answer_rows(&self) -> Vec<AnswerRow> {
+        let standings = standings(&self.answers, &self.clocks);
+        let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), usize)| {
+            let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
+            let kind = question.map(|question| &question.kind);
+            let sus_score = match (kind, &standing.value) {
+                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
+                _ => None,
+            };
+
+            AnswerRow {
+                number,
+                key: answer.key,
+                session: answer.session,
+                setting: self.setting(answer.segment),
+                segment: answer.segment,
+                question: answer.question.clone(),
+                question_text: question.map(|question| question.text.clone()),
+                kind: kind.map(QuestionKind::name),
+                revision: standing.revision,
+                counts: standing.counts,
+                value: serde_json::to_string(&standing.value).ok(),
+                given_value: serde_json::to_string(&answer.value).ok(),
+                sus_score,
+                wall: answer.stamp.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(answer.stamp.at),
+                given: self.clocks.said(*run, answer.stamp.at, &answer.origin),
+                client_millis: answer.origin.client_millis,
+                waited_ms: answer.origin.waited_millis,
+                waited_by: answer.origin.waited_by.map(WaitClock::name),
+                device: answer.origin.device,
+                sequence: answer.origin.sequence,
+                late: answer.late,
+                disagrees: standing.disagrees,
+                erased: self.erased(Erasable::Answer, &answer.key.to_string()),
+            }
+        };
+
+        self.answers.iter().zip(standings).zip(1..).map(row).collect()
+    }
+
+    /// When the words of a record were erased; `None` if they were not.
+    pub(super) fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
+        let mut erasures = self.erasures.iter().map(|stored| &stored.erasure);
+        let its_own = |erasure: &&Erasure| erasure.subject == subject && erasure.record == record;
+        erasures.find(its_own).map(|erasure| erasure.stamp.wall)
+    }
+
+    fn score_rows(&self) -> Vec<ScoreRow> {
+        // If this version cannot read the protocol, it cannot know the questions.
+        let Some(protocol) = &self.protocol else { return Vec::new() };
+        let scored = Scored {
+            session: self.session(),
+            protocol,
+            segments: &self.segments,
+            answers: &self.answers,
+            standings: &standings(&self.answers, &self.clocks),
+            corrections: &Latest::of(&self.corrections),
+        };
+        scored.rows()
+    }
+
+    fn correction_rows(&self) -> Vec<CorrectionRow> {
+        let row = |StoredCorrection { number, run, correction }: &StoredCorrection| CorrectionRow {
+            number: *number,
+            session: correction.session,
+            subject: correction.subject.name(),
+            record: correction.record.clone(),
+            field: correction.field.name(),
+            old_value: correction.old.clone(),
+            new_value: correction.new.clone(),
+            reason: correction.reason.clone(),
+            role: correction.by,
+            wall: correction.stamp.wall,
+            run: *run,
+            monotonic_ns: nanoseconds(correction.stamp.at),
+            erased: self.erased(Erasable::Correction, &number.to_string()),
+        };
+        self.corrections.iter().map(row).collect()
+    }
+
+    fn consent_rows(&self) -> Vec<ConsentRow> {
+        let row = |stored: &StoredConsent| ConsentRow {
+            number: stored.number,
+            session: self.session(),
+            text_version: stored.consent.text_version.clone(),
+            given_on: stored.consent.given_on.to_string(),
+            obtained_by: stored.consent.obtained_by.clone(),
+            medium: stored.consent.medium.name(),
+            role: stored.by,
+            wall: stored.stamp.wall,
+            run: stored.run,
+            monotonic_ns: nanoseconds(stored.stamp.at),
+        };
+        self.consents.iter().map(row).collect()
+    }
+
+    fn erasure_rows(&self) -> Vec<ErasureRow> {
+        let row = |StoredErasure { number, run, erasure }: &StoredErasure| ErasureRow {
+            number: *number,
+            session: erasure.session,
+            subject: erasure.subject.name(),
+            record: erasure.record.clone(),
+            reason: erasure.reason.clone(),
+            role: erasure.by,
+            wall: erasure.stamp.wall,
+            run: *run,
+            monotonic_ns: nanoseconds(erasure.stamp.at),
+        };
+        self.erasures.iter().map(row).collect()
+    }
+
+    fn withdrawal_rows(&self) -> Vec<WithdrawalRow> {
+        let row = |withdrawal: &Withdrawal| WithdrawalRow {
+            session: withdrawal.session,
+            protocol: withdrawal.protocol.clone(),
+            place: withdrawal.place,
+            wall: withdrawal.wall,
+            role: withdrawal.role.clone(),
+        };
+        self.withdrawals.iter().map(row).collect()
+    }
+
+    fn event_rows(&self) -> Vec<EventRow> {
+        let row = |(run, event): &(i64, Event)| {
+            let (reason, emergency) = match &event.kind {
+                EventKind::Paused { reason, .. }
+                | EventKind::Aborted { reason, .. }
+                | EventKind::Withdrawn { reason } => (Some(reason), None),
+                EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),
+                _ => (None, None),
+            };
+
+            EventRow {
+                session: self.session(),
+                number: event.number,
+                wall: event.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(event.at),
+                role: event.by,
+                kind: event.kind.name(),
+                setting: self.setting(event.kind.segment()),
+                segment: event.kind.segment(),
+                inspected_ms: event.kind.inspected_ms(),
+                reason: reason.cloned(),
+                emergency,
+            }
+        };
+
+        self.events.iter().map(row).collect()
+    }
+}
+
+/// The rows of the chain that are about a session.
+struct OwnRows {
+    session: String,
+    runs: BTreeSet<String>,
+    devices: BTreeSet<String>,
+    /// Keys of its unblinding, whose reason may name a policy.
+    unblindings: BTreeSet<String>,
+    /// Keys of its study, and of the study's events that the export shows.
+    study: BTreeSet<String>,
+}
+
+impl OwnRows {
+    /// What a blinded export shows of `row`.
+    fn told_of(&self, row: ChainRow) -> ChainRow {
+        let kind = row.kind.as_deref().unwrap_or_default();
+        let key = row.key.as_deref().unwrap_or_default();
+        let own = match kind {
+            "run" => self.runs.contains(key),
+            "device" => self.devices.contains(key),
+            "study" | "study-event" => self.study.contains(key),
+            _ => row.session.as_ref() == Some(&self.session),
+        };
+
+        if !own {
+            return ChainRow { number: row.number, entry: row.entry, hash: row.hash, ..ChainRow::default() };
+        }
+        let withheld = matches!(kind, "run" | "telemetry") || kind == "event" && self.unblindings.contains(key);
+        ChainRow { sealed_salt: row.sealed_salt.filter(|_| !withheld), ..row }
+    }
+}
+
+/// Writes a table, and copies it into `copies`, which becomes session.json.
+async fn copy<R: Row>(folder: &mut Folder, copies: &mut Map<String, Value>, rows: &[R]) -> Result<(), ExportError> {
+    copies.insert(R::TABLE.name.to_owned(), objects(rows));
+    folder.table(rows).await
+}
+
+fn device_rows(events: Vec<(i64, i64, DeviceEvent)>) -> Vec<DeviceRow> {
+    let row = |(number, run, event): (i64, i64, DeviceEvent)| DeviceRow {
+        number,
+        wall: event.wall,
+        run,
+        monotonic_ns: nanoseconds(event.at),
+        device: event.device,
+        working: event.working,
+        message: event.message,
+    };
+
+    events.into_iter().map(row).collect()
+}
+
+fn seconds(milliseconds: u64) -> f64 {
+    std::time::Duration::from_millis(milliseconds).as_secs_f64()
+}

@@ -1,0 +1,96 @@
+//! What surgeons said aloud, in an export: a file for each recording, and its table.
+
+use sha2::{Digest, Sha256};
+
+use super::ExportError;
+use super::blinded::Blinded;
+use super::description::{VoicePieceRow, VoiceRow};
+use super::folder::Folder;
+use crate::store::values::nanoseconds;
+use crate::store::{Comment, Latest, Reader, Recorded, StoredPiece};
+use parfocal_base::ids::IdempotencyKey;
+use parfocal_trial::correction::Subject;
+use parfocal_trial::erasure::Erasable;
+use parfocal_trial::remark::CommentContent;
+use parfocal_trial::voice::{Ending, MediaType};
+
+/// The folder of an export in which the recordings are.
+pub const FOLDER: &str = "voice";
+
+/// Path, in an export, of the recording that belongs to `comment`.
+pub fn file_name(comment: impl std::fmt::Display, media_type: MediaType) -> String {
+    format!("{FOLDER}/{comment}.{}", media_type.extension())
+}
+
+impl Blinded {
+    /// Writes the recordings, one file each, and returns the rows of their table.
+    pub(super) async fn write_voice(&self, reader: &Reader, folder: &mut Folder) -> Result<Vec<VoiceRow>, ExportError> {
+        let typed = Latest::of(&self.corrections);
+        let comments = self.comments.iter().map(|(_, comment)| comment);
+        let mut rows = Vec::new();
+
+        for comment in comments.filter(|comment| comment.said == CommentContent::Voice) {
+            let sound = reader.voice_audio(comment.session, comment.key).await?;
+            let file = sound.as_ref().map(|(media_type, _)| file_name(comment.key, *media_type));
+            if let (Some(name), Some((_, audio))) = (&file, &sound) {
+                folder.file(name, audio).await?;
+            }
+
+            let sha256 = sound.map(|(_, audio)| hex::encode(Sha256::digest(audio)));
+            let transcript = typed.note(Subject::Comment, &comment.key).map(str::to_owned);
+            rows.push(VoiceRow { file, sha256, transcript, ..self.voice_row(comment) });
+        }
+        Ok(rows)
+    }
+
+    /// The row of a recording, without file, hash and transcript.
+    fn voice_row(&self, comment: &Comment) -> VoiceRow {
+        let nothing = Recorded::default();
+        let recorded = self.voice.get(&comment.key).unwrap_or(&nothing);
+        let ended = recorded.ended();
+
+        VoiceRow {
+            comment: comment.key,
+            session: comment.session,
+            setting: self.setting(comment.segment),
+            file: None,
+            media_type: recorded.media_type().map(MediaType::name),
+            seconds: recorded.seconds(),
+            pieces: recorded.pieces.len(),
+            missing: recorded.missing(),
+            bytes: recorded.bytes(),
+            sha256: None,
+            ended: ended.map(Ending::name),
+            complete: ended.is_some() && recorded.missing() == 0,
+            transcript: None,
+            erased: self.erased(Erasable::Comment, &comment.key.to_string()),
+        }
+    }
+
+    /// The pieces of all recordings, in the order they were kept.
+    pub(super) fn voice_piece_rows(&self) -> Vec<VoicePieceRow> {
+        let rows_of = |(comment, recorded): (&IdempotencyKey, &Recorded)| -> Vec<VoicePieceRow> {
+            recorded.pieces.iter().map(|piece| self.voice_piece_row(*comment, piece)).collect()
+        };
+        let mut rows: Vec<VoicePieceRow> = self.voice.iter().flat_map(rows_of).collect();
+        rows.sort_by_key(|row| row.number);
+        rows
+    }
+
+    fn voice_piece_row(&self, comment: IdempotencyKey, piece: &StoredPiece) -> VoicePieceRow {
+        VoicePieceRow {
+            number: piece.number,
+            session: self.session(),
+            comment,
+            piece: piece.piece,
+            media_type: piece.media_type.name(),
+            through_ms: piece.through_ms,
+            ended: piece.ended.map(Ending::name),
+            bytes: piece.bytes,
+            sha256: piece.sha256.clone(),
+            wall: piece.stamp.wall,
+            run: piece.run,
+            monotonic_ns: nanoseconds(piece.stamp.at),
+        }
+    }
+}

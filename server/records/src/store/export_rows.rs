@@ -1,0 +1,257 @@
+//! The rows of an export that come straight from the database. Long tables such as telemetry come row by row, because
+//! they are too large to gather first.
+
+use futures_util::TryStreamExt;
+use jiff::Timestamp;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{FromRow, Row as _};
+
+use super::chain::Entry;
+use super::export::{
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+};
+use super::values::parsed;
+use super::{Reader, StoreError};
+use parfocal_base::ids::SessionId;
+
+/// A study's plan, as the database has it.
+pub(super) struct PlannedStudy {
+    /// SHA-256 of its definition.
+    pub definition_sha256: String,
+    /// JSON: the sites that this database runs.
+    pub sites: String,
+    /// When it was planned.
+    pub wall: Timestamp,
+}
+
+impl Reader {
+    /// The starts of the server that recorded something of `session`.
+    pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<RunRow>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
+                 SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
+                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
+                 UNION SELECT frame_run FROM comments WHERE session = ?1
+                 UNION SELECT run FROM corrections WHERE session = ?1
+                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1
+                 UNION SELECT run FROM voice_pieces WHERE session = ?1)
+             ORDER BY run",
+        )
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+
+        rows.iter().map(run_row).collect()
+    }
+
+    /// The plan of study `study`.
+    pub(super) async fn export_study(&self, study: &str) -> Result<PlannedStudy, StoreError> {
+        let row = sqlx::query("SELECT definition_sha256, sites, wall FROM studies WHERE study = ?")
+            .bind(study)
+            .fetch_one(self.pool())
+            .await?;
+
+        Ok(PlannedStudy {
+            definition_sha256: row.try_get("definition_sha256")?,
+            sites: row.try_get("sites")?,
+            wall: parsed(&row, "wall")?,
+        })
+    }
+
+    /// The events of study `study` that are about the whole study or about `session`.
+    pub(super) async fn export_study_events(
+        &self,
+        study: &str,
+        session: SessionId,
+    ) -> Result<Vec<StudyEventRow>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT * FROM study_events WHERE study = ? AND (session IS NULL OR session = ?) ORDER BY number",
+        )
+        .bind(study)
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+
+        rows.iter().map(study_event_row).collect()
+    }
+
+    /// The accounts behind the records of `session`.
+    pub(super) async fn export_actors(&self, session: SessionId) -> Result<Vec<ActorRow>, StoreError> {
+        let rows = sqlx::query_as("SELECT * FROM actors WHERE session = ? ORDER BY number");
+        Ok(rows.bind(session.to_string()).fetch_all(self.pool()).await?)
+    }
+
+    /// Passes the blinded telemetry of `session` to `take`, row by row.
+    pub(super) async fn export_telemetry<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl AsyncFnMut(TelemetryRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        // Holds caused by the policy are left out, because they would reveal it: only learned policies take time to
+        // start and to compute.
+        let sql = "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured,
+                    coalesce(t.held IN ('paused', 'lens-failed', 'camera-failed'), FALSE) AS held, t.optimal
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+             WHERE g.session = ? ORDER BY g.setting, t.number";
+        self.hand_out(session, sql, take).await
+    }
+
+    /// Passes the part of the telemetry of `session` that reveals the policy to `take`, row by row.
+    pub(super) async fn export_policy_steps<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl AsyncFnMut(PolicyStepRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros,
+                    t.latency_micros, t.held
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+                  LEFT JOIN policies AS p ON p.number = t.policy
+             WHERE g.session = ? ORDER BY g.setting, t.number";
+        self.hand_out(session, sql, take).await
+    }
+
+    /// Passes the weights of the learned policies of `session` to `take`, run by run.
+    pub(super) async fn export_weights<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl AsyncFnMut(WeightsRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
+             WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
+                 AND w.key IN (SELECT policy FROM segments WHERE session = ?1) ORDER BY r.run, w.key";
+        self.hand_out(session, sql, take).await
+    }
+
+    /// Who looked at `session`.
+    pub(super) async fn export_accesses(&self, session: SessionId) -> Result<Vec<AccessRow>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM accesses WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(access_row).collect()
+    }
+
+    /// Passes every row of the chain to `take`, with all its columns.
+    pub(super) async fn export_chain<E: From<StoreError>>(
+        &self,
+        mut take: impl AsyncFnMut(ChainRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT chain.*, chain_salts.salt AS sealed_salt FROM chain LEFT JOIN chain_salts USING (number)
+             ORDER BY number";
+        let mut rows = sqlx::query(sql).fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            take(chain_row(&row)?).await?;
+        }
+        Ok(())
+    }
+
+    /// Passes the salts that a blinded export of `session` withholds to `take`, except those of the server's starts.
+    pub(super) async fn export_chain_salts<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl AsyncFnMut(ChainSaltRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT number, chain_salts.salt FROM chain_salts JOIN chain USING (number)
+             WHERE chain.session = ?1 AND (chain.kind = 'telemetry' OR chain.kind = 'event' AND chain.key IN (
+                 SELECT session || '/' || number FROM events WHERE session = ?1 AND kind = 'unblinded'))
+             ORDER BY number";
+        self.hand_out(session, sql, take).await
+    }
+
+    /// Passes the rows of `sql` to `take`. The only parameter of `sql` is `session`.
+    async fn hand_out<R, E>(
+        &self,
+        session: SessionId,
+        sql: &'static str,
+        mut take: impl AsyncFnMut(R) -> Result<(), E>,
+    ) -> Result<(), E>
+    where
+        R: for<'r> FromRow<'r, SqliteRow>,
+        E: From<StoreError>,
+    {
+        let mut rows = sqlx::query(sql).bind(session.to_string()).fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            take(R::from_row(&row).map_err(StoreError::from)?).await?;
+        }
+        Ok(())
+    }
+}
+
+fn run_row(row: &SqliteRow) -> Result<RunRow, StoreError> {
+    Ok(RunRow {
+        run: row.try_get("run")?,
+        wall: parsed(row, "wall")?,
+        monotonic_ns: row.try_get("monotonic_ns")?,
+        version: row.try_get("version")?,
+        camera: row.try_get("camera")?,
+        lens: row.try_get("lens")?,
+        calibration: row.try_get("calibration")?,
+        blur: row.try_get("blur")?,
+    })
+}
+
+fn access_row(row: &SqliteRow) -> Result<AccessRow, StoreError> {
+    Ok(AccessRow {
+        number: row.try_get("number")?,
+        wall: parsed(row, "wall")?,
+        run: row.try_get("run")?,
+        monotonic_ns: row.try_get("monotonic_ns")?,
+        role: row.try_get("role")?,
+        kind: row.try_get("kind")?,
+        session: parsed(row, "session")?,
+        detail: row.try_get("detail")?,
+    })
+}
+
+fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
+    let session: Option<String> = row.try_get("session")?;
+    let entry = Entry {
+        wall: row.try_get("wall")?,
+        kind: row.try_get("kind")?,
+        key: row.try_get("key")?,
+        session: session.unwrap_or_default(),
+        place: row.try_get("place")?,
+        adopted: row.try_get("adopted")?,
+        salt: row.try_get("salt")?,
+        sealed: row.try_get("sealed")?,
+        content: row.try_get("content")?,
+    };
+
+    Ok(ChainRow {
+        number: row.try_get("number")?,
+        entry: entry.hash(),
+        hash: row.try_get("hash")?,
+        wall: Some(entry.wall),
+        kind: Some(entry.kind),
+        key: Some(entry.key),
+        session: Some(entry.session),
+        place: entry.place,
+        adopted: Some(entry.adopted),
+        salt: Some(entry.salt),
+        sealed: Some(entry.sealed),
+        sealed_salt: row.try_get("sealed_salt")?,
+        content: Some(entry.content),
+    })
+}
+
+fn study_event_row(row: &SqliteRow) -> Result<StudyEventRow, StoreError> {
+    let session: Option<String> = row.try_get("session")?;
+    let about_session = match session {
+        Some(_) => Some(parsed(row, "session")?),
+        None => None,
+    };
+
+    Ok(StudyEventRow {
+        study: row.try_get("study")?,
+        number: row.try_get("number")?,
+        wall: parsed(row, "wall")?,
+        run: row.try_get("run")?,
+        monotonic_ns: row.try_get("monotonic_ns")?,
+        role: row.try_get("role")?,
+        person: row.try_get("person")?,
+        kind: row.try_get("kind")?,
+        about_session,
+        commitment: row.try_get("commitment")?,
+        reason: row.try_get("reason")?,
+    })
+}

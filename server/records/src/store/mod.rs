@@ -1,0 +1,62 @@
+//! The store: everything that is SQLite, and the only place with SQL. It decides nothing.
+//!
+//! The database is one file, `parfocal.db`, in WAL mode. A server uses three kinds of connections. The one for trial
+//! data syncs every commit to the disk before it is acknowledged. The one for telemetry does not. Readers never write.
+//! A lock on the folder keeps a second server out, while programs that only read come and go.
+
+mod accesses;
+mod accounts;
+mod actors;
+pub mod backup;
+mod chain;
+mod consents;
+mod corrections;
+mod counts;
+mod database;
+mod erasures;
+mod error;
+pub mod export;
+mod export_rows;
+mod lock;
+mod motion;
+mod motions;
+mod reader;
+mod remarks;
+mod rows;
+mod schema;
+mod scrub;
+mod session_events;
+mod sessions;
+mod sets;
+mod studies;
+pub mod telemetry;
+mod values;
+mod verify;
+mod voice;
+mod whole;
+mod withdrawals;
+mod writes;
+
+pub use accesses::{Access, Recorder};
+pub use accounts::{
+    AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, StoredAccount, StoredSignIn,
+};
+pub use chain::Head;
+pub use consents::StoredConsent;
+pub use corrections::{Correction, Latest, StoredCorrection};
+pub use counts::Counts;
+pub use database::{Run, Store};
+pub use erasures::{Erasure, StoredErasure};
+pub use error::StoreError;
+pub use motion::Motion;
+pub use reader::Reader;
+pub use remarks::KeepOutcome;
+pub use rows::*;
+pub use schema::MIGRATOR;
+pub use sessions::{NewSession, StoredSession};
+pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
+pub use verify::verify_database;
+pub use voice::{KeptVoice, PieceKept, Recorded, StoredPiece, VoicePiece};
+pub use whole::{DatabaseState, database_state};
+pub use withdrawals::Withdrawal;
+pub use writes::{WriteTimes, Writes};

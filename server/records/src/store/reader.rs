@@ -1,0 +1,324 @@
+//! Reads lists and timelines for the pages. Other programs can use it too while the server runs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
+use sqlx::{Connection as _, Row, migrate::Migrate};
+
+use super::motion::MotionsOfEnded;
+use super::schema::{DATABASE, MIGRATOR, check_names};
+use super::values::moment;
+use super::values::{parsed, stamp};
+use super::{DeviceEvent, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
+use parfocal_base::FocalPower;
+use parfocal_base::ids::{SegmentId, SessionId};
+use parfocal_trial::phase::SessionStatus;
+
+/// Rows that are read ahead of the caller that takes them. With fewer, two threads wait for each other over and over
+/// while telemetry is read.
+const ROWS_AHEAD: usize = 1024;
+
+/// A database open for reading. Clone freely.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    pool: SqlitePool,
+    /// Figures from the telemetry of ended sessions, kept so that it is read only once.
+    pub(super) ended: MotionsOfEnded,
+}
+
+impl Reader {
+    /// Opens the database of data folder `folder`, whether or not a server has it open.
+    ///
+    /// # Errors
+    /// If there is no database, or it is of another version.
+    pub async fn open(folder: &Path) -> Result<Self, StoreError> {
+        Self::open_checked(&folder.join(DATABASE)).await
+    }
+
+    /// Opens the database `file`, and checks its names and its version.
+    pub(super) async fn open_checked(file: &Path) -> Result<Self, StoreError> {
+        let reader = Self::open_file(there(file)?).await?;
+        check_names(&reader.pool).await?;
+        reader.check_version().await?;
+        Ok(reader)
+    }
+
+    /// The same without the checks, for a database that the caller has made or checked.
+    pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
+        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(reading(file)).await?;
+        Ok(Self { pool, ended: MotionsOfEnded::default() })
+    }
+
+    /// Opens a snapshot of the database `file`, which later writes do not change.
+    pub(super) async fn open_snapshot(file: &Path) -> Result<Self, StoreError> {
+        let snapshot = Self::open_snapshot_unchecked(file).await?;
+        snapshot.check_version().await?;
+        Ok(snapshot)
+    }
+
+    /// The same, for a database of any version.
+    pub(super) async fn open_snapshot_unchecked(file: &Path) -> Result<Self, StoreError> {
+        let pool = snapshot_pool(reading(there(file)?)).await?;
+        Ok(Self { pool, ended: MotionsOfEnded::default() })
+    }
+
+    /// A snapshot of the database, which later writes do not change. So everything that is read from it belongs
+    /// together.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn snapshot(&self) -> Result<Self, StoreError> {
+        let pool = snapshot_pool((*self.pool.connect_options()).clone()).await?;
+        Ok(Self { pool, ended: Arc::clone(&self.ended) })
+    }
+
+    pub(super) async fn check_version(&self) -> Result<(), StoreError> {
+        let mut connection = self.pool.acquire().await?;
+        let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
+        if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
+            return Err(StoreError::Newer { version: newer.version });
+        }
+
+        let missing = MIGRATOR.iter().any(|ours| !applied.iter().any(|migration| migration.version == ours.version));
+        if missing { Err(StoreError::Outdated) } else { Ok(()) }
+    }
+
+    pub(super) const fn pool(&self) -> &SqlitePool {
+        &self.pool
+    }
+
+    /// Copies the database as it is now into `file`, which must be empty or must not exist.
+    pub(super) async fn copy_to(&self, file: &Path) -> Result<(), StoreError> {
+        let file = file.to_str().ok_or_else(|| StoreError::Disk("the file's name is not UTF-8".to_owned()))?;
+        sqlx::query("VACUUM INTO ?").bind(file).execute(&self.pool).await?;
+        Ok(())
+    }
+
+    /// Moves the log of the database `file` into it, as far as other programs that have it open allow.
+    pub(super) async fn fold_log(file: &Path) -> Result<(), StoreError> {
+        let options = SqliteConnectOptions::new().filename(file).busy_timeout(Duration::from_secs(1));
+        let mut connection = sqlx::SqliteConnection::connect_with(&options).await?;
+        let folded = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)").execute(&mut connection).await;
+        connection.close().await?;
+        Ok(folded.map(|_| ())?)
+    }
+
+    /// Closes its connections.
+    pub(super) async fn close(&self) {
+        self.pool.close().await;
+    }
+
+    /// The participants, by code.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn participants(&self) -> Result<Vec<Participant>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT code, wall, (SELECT count(*) FROM sessions WHERE participant = code AND NOT practice) AS sessions
+             FROM participants ORDER BY code",
+        )
+        .fetch_all(&self.pool)
+        .await?;
+
+        let participant = |row: &SqliteRow| {
+            let code = row.try_get("code")?;
+            let sessions = row.try_get("sessions")?;
+            Ok(Participant { code, added: parsed(row, "wall")?, sessions })
+        };
+
+        rows.iter().map(participant).collect()
+    }
+
+    /// The sessions, newest first. Practice sessions are included only if `practice` is true.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT session, wall, participant, protocol, practice,
+                 (SELECT study FROM study_sessions AS m WHERE m.session = s.session) AS study,
+                 (SELECT kind FROM events AS e
+                     WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
+                 (SELECT count(*) FROM events AS e
+                     WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
+                 (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
+                 (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
+                 (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
+                     AS emergency,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
+                 (SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
+                     ORDER BY number DESC LIMIT 1) AS corrected_participant
+             FROM sessions AS s WHERE practice = 0 OR ?1 ORDER BY s.rowid DESC",
+        )
+        .bind(practice)
+        .fetch_all(&self.pool)
+        .await?;
+
+        rows.iter().map(line).collect()
+    }
+
+    /// The clocks at each start of the server. If the wall clock was behind when a run began, that run counts from the
+    /// last known time of the run before. So later events never get earlier times.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn run_clocks(&self) -> Result<RunClocks, StoreError> {
+        let rows = sqlx::query(
+            "SELECT run, wall, monotonic_ns, coalesce(last_ns, monotonic_ns) AS last_ns FROM runs LEFT JOIN (
+                 SELECT run, max(monotonic_ns) AS last_ns FROM (
+                     SELECT run, monotonic_ns FROM events UNION ALL SELECT run, monotonic_ns FROM comments
+                     UNION ALL SELECT run, monotonic_ns FROM answers)
+                 GROUP BY run) USING (run)
+             ORDER BY run",
+        )
+        .fetch_all(&self.pool)
+        .await?;
+
+        let mut clocks = BTreeMap::new();
+        let mut known_until = Timestamp::MIN;
+        for row in &rows {
+            let started = stamp(row)?;
+            let start = Stamp { wall: started.wall.max(known_until), at: started.at };
+            let last = moment(row.try_get("last_ns")?);
+            known_until = start.wall.saturating_add(last.since(start.at)).unwrap_or(start.wall);
+            clocks.insert(row.try_get("run")?, start);
+        }
+
+        Ok(RunClocks(clocks))
+    }
+
+    /// The events of camera and lens in `session`, each with its number and its run. They go from the start of every
+    /// run that served the session to the end of the session, so they include the state in which it began.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn device_events(&self, session: SessionId) -> Result<Vec<(i64, i64, DeviceEvent)>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
+             WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (
+                 SELECT 1 FROM events AS e WHERE e.session = ?1 AND e.kind IN ('completed', 'aborted')
+                     AND (e.run, e.monotonic_ns) < (d.run, d.monotonic_ns))
+             ORDER BY number",
+        )
+        .bind(session.to_string())
+        .fetch_all(&self.pool)
+        .await?;
+
+        let event = |row: &SqliteRow| {
+            let Stamp { wall, at } = stamp(row)?;
+            let device = row.try_get("device")?;
+            let working = row.try_get("working")?;
+            let message = row.try_get("message")?;
+            Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
+        };
+
+        rows.iter().map(event).collect()
+    }
+
+    /// The focal power of the last command to the lens in `segment`, from telemetry; `None` if no policy was asked
+    /// there. Steps without a policy do not count, because the lens may be elsewhere then, as after a device was opened
+    /// again.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn last_commanded(&self, segment: SegmentId) -> Result<Option<FocalPower>, StoreError> {
+        let asked: Option<f64> = sqlx::query_scalar(
+            "SELECT asked FROM telemetry
+             WHERE segment = (SELECT number FROM segments WHERE segment = ?) AND policy IS NOT NULL
+             ORDER BY number DESC LIMIT 1",
+        )
+        .bind(segment.to_string())
+        .fetch_optional(&self.pool)
+        .await?;
+
+        Ok(asked.and_then(|asked| FocalPower::new(asked).ok()))
+    }
+
+    /// The focal path of `session`: about `points` steps of each setting, evenly spread over its steps.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn focal_path(&self, session: SessionId, points: u32) -> Result<Vec<PathPoint>, StoreError> {
+        let rows = sqlx::query(
+            "WITH steps AS (
+                 SELECT t.*, g.setting, row_number() OVER w AS step, count(*) OVER (PARTITION BY t.segment) AS steps
+                 FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+                 WHERE g.session = ?1 WINDOW w AS (PARTITION BY t.segment ORDER BY t.number))
+             SELECT * FROM steps WHERE (step - 1) % max(1, steps / ?2) = 0 ORDER BY setting, number",
+        )
+        .bind(session.to_string())
+        .bind(points.max(1))
+        .fetch_all(&self.pool)
+        .await?;
+
+        rows.iter().map(path_point).collect()
+    }
+}
+
+/// `file`, or an error if it does not exist.
+fn there(file: &Path) -> Result<&Path, StoreError> {
+    if file.is_file() { Ok(file) } else { Err(StoreError::Missing(file.to_owned())) }
+}
+
+/// How the database `file` is opened for reading.
+fn reading(file: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(file)
+        .read_only(true)
+        .busy_timeout(Duration::from_secs(5))
+        .row_buffer_size(ROWS_AHEAD)
+}
+
+/// One connection, within one transaction from its first to its last use.
+async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
+    let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
+    let pool = one.test_before_acquire(false).connect_with(options).await?;
+
+    // The first read takes the snapshot. Both statements are executed here and not in `after_connect`. If that failed,
+    // as it does on a damaged file, the pool would try again for half a minute and then report a timeout.
+    sqlx::query("BEGIN").execute(&pool).await?;
+    check_names(&pool).await?;
+    Ok(pool)
+}
+
+fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
+    let ended: Option<String> = row.try_get("ended")?;
+    let emergency: Option<bool> = row.try_get("emergency")?;
+    Ok(SessionLine {
+        session: parsed(row, "session")?,
+        created: parsed(row, "wall")?,
+        participant: row.try_get("participant")?,
+        corrected_participant: row.try_get("corrected_participant")?,
+        protocol: row.try_get("protocol")?,
+        practice: row.try_get("practice")?,
+        study: row.try_get("study")?,
+        status: match ended.as_deref() {
+            None => SessionStatus::UnderWay,
+            Some("completed") => SessionStatus::Completed,
+            Some(_) => SessionStatus::Aborted,
+        },
+        finished_settings: row.try_get("finished")?,
+        settings: row.try_get("settings")?,
+        comments: row.try_get("comments")?,
+        unblinded: emergency.is_some(),
+        emergency: emergency == Some(true),
+        withdrawn: row.try_get("withdrawn")?,
+    })
+}
+
+fn path_point(row: &SqliteRow) -> Result<PathPoint, StoreError> {
+    Ok(PathPoint {
+        setting: row.try_get("setting")?,
+        frame: row.try_get("frame")?,
+        run: row.try_get("run")?,
+        exposed: moment(row.try_get("exposed_ns")?),
+        asked: row.try_get("asked")?,
+        measured: row.try_get("measured")?,
+        optimal: row.try_get("optimal")?,
+        metric: row.try_get("metric")?,
+    })
+}

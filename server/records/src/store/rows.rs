@@ -1,0 +1,215 @@
+//! What is read from and written to the database, as plain records.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use parfocal_trial::phase::SessionStatus;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::{CommentContent, Origin};
+use parfocal_trial::standing::{GivenAnswer, Standing, by_question};
+
+/// When something was recorded, by both clocks of the server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamp {
+    /// When it was recorded, by the server's wall clock.
+    pub wall: Timestamp,
+    /// When it was recorded, by the monotonic clock.
+    pub at: Moment,
+}
+
+/// A comment kept, or to be kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comment {
+    /// The browser's idempotency key.
+    pub key: IdempotencyKey,
+    /// Its session.
+    pub session: SessionId,
+    /// Its segment, if it belongs to one.
+    pub segment: Option<SegmentId>,
+    /// Number of the frame on screen.
+    pub frame: Option<u64>,
+    /// The run that counted the frame.
+    pub frame_run: Option<i64>,
+    /// Where and when it was said, as the page reported.
+    pub origin: Origin,
+    /// Whether it arrived too late to count.
+    pub late: bool,
+    /// When it was kept.
+    pub stamp: Stamp,
+    /// What was said.
+    pub said: CommentContent,
+}
+
+/// An answer kept, or to be kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// The browser's idempotency key.
+    pub key: IdempotencyKey,
+    /// Its session.
+    pub session: SessionId,
+    /// Its segment; `None` for a closing question.
+    pub segment: Option<SegmentId>,
+    /// The question's id.
+    pub question: String,
+    /// The answer, or the part of it that was given.
+    pub value: AnswerValue,
+    /// Where and when it was given, as the page reported.
+    pub origin: Origin,
+    /// Whether it arrived too late to count.
+    pub late: bool,
+    /// When it was kept.
+    pub stamp: Stamp,
+}
+
+impl Answer {
+    /// The answer in the form in which the answers to a question are compared. `run` is the run that kept it, and
+    /// `clocks` has the clocks of that run.
+    #[must_use]
+    pub fn given(&self, run: i64, clocks: &RunClocks) -> GivenAnswer {
+        GivenAnswer {
+            device: self.origin.device,
+            sequence: self.origin.sequence,
+            at: clocks.said(run, self.stamp.at, &self.origin),
+            late: self.late,
+            value: self.value.clone(),
+        }
+    }
+}
+
+/// The standing of each of `answers`, such as whether it counts. `answers` are those of a session in the order they
+/// were kept, each with the run that kept it.
+#[must_use]
+pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<Standing> {
+    let asked = |(run, answer): &(i64, Answer)| ((answer.segment, answer.question.clone()), answer.given(*run, clocks));
+    by_question(answers.iter().map(asked))
+}
+
+/// The last report of a surgeon's device about how many comments and answers of a session it still holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceReport {
+    /// The device.
+    pub device: DeviceId,
+    /// How many it held, the run in which it reported this, and when; `None` if it never reported.
+    pub told: Option<(u32, i64, Moment)>,
+}
+
+impl DeviceReport {
+    /// How many the device held, and when it reported this, by `clocks`; `None` if it never reported.
+    #[must_use]
+    pub fn told_on(&self, clocks: &RunClocks) -> Option<(u32, Timestamp)> {
+        let (holding, run, at) = self.told?;
+        Some((holding, clocks.wall(run, at)))
+    }
+}
+
+/// A participant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Participant {
+    /// Code.
+    pub code: String,
+    /// When it was added, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub added: Timestamp,
+    /// Sessions, practice excluded.
+    pub sessions: i64,
+}
+
+/// A session in a list. Says nothing of policies.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[allow(clippy::struct_excessive_bools, reason = "facts that the list shows each by itself")]
+pub struct SessionLine {
+    /// Session.
+    pub session: SessionId,
+    /// When it was made, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub created: Timestamp,
+    /// Participant's code, as it was recorded.
+    pub participant: String,
+    /// The right code, where that was corrected.
+    pub corrected_participant: Option<String>,
+    /// Protocol's name.
+    pub protocol: String,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// The study that it belongs to; none where it is outside any study.
+    pub study: Option<String>,
+    /// How far it came.
+    pub status: SessionStatus,
+    /// Settings inspected to the end.
+    pub finished_settings: i64,
+    /// Settings in all.
+    pub settings: i64,
+    /// Comments kept.
+    pub comments: i64,
+    /// Whether it was told which policies ran.
+    pub unblinded: bool,
+    /// Whether that was while it was under way.
+    pub emergency: bool,
+    /// Whether the participant withdrew: its data stay out of exports.
+    pub withdrawn: bool,
+}
+
+/// A point of a session's focal path. Only people who know the policy may see its metric.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPoint {
+    /// Setting, from 1.
+    pub setting: i64,
+    /// Frame's number.
+    pub frame: i64,
+    /// Start of the server that it belongs to.
+    pub run: i64,
+    /// End of the exposure.
+    pub exposed: Moment,
+    /// Focal power asked for, 0..=1.
+    pub asked: f64,
+    /// Focal power that the frame was exposed at, 0..=1; `None` if it is not known.
+    pub measured: Option<f64>,
+    /// The optimum, 0..=1, if a simulation knows it.
+    pub optimal: Option<f64>,
+    /// The policy's focus metric. Its scale reveals the policy.
+    pub metric: Option<f64>,
+}
+
+/// A device started or stopped working.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceEvent {
+    /// When it was recorded, by the server's wall clock.
+    pub wall: Timestamp,
+    /// When it was recorded, by the monotonic clock.
+    pub at: Moment,
+    /// `camera` or `lens`.
+    pub device: String,
+    /// Whether it works now.
+    pub working: bool,
+    /// What the device reports, or what was changed, in words.
+    pub message: String,
+}
+
+/// The clocks at each start of the server. They give each moment of a run its time of day.
+#[derive(Debug, Clone, Default)]
+pub struct RunClocks(pub(super) BTreeMap<i64, Stamp>);
+
+impl RunClocks {
+    /// The time of day of `at` in run `run`, counted from the wall clock at the start of that run. So setting the wall
+    /// clock does not change the distances between times of a run.
+    #[must_use]
+    pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
+        let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };
+        start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
+    }
+
+    /// When something was said that arrived at `at` in run `run`: its time of arrival, less its wait on the surgeon's
+    /// device.
+    #[must_use]
+    pub fn said(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
+        let arrived = self.wall(run, at);
+        let waited = Duration::from_millis(origin.waited_millis.map_or(0, i64::unsigned_abs));
+        arrived.saturating_sub(waited).unwrap_or(arrived)
+    }
+}

@@ -1,0 +1,197 @@
+//! Reads studies.
+
+use jiff::Timestamp;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use super::{Enrolment, StoredStudy};
+use crate::store::values::parsed;
+use crate::store::{Reader, StoreError};
+use parfocal_base::ids::SessionId;
+use parfocal_trial::account::AccountName;
+use parfocal_trial::allocation::Seed;
+use parfocal_trial::phase::SessionStatus;
+use parfocal_trial::protocol::Protocol;
+use parfocal_trial::study::definition::Definition;
+use parfocal_trial::study::event::{StudyEvent, StudyEventKind};
+use parfocal_trial::study::places::Enrolled;
+use parfocal_trial::study::signature::{Channel, Signature};
+
+impl Reader {
+    /// The names of all studies, in the order in which they were planned.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn study_names(&self) -> Result<Vec<String>, StoreError> {
+        Ok(sqlx::query_scalar("SELECT study FROM studies ORDER BY rowid").fetch_all(self.pool()).await?)
+    }
+
+    /// The whole of study `name`, or `None` if there is none.
+    ///
+    /// # Errors
+    /// If the database fails or holds data that this version cannot read.
+    pub async fn study(&self, name: &str) -> Result<Option<StoredStudy>, StoreError> {
+        let row = sqlx::query("SELECT definition, sites FROM studies WHERE study = ?").bind(name);
+        let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
+
+        let unreadable = |error: &dyn std::fmt::Display| StoreError::Damaged(format!("study {name}: {error}"));
+        let protocols = self.study_protocols(name).await?;
+        let definition: String = row.try_get("definition")?;
+        let definition = Definition::parse(&definition, name, &protocols).map_err(|error| unreadable(&error))?;
+        let sites: String = row.try_get("sites")?;
+        let sites = serde_json::from_str(&sites).map_err(|error| unreadable(&error))?;
+
+        Ok(Some(StoredStudy {
+            definition,
+            sites,
+            seed: self.study_seed(name).await?,
+            events: self.study_events(name).await?,
+            sessions: self.enrolled(name).await?,
+        }))
+    }
+
+    async fn study_protocols(&self, study: &str) -> Result<Vec<Protocol>, StoreError> {
+        let rows: Vec<(String, String)> =
+            sqlx::query_as("SELECT protocol, protocol_toml FROM study_protocols WHERE study = ? ORDER BY protocol")
+                .bind(study)
+                .fetch_all(self.pool())
+                .await?;
+
+        let protocol = |(name, text): (String, String)| {
+            Protocol::parse_kept(&text, &name)
+                .map_err(|error| StoreError::Damaged(format!("study {study}, protocol {error}")))
+        };
+        rows.into_iter().map(protocol).collect()
+    }
+
+    async fn study_seed(&self, study: &str) -> Result<Option<Seed>, StoreError> {
+        let seed: Option<String> = sqlx::query_scalar("SELECT seed FROM study_seeds WHERE study = ?")
+            .bind(study)
+            .fetch_optional(self.pool())
+            .await?;
+
+        let read = |text: String| {
+            Seed::from_hex(&text)
+                .ok_or_else(|| StoreError::Damaged(format!("study {study}: its seed is not 64 hexadecimal digits")))
+        };
+        seed.map(read).transpose()
+    }
+
+    /// The events of study `study`, in order.
+    ///
+    /// # Errors
+    /// If the database fails or holds data that this version cannot read.
+    pub async fn study_events(&self, study: &str) -> Result<Vec<StudyEvent>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT *, (SELECT account FROM actors AS a
+                 WHERE a.kind = 'study-event' AND a.record = study || '/' || e.number) AS account
+             FROM study_events AS e WHERE study = ? ORDER BY number",
+        )
+        .bind(study)
+        .fetch_all(self.pool())
+        .await?;
+        rows.iter().map(event).collect()
+    }
+
+    /// The sessions of study `study`, in the order in which they were made.
+    async fn enrolled(&self, study: &str) -> Result<Vec<Enrolled>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT m.session, m.site, m.protocol, m.place, s.participant,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'completed') AS completed,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'aborted') AS aborted,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'unblinded') AS unblinded,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn,
+                 (SELECT new_value FROM corrections AS c WHERE c.session = m.session AND field = 'participant'
+                     ORDER BY number DESC LIMIT 1) AS corrected_participant
+             FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid",
+        )
+        .bind(study)
+        .fetch_all(self.pool())
+        .await?;
+        rows.iter().map(enrolled).collect()
+    }
+
+    /// The place of `session` in its study; `None` outside any study.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn enrolment(&self, session: SessionId) -> Result<Option<Enrolment>, StoreError> {
+        let row = sqlx::query(
+            "SELECT study, definition_sha256, site, protocol, place FROM study_sessions JOIN studies USING (study)
+             WHERE session = ?",
+        )
+        .bind(session.to_string())
+        .fetch_optional(self.pool())
+        .await?;
+
+        let enrolment = |row: SqliteRow| {
+            Ok(Enrolment {
+                study: row.try_get("study")?,
+                definition_sha256: row.try_get("definition_sha256")?,
+                site: row.try_get("site")?,
+                protocol: row.try_get("protocol")?,
+                place: place(&row)?,
+            })
+        };
+        row.map(enrolment).transpose()
+    }
+
+    /// When the study of `session` was locked; `None` if it was not, or if the session is outside any study.
+    pub(in crate::store) async fn study_locked(&self, session: SessionId) -> Result<Option<Timestamp>, StoreError> {
+        let row = sqlx::query(
+            "SELECT e.wall FROM study_sessions AS m JOIN study_events AS e USING (study)
+             WHERE m.session = ? AND e.kind = 'locked'",
+        )
+        .bind(session.to_string())
+        .fetch_optional(self.pool())
+        .await?;
+        row.map(|row| parsed(&row, "wall")).transpose()
+    }
+}
+
+fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
+    let way: String = row.try_get("role")?;
+    let kind: String = row.try_get("kind")?;
+    let session: Option<String> = row.try_get("session")?;
+    let session = match session {
+        Some(_) => Some(parsed(row, "session")?),
+        None => None,
+    };
+
+    let account: Option<String> = row.try_get("account")?;
+    let account = account.map(|name| AccountName::new(&name)).transpose();
+    let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
+    Ok(StudyEvent {
+        number: row.try_get("number")?,
+        way: Channel::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
+        signature: Signature { person: row.try_get("person")?, reason: row.try_get("reason")?, account },
+        wall: parsed(row, "wall")?,
+        kind: StudyEventKind::of(&kind, session, row.try_get("commitment")?)
+            .ok_or_else(|| StoreError::Damaged(format!("unknown event '{kind}' of a study")))?,
+    })
+}
+
+fn enrolled(row: &SqliteRow) -> Result<Enrolled, StoreError> {
+    let status = match (row.try_get("completed")?, row.try_get("aborted")?) {
+        (_, true) => SessionStatus::Aborted,
+        (true, false) => SessionStatus::Completed,
+        (false, false) => SessionStatus::UnderWay,
+    };
+
+    Ok(Enrolled {
+        session: parsed(row, "session")?,
+        participant: row.try_get("participant")?,
+        corrected_participant: row.try_get("corrected_participant")?,
+        site: row.try_get("site")?,
+        protocol: row.try_get("protocol")?,
+        place: place(row)?,
+        status,
+        unblinded: row.try_get("unblinded")?,
+        withdrawn: row.try_get("withdrawn")?,
+    })
+}
+
+fn place(row: &SqliteRow) -> Result<usize, StoreError> {
+    let place: i64 = row.try_get("place")?;
+    usize::try_from(place).map_err(|_| StoreError::Damaged(format!("place {place} in a list")))
+}

@@ -1,0 +1,193 @@
+//! A session's export as part of a package: verified, and identified by study, site and chain.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::error::PackageError;
+use parfocal_records::store::export::verify::{Verdict, is_export, verify_files};
+use parfocal_records::store::export::{ExportFiles, FORMAT};
+
+/// Folder of a package that contains the exports.
+pub const SESSIONS: &str = "sessions";
+
+/// A session of a study that is not in a package.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The session.
+    pub session: String,
+    /// Why it is not in the package.
+    pub reason: String,
+}
+
+/// A verified export of a session of a study.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Folder of the export.
+    pub folder: PathBuf,
+    /// The session.
+    pub session: String,
+    /// Name of the session's study.
+    pub study: String,
+    /// Name of the session's site.
+    pub site: String,
+    /// SHA-256 of the study's definition.
+    definition_sha256: String,
+    /// Whether the policies are left out.
+    pub blinded: bool,
+    /// Number and hash of the chain's head at the time of the export.
+    head: (u64, String),
+}
+
+impl Source {
+    /// Verifies the export in `folder`.
+    ///
+    /// # Errors
+    /// If it does not verify, another version wrote it, or its session is outside any study.
+    pub fn open(folder: &Path) -> Result<Self, PackageError> {
+        if !is_export(folder) {
+            return Err(PackageError::NotAnExport(folder.to_owned()));
+        }
+
+        let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
+        let export = ExportFiles::of(folder);
+        let package = export.json("datapackage.json").map_err(unreadable)?;
+        let told = &package["parfocal"];
+        let format = told["format"].as_u64().unwrap_or(1);
+        if format != FORMAT {
+            return Err(PackageError::OtherFormat { folder: folder.to_owned(), found: format, expected: FORMAT });
+        }
+
+        for check in verify_files(&export, None) {
+            if let Verdict::Failed(problem) = check.verdict {
+                return Err(PackageError::Unverified {
+                    folder: folder.to_owned(),
+                    check: check.name.to_owned(),
+                    problem,
+                });
+            }
+        }
+
+        let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
+        let text = |value: &Value| value.as_str().map(str::to_owned);
+        let cell = |file: &str, column: &str| {
+            let cells = export.cells(file, column).map_err(unreadable)?;
+            cells.into_iter().next().ok_or_else(outside)
+        };
+
+        Ok(Self {
+            folder: folder.to_owned(),
+            session: cell("sessions.csv", "session")?,
+            study: text(&told["study"]).ok_or_else(outside)?,
+            site: cell("study_sessions.csv", "site")?,
+            definition_sha256: text(&told["study_definition_sha256"]).ok_or_else(outside)?,
+            blinded: told["blinded"].as_bool().unwrap_or(true),
+            head: (
+                told["chain"]["number"].as_u64().unwrap_or_default(),
+                text(&told["chain"]["hash"]).unwrap_or_default(),
+            ),
+        })
+    }
+
+    /// The export's folder within a package.
+    #[must_use]
+    pub fn place(&self) -> String {
+        format!("{SESSIONS}/{}", self.session)
+    }
+
+    /// The same export after its folder was moved or copied to `folder`.
+    pub(super) fn at(&self, folder: PathBuf) -> Self {
+        Self { folder, ..self.clone() }
+    }
+
+    fn apart(&self, other: &Self, reason: impl Into<String>) -> PackageError {
+        PackageError::Apart { one: self.folder.clone(), other: other.folder.clone(), reason: reason.into() }
+    }
+}
+
+/// The folders of the exports in `path`: `path` itself if it is an export, or those of a package.
+///
+/// # Errors
+/// If it is neither, or cannot be read.
+pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
+    let sessions = path.join(SESSIONS);
+    if !sessions.is_dir() {
+        return if is_export(path) {
+            Ok(vec![path.to_owned()])
+        } else {
+            Err(PackageError::NotAnExport(path.to_owned()))
+        };
+    }
+
+    let mut folders = Vec::new();
+    for entry in std::fs::read_dir(&sessions).map_err(PackageError::unreadable(&sessions))? {
+        folders.push(entry.map_err(PackageError::unreadable(&sessions))?.path());
+    }
+    folders.sort();
+    Ok(folders)
+}
+
+/// The sessions that the package `path` lists as left out; none if `path` is the export of a session.
+///
+/// # Errors
+/// If its description cannot be read, or a file in it was changed since it was written.
+pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
+    if !path.join(SESSIONS).is_dir() {
+        return Ok(Vec::new());
+    }
+    let unreadable = |reason: String| PackageError::Unreadable { path: path.to_owned(), reason };
+    let package = ExportFiles::of(path).json("datapackage.json").map_err(unreadable)?;
+    serde_json::from_value(package["parfocal"]["left_out"].clone()).map_err(|error| unreadable(error.to_string()))
+}
+
+/// Checks that `sources` belong together: one study with one definition, all blinded or none, no session twice, and one
+/// chain per site.
+pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
+    let Some(first) = sources.first() else { return Ok(()) };
+    let mut seen: BTreeMap<&str, &Source> = BTreeMap::new();
+    for source in sources {
+        if source.study != first.study {
+            let reason = format!("one is of study '{}', the other of '{}'", first.study, source.study);
+            return Err(first.apart(source, reason));
+        }
+        if source.definition_sha256 != first.definition_sha256 {
+            return Err(first.apart(source, "the definition of their study differs"));
+        }
+        if source.blinded != first.blinded {
+            return Err(
+                first.apart(source, "one contains the policies, the other does not; export both in the same way")
+            );
+        }
+        if let Some(twin) = seen.insert(&source.session, source) {
+            return Err(twin.apart(source, format!("both have session {}; give each site once", source.session)));
+        }
+    }
+
+    let sites: BTreeSet<&str> = sources.iter().map(|source| source.site.as_str()).collect();
+    for site in sites {
+        let of_site: Vec<&Source> = sources.iter().filter(|source| source.site == site).collect();
+        one_chain(&of_site)?;
+    }
+    Ok(())
+}
+
+/// Checks that the heads of all `sources`, which are of one site, are in the longest chain among them. If one is not, a
+/// record was rewritten between two exports, or two databases have the same site name.
+fn one_chain(sources: &[&Source]) -> Result<(), PackageError> {
+    let Some(longest) = sources.iter().max_by_key(|source| source.head.0) else { return Ok(()) };
+    let export = ExportFiles::of(&longest.folder);
+    let column =
+        |name| export.cells("chain.csv", name).map_err(PackageError::unreadable(longest.folder.join("chain.csv")));
+    let rows: BTreeMap<String, String> = column("number")?.into_iter().zip(column("hash")?).collect();
+
+    for source in sources {
+        if rows.get(&source.head.0.to_string()) != Some(&source.head.1) {
+            let reason =
+                format!("both say that they are of site '{}', but their chains of records differ", source.site);
+            return Err(source.apart(longest, reason));
+        }
+    }
+    Ok(())
+}

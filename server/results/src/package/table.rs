@@ -1,0 +1,87 @@
+//! A joined table: a table of the exports, with columns for session and site.
+
+use parfocal_records::store::export::{Column, FORMAT, TABLES, Table, Type};
+
+/// Column that tells the records of different databases apart.
+const SITE: Column = Column {
+    name: "site",
+    kind: Type::String,
+    unit: "",
+    description: "Site of the study that recorded it; numbers such as run are counted at each site",
+    since: FORMAT,
+};
+
+const SESSION: Column =
+    Column { name: "session", kind: Type::String, unit: "", description: "Session's random id", since: FORMAT };
+
+/// Tables whose rows may belong to several sessions of a site; each row is joined once.
+const SHARED: [&str; 5] = ["runs", "devices", "studies", "study_events", "weights"];
+
+/// Tables with a row for each frame, joined only as Parquet. The exports have them as CSV.
+const LONG: [&str; 2] = ["telemetry", "policy_steps"];
+
+/// Tables that prove a single export and have no meaning when joined.
+const PROOFS: [&str; 3] = ["chain", "chain_salts", "voice_pieces"];
+
+/// Source of a cell of a joined table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// The export's site.
+    Site,
+    /// The export's session.
+    Session,
+    /// This column of the export's table.
+    Cell(usize),
+}
+
+/// A table of all sessions.
+#[derive(Debug, Clone)]
+pub struct JoinedTable {
+    /// The table as in an export.
+    pub table: Table,
+    /// The columns, in order, and the source of their cells.
+    pub columns: Vec<(Column, Origin)>,
+    /// Names of the columns that together identify a row.
+    pub key: Vec<&'static str>,
+    /// Whether a row may be in several exports of a site.
+    pub shared: bool,
+    /// Whether there is a row for each frame.
+    pub long: bool,
+}
+
+impl JoinedTable {
+    fn of(table: Table) -> Self {
+        let shared = SHARED.contains(&table.name);
+        let mut columns = vec![(SITE, Origin::Site)];
+        if !shared {
+            columns.push((SESSION, Origin::Session));
+        }
+        let before: Vec<&str> = columns.iter().map(|(column, _)| column.name).collect();
+        let own = table.columns.iter().zip(0..).filter(|(column, _)| !before.contains(&column.name));
+        let own: Vec<_> = own.map(|(column, place)| (*column, Origin::Cell(place))).collect();
+        columns.extend(own);
+
+        let mut key = vec![SITE.name];
+        if !shared {
+            key.push(SESSION.name);
+        }
+        key.extend(table.key.iter().filter(|name| **name != SESSION.name));
+
+        Self { table, columns, key, shared, long: LONG.contains(&table.name) }
+    }
+
+    /// The columns without the source of their cells.
+    pub fn columns(&self) -> impl Iterator<Item = &Column> {
+        self.columns.iter().map(|(column, _)| column)
+    }
+
+    /// Whether each row belongs to one session.
+    pub const fn of_sessions(&self) -> bool {
+        !self.shared
+    }
+}
+
+/// Every table of a package, in order.
+pub fn joined_tables() -> impl Iterator<Item = JoinedTable> {
+    TABLES.into_iter().filter(|table| !PROOFS.contains(&table.name)).map(JoinedTable::of)
+}

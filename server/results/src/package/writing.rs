@@ -1,0 +1,276 @@
+//! Writes a package: next to its final place and under another name until it is complete.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::error::PackageError;
+use super::parquet::ParquetFile;
+use super::source::{LeftOut, SESSIONS, Source, agree};
+use super::table::{JoinedTable, joined_tables};
+use super::{description, join, r, redcap, spss};
+use parfocal_base::files::{files_below, sync_folder_of, write_through};
+use parfocal_records::store::export::SUMS;
+
+/// Summary of the written package.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// Folder of the package.
+    pub folder: PathBuf,
+    /// Name of the study.
+    pub study: String,
+    /// Names of the sites in the package.
+    pub sites: Vec<String>,
+    /// Number of sessions in the package.
+    pub sessions: usize,
+    /// Sessions of the study that are not in the package.
+    pub left_out: Vec<LeftOut>,
+    /// Whether it contains the policies.
+    pub unblinded: bool,
+}
+
+/// What happens to the exports that go into a package.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sessions {
+    /// They stay where they are, and the package has copies.
+    Copied,
+    /// They are moved into the package, which must be on the same disk. If writing the package fails, they are lost.
+    Moved,
+}
+
+/// Writes the package of `sources` to the folder `out`, which must be new or empty and appears complete or not at all.
+/// Calls `told` with the number of steps done and the number of all steps.
+///
+/// # Errors
+/// If there is no source, two of them do not belong together, or a file cannot be read or written.
+pub fn write(
+    sources: &[Source],
+    sessions: Sessions,
+    left_out: &[LeftOut],
+    out: &Path,
+    told: &mut (dyn FnMut(usize, usize) + Send),
+) -> Result<Summary, PackageError> {
+    // In the order in which `check` finds them again: by the names of their folders.
+    let mut sources = sources.to_vec();
+    sources.sort_by(|one, other| one.session.cmp(&other.session));
+    let sources = sources.as_slice();
+
+    let first = sources.first().ok_or_else(|| PackageError::Empty(out.to_owned()))?;
+    agree(sources)?;
+    check_new(out)?;
+
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(parent).map_err(PackageError::unwritable(parent))?;
+    let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
+    let temporary = temporary.map_err(PackageError::unwritable(parent))?;
+
+    fill(sources, sessions, left_out, temporary.path(), told)?;
+
+    // An existing empty folder is replaced.
+    let _ = fs::remove_dir(out);
+    fs::rename(temporary.keep(), out).map_err(PackageError::unwritable(out))?;
+    sync_folder_of(out);
+
+    let sites: BTreeSet<&String> = sources.iter().map(|source| &source.site).collect();
+    Ok(Summary {
+        folder: out.to_owned(),
+        study: first.study.clone(),
+        sites: sites.into_iter().cloned().collect(),
+        sessions: sources.len(),
+        left_out: left_out.to_vec(),
+        unblinded: !first.blinded,
+    })
+}
+
+fn check_new(out: &Path) -> Result<(), PackageError> {
+    let unwritable = PackageError::unwritable(out);
+    if out.is_file() || out.is_dir() && fs::read_dir(out).map_err(unwritable)?.next().is_some() {
+        return Err(PackageError::Exists(out.to_owned()));
+    }
+    Ok(())
+}
+
+fn fill(
+    sources: &[Source],
+    sessions: Sessions,
+    left_out: &[LeftOut],
+    folder: &Path,
+    told: StepsCallback,
+) -> Result<(), PackageError> {
+    let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
+    let steps = Steps::new(sources, sessions, &tables, told);
+
+    let mut taken = Vec::new();
+    for source in sources {
+        taken.push(take(source, sessions, folder)?);
+        if sessions == Sessions::Copied {
+            steps.done();
+        }
+    }
+
+    join_tables(&tables, &taken, folder, &steps)?;
+    beside(&tables, &taken, folder)?;
+    let description = description::describe(&taken, &tables, left_out);
+    write_file(folder, "datapackage.json", format!("{description:#}\n").as_bytes())?;
+    write_file(folder, SUMS, sums(folder)?.as_bytes())?;
+    steps.done();
+    Ok(())
+}
+
+/// Called with the number of steps done and the number of all steps.
+type StepsCallback<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
+
+/// Counts the steps of joining from several threads: one for each copied export, one for each table (one per export for
+/// a long table), and one for the checksums.
+struct Steps<'a> {
+    all: usize,
+    done: Mutex<(usize, StepsCallback<'a>)>,
+}
+
+impl<'a> Steps<'a> {
+    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], told: StepsCallback<'a>) -> Self {
+        let copied = if sessions == Sessions::Copied { sources.len() } else { 0 };
+        let joined = tables.iter().map(|table| if table.long { sources.len() } else { 1 });
+        let all = copied + joined.sum::<usize>() + 1;
+        told(0, all);
+        Self { all, done: Mutex::new((0, told)) }
+    }
+
+    fn done(&self) {
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.0 += 1;
+        let (count, told) = &mut *done;
+        told(*count, self.all);
+    }
+}
+
+/// Joins all tables. The long ones take most of the time; each is joined on a thread of its own beside the others.
+fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
+    let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
+    thread::scope(|scope| {
+        let begin = |table| scope.spawn(move || join_long(table, sources, folder, steps));
+        let long: Vec<_> = long.into_iter().map(begin).collect();
+        for table in short {
+            join_short(table, sources, folder)?;
+            steps.done();
+        }
+
+        for thread in long {
+            let broken = || PackageError::unwritable(folder)("a thread ended before its table was whole");
+            thread.join().unwrap_or_else(|_| Err(broken()))?;
+        }
+        Ok(())
+    })
+}
+
+/// Puts an export into the package `folder`. Returns the export at its new place.
+fn take(source: &Source, sessions: Sessions, folder: &Path) -> Result<Source, PackageError> {
+    let place = folder.join(source.place());
+    match sessions {
+        Sessions::Copied => copy_folder(&source.folder, &place)?,
+        Sessions::Moved => {
+            let above = folder.join(SESSIONS);
+            fs::create_dir_all(&above).map_err(PackageError::unwritable(&above))?;
+            fs::rename(&source.folder, &place).map_err(PackageError::unwritable(&place))?;
+        }
+    }
+    Ok(source.at(place))
+}
+
+fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
+    fs::create_dir_all(to).map_err(PackageError::unwritable(to))?;
+    for entry in fs::read_dir(from).map_err(PackageError::unreadable(from))? {
+        let entry = entry.map_err(PackageError::unreadable(from))?;
+        let copy = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy_folder(&entry.path(), &copy)?;
+        } else {
+            fs::copy(entry.path(), &copy).map_err(PackageError::unwritable(&copy))?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes a table that has a row for each frame, only as Parquet.
+fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
+    let mut parquet = ParquetFile::create(&folder.join(format!("{}.parquet", table.table.name)), table)?;
+    for source in sources {
+        join::rows(table, std::slice::from_ref(source), |cells| parquet.row(cells))?;
+        steps.done();
+    }
+    parquet.end()
+}
+
+/// Writes any other table as Parquet, as CSV and for SPSS.
+fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+    let name = table.table.name;
+    let mut parquet = ParquetFile::create(&folder.join(format!("{name}.parquet")), table)?;
+    let path = folder.join(table.table.file());
+    let file = fs::File::create(&path).map_err(PackageError::unwritable(&path))?;
+    let mut csv = csv::Writer::from_writer(BufWriter::new(file));
+    csv.write_record(table.columns().map(|column| column.name)).map_err(PackageError::unwritable(&path))?;
+    join::rows(table, sources, |cells| {
+        csv.write_record(cells).map_err(PackageError::unwritable(&path))?;
+        parquet.row(cells)
+    })?;
+
+    csv.flush().map_err(PackageError::unwritable(&path))?;
+    parquet.end()?;
+
+    let spss = folder.join("spss");
+    fs::create_dir_all(&spss).map_err(PackageError::unwritable(&spss))?;
+    spss::write(&spss.join(format!("{name}.sav")), table, sources)
+}
+
+/// Writes the files for R and REDCap.
+fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+    let short: Vec<JoinedTable> = tables.iter().filter(|table| !table.long).cloned().collect();
+    write_file(folder, "load.R", r::script(&short).as_bytes())?;
+
+    let instruments = redcap::instruments(&short);
+    let dictionary = redcap::dictionary(&instruments).map_err(PackageError::unwritable("redcap/dictionary.csv"))?;
+    fs::create_dir_all(folder.join("redcap")).map_err(PackageError::unwritable(folder.join("redcap")))?;
+    write_file(folder, "redcap/dictionary.csv", &dictionary)?;
+    write_file(folder, "redcap/import.csv", &redcap::import(&instruments, sources)?)
+}
+
+fn write_file(folder: &Path, name: &str, content: &[u8]) -> Result<(), PackageError> {
+    let path = folder.join(name);
+    write_through(&path, content).map_err(PackageError::unwritable(path))
+}
+
+/// The checksums of all files below `folder`, in the form of `sha256sum`, except that of the list itself.
+pub fn sums(folder: &Path) -> Result<String, PackageError> {
+    let mut files = files_below(folder).map_err(PackageError::unreadable(folder))?;
+    files.retain(|file| file != Path::new(SUMS));
+
+    let mut lines = Vec::new();
+    for file in files {
+        let mut digest = Digester(Sha256::new());
+        let path = folder.join(&file);
+        let mut content = fs::File::open(&path).map_err(PackageError::unreadable(&path))?;
+        std::io::copy(&mut content, &mut digest).map_err(PackageError::unreadable(&path))?;
+        lines.push(format!("{}  {}\n", hex::encode(digest.0.finalize()), file.display()));
+    }
+    Ok(lines.concat())
+}
+
+/// A writer that hashes what is written.
+struct Digester(Sha256);
+
+impl Write for Digester {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! Gathers from the database what the rules of unblinding need to know.
+
+use super::course::Course;
+use super::{ConductError, Pen, Shared};
+use parfocal_base::ids::SessionId;
+use parfocal_trial::action::Action;
+use parfocal_trial::allocation::Seed;
+use parfocal_trial::grace::{Grace, Outstanding};
+use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::stage::Stage;
+use parfocal_trial::unblinding::{BlindedStudy, Circumstances};
+
+/// The parts of a session that are needed to look up the circumstances of an action on it.
+#[derive(Clone, Copy)]
+pub(super) struct Subject {
+    session: SessionId,
+    seed: Seed,
+    grace: Grace,
+}
+
+impl Subject {
+    pub const fn of(course: &Course) -> Self {
+        Self { session: course.session(), seed: course.made.seed, grace: course.grace }
+    }
+}
+
+impl Shared {
+    /// The circumstances that the rules need for `action`; only unblinding needs any. `signature` is given for an
+    /// emergency unblinding.
+    pub(super) async fn circumstances(
+        &self,
+        pen: &mut Pen,
+        subject: Subject,
+        action: &Action,
+        signature: Option<&Signature>,
+    ) -> Result<Circumstances, ConductError> {
+        if !matches!(action, Action::Unblind { .. }) {
+            return Ok(Circumstances::default());
+        }
+
+        // The database must know whether the session in memory has ended, because it may belong to the same set.
+        self.record_stops(pen).await?;
+        let set = self.store.reader().balanced_set(subject.seed).await?;
+        let outstanding = self.outstanding(subject.session, subject.grace).await?;
+        let study = self.blinded_study(subject.session, signature.is_some()).await?;
+        Ok(Circumstances { set: Some(set), outstanding, study })
+    }
+
+    /// The study of `session`, if it belongs to one that is still blinded.
+    async fn blinded_study(&self, session: SessionId, signed: bool) -> Result<Option<BlindedStudy>, ConductError> {
+        let reader = self.store.reader();
+        let Some(enrolment) = reader.enrolment(session).await? else { return Ok(None) };
+        let Some(study) = reader.study(&enrolment.study).await? else { return Ok(None) };
+        if study.state().stage == Stage::Unblinded {
+            return Ok(None);
+        }
+
+        let policies = study.definition.protocols.iter().flat_map(|protocol| protocol.policies.clone()).collect();
+        Ok(Some(BlindedStudy { name: study.definition.name, policies, signed }))
+    }
+
+    /// What may still arrive for `session`, which has the grace period `grace`, and would not count after unblinding.
+    pub(super) async fn outstanding(
+        &self,
+        session: SessionId,
+        grace: Grace,
+    ) -> Result<Option<Outstanding>, ConductError> {
+        let devices = self.store.reader().surgeon_devices(session).await?;
+        let clocks = &self.run_clock.clocks;
+        let told = devices.iter().map(|device| device.told_on(clocks));
+
+        let now = self.run_clock.time(self.clock.now());
+        Ok(grace.outstanding(now, told))
+    }
+}

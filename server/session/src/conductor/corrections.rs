@@ -1,0 +1,156 @@
+//! Corrections: the trial's rules decide on them against what is on disk, and they are recorded beside the original.
+
+use super::course::Course;
+use super::{ConductError, Conductor, Shared};
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_records::store::{Answer, Correction, Latest, standings};
+use parfocal_trial::account::Actor;
+use parfocal_trial::correction::{self, Corrected, Field, FieldChange, NewCorrection, Subject};
+use parfocal_trial::permission;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::refusal::Refusal;
+
+/// A correction that was decided on, as it is stored.
+struct DecidedCorrection {
+    subject: Subject,
+    record: String,
+    field: Field,
+    old: String,
+    new: String,
+}
+
+impl Conductor {
+    /// Corrects a record of session `session`. The correction is on disk when this returns; the original stays.
+    ///
+    /// # Errors
+    /// If `by` is not the researcher, the session is under way or withdrawn, the correction is invalid or was made in
+    /// the meantime, or the disk failed.
+    pub async fn correct(
+        &self,
+        by: impl Into<Actor>,
+        session: SessionId,
+        new: NewCorrection,
+    ) -> Result<(), ConductError> {
+        let by = by.into();
+        self.to_the_end(move |shared| async move { shared.correct(by, session, new).await }).await
+    }
+}
+
+impl Shared {
+    async fn correct(&self, by: Actor, session: SessionId, new: NewCorrection) -> Result<(), ConductError> {
+        let _pen = self.pen.lock().await;
+        let course = self.load(session).await?;
+        let reason = correction::check(by.role, course.state.ended(), &new.reason)?;
+        // The participant can be corrected even after a withdrawal, because it says who has withdrawn.
+        if !matches!(new.change, FieldChange::Participant { .. }) {
+            permission::check_reading(course.state.withdrawn())?;
+        }
+
+        let latest = Latest::of(&self.store.reader().corrections(session).await?);
+        let DecidedCorrection { subject, record, field, old, new } = match new.change {
+            FieldChange::Participant { old, new } => self.participant(&course, &latest, old, new).await?,
+            FieldChange::Value { record, old, new } => self.value(&course, &latest, record, &old, &new).await?,
+            FieldChange::Note { record, old, new } => self.note(&course, &latest, record, &old, &new).await?,
+        };
+
+        let stamp = self.stamp();
+        let Actor { role: by, account } = by;
+        let correction = Correction { session, subject, record, field, old, new, reason, by, stamp };
+        Ok(self.store.correct(&correction, account.as_ref()).await?)
+    }
+
+    async fn participant(
+        &self,
+        course: &Course,
+        latest: &Latest,
+        old: String,
+        new: String,
+    ) -> Result<DecidedCorrection, ConductError> {
+        let session = course.session();
+        let known = self.store.reader().participants().await?;
+        let current = latest.participant(session).unwrap_or(&course.made.participant);
+        let codes = known.iter().map(|participant| participant.code.as_str());
+        correction::check_participant(current, &old, &new, codes)?;
+
+        Ok(DecidedCorrection {
+            subject: Subject::Session,
+            record: session.to_string(),
+            field: Field::Participant,
+            old,
+            new,
+        })
+    }
+
+    async fn value(
+        &self,
+        course: &Course,
+        latest: &Latest,
+        record: IdempotencyKey,
+        old: &AnswerValue,
+        new: &AnswerValue,
+    ) -> Result<DecidedCorrection, ConductError> {
+        let answers = self.store.reader().answers(course.session()).await?;
+        let standings = standings(&answers, &self.run_clock.clocks);
+        let found = answers.iter().zip(&standings).find(|((_, answer), _)| answer.key == record);
+        let ((_, answer), standing) = found.ok_or_else(no_such_record)?;
+        if !standing.counts {
+            let refusal = "this answer does not count; correct the one that counts, or add a note";
+            return Err(Refusal::conflict(refusal).into());
+        }
+
+        let corrected = latest.value(&record);
+        let answer = Corrected {
+            segment: answer.segment,
+            question: &answer.question,
+            current: corrected.as_ref().unwrap_or(&standing.value),
+        };
+        let settings = course.state.plan().segments.len();
+        correction::check_value(&answer, old, new, &course.protocol, settings)?;
+
+        let record = record.to_string();
+        Ok(DecidedCorrection {
+            subject: Subject::Answer,
+            record,
+            field: Field::Value,
+            old: json(old)?,
+            new: json(new)?,
+        })
+    }
+
+    async fn note(
+        &self,
+        course: &Course,
+        latest: &Latest,
+        record: IdempotencyKey,
+        old: &str,
+        new: &str,
+    ) -> Result<DecidedCorrection, ConductError> {
+        let subject = self.subject_of(course.session(), record).await?;
+        let old = old.trim();
+        let new = new.trim();
+        correction::check_note(latest.note(subject, &record).unwrap_or_default(), old, new)?;
+
+        let record = record.to_string();
+        Ok(DecidedCorrection { subject, record, field: Field::Note, old: old.to_owned(), new: new.to_owned() })
+    }
+
+    /// Whether the record with this key is an answer or a comment of `session`.
+    async fn subject_of(&self, session: SessionId, record: IdempotencyKey) -> Result<Subject, ConductError> {
+        let reader = self.store.reader();
+        let is_answer = |(_, answer): &(i64, Answer)| answer.key == record;
+        if reader.answers(session).await?.iter().any(is_answer) {
+            return Ok(Subject::Answer);
+        }
+        let comments = reader.comments(session).await?;
+        let is_comment = comments.iter().any(|(_, comment)| comment.key == record);
+        if is_comment { Ok(Subject::Comment) } else { Err(no_such_record()) }
+    }
+}
+
+pub(super) fn no_such_record() -> ConductError {
+    ConductError::NotFound("this session has no such record; reload the page".to_owned())
+}
+
+fn json(value: &AnswerValue) -> Result<String, ConductError> {
+    serde_json::to_string(value).map_err(|error| ConductError::Invalid(error.to_string()))
+}

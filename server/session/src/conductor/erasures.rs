@@ -1,0 +1,221 @@
+//! Erases words, together with everything that the database has about them.
+
+use std::collections::BTreeSet;
+
+use super::corrections::no_such_record;
+use super::{ConductError, Conductor, Pen, Shared};
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::{Answer, Comment, Erasure, StoredCorrection};
+use parfocal_trial::account::Actor;
+use parfocal_trial::correction::Field;
+use parfocal_trial::erasure::{self, Erasable, NewErasure};
+use parfocal_trial::event::EventKind;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::refusal::Refusal;
+use parfocal_trial::remark::CommentContent;
+use parfocal_trial::study::event::StudyEventKind;
+
+impl Conductor {
+    /// Erases words of session `session` with the notes on them, or the reason of one of its events. When this returns,
+    /// no file of the database contains them.
+    ///
+    /// # Errors
+    /// If `by` is not the researcher, a session is under way, the record has no words, or the disk failed.
+    pub async fn erase(&self, by: impl Into<Actor>, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+        let by = by.into();
+        self.to_the_end(move |shared| async move { shared.erase(by, session, new).await }).await
+    }
+
+    /// Erases all words of session `session`, whose participant withdrew: comments with their sound, answers in words,
+    /// and notes. When this returns, no file of the database contains them.
+    ///
+    /// # Errors
+    /// If `by` is not the researcher, the participant has not withdrawn, a session is under way, nothing is left to
+    /// erase, or the disk failed.
+    pub async fn erase_all_words(
+        &self,
+        by: impl Into<Actor>,
+        session: SessionId,
+        reason: String,
+    ) -> Result<(), ConductError> {
+        let by = by.into();
+        self.to_the_end(move |shared| async move { shared.erase_all_words(by, session, &reason).await }).await
+    }
+}
+
+impl Shared {
+    async fn erase_all_words(&self, by: Actor, session: SessionId, reason: &str) -> Result<(), ConductError> {
+        let mut pen = self.pen.lock().await;
+        let reason = self.check_erasing(&mut pen, &by, session, reason).await?;
+        if !self.store.reader().is_withdrawn(session).await? {
+            let refusal = "all words can be erased at once only for a withdrawn session; erase them one by one";
+            return Err(Refusal::conflict(refusal).into());
+        }
+
+        let records = self.words_left(session).await?;
+        if records.is_empty() {
+            return Err(Refusal::conflict("no words of this session are left to erase").into());
+        }
+        self.erase_records(by, session, records, &reason).await
+    }
+
+    /// The records of `session` whose words nobody has erased: comments, answers in words, notes.
+    pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
+        let reader = self.store.reader();
+        let comments = reader.comments(session).await?.into_iter();
+        let comments = comments.filter(|(_, comment)| comment.said != CommentContent::Mark);
+        let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
+        let answers = reader.answers(session).await?.into_iter();
+        let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
+        let answers = answers.map(|(_, answer)| (Erasable::Answer, answer.key.to_string()));
+        let notes = reader.corrections(session).await?.into_iter();
+        let notes = notes.filter(|stored| stored.correction.field == Field::Note);
+        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
+
+        let erased = reader.erasures(session).await?;
+        let erased: BTreeSet<(Erasable, String)> =
+            erased.into_iter().map(|stored| (stored.erasure.subject, stored.erasure.record)).collect();
+        let left = comments.chain(answers).chain(notes).filter(|record| !erased.contains(record));
+        Ok(left.collect())
+    }
+
+    /// Checks that words of `session` may be erased now. Returns the reason without surrounding white space.
+    async fn check_erasing(
+        &self,
+        pen: &mut Pen,
+        by: &Actor,
+        session: SessionId,
+        reason: &str,
+    ) -> Result<String, ConductError> {
+        self.record_stops(pen).await?;
+        let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
+        let reason = erasure::check(by.role, under_way, reason)?;
+
+        if self.store.reader().session(session).await?.is_none() {
+            return Err(ConductError::no_session());
+        }
+        Ok(reason)
+    }
+
+    async fn erase(&self, by: Actor, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+        let mut pen = self.pen.lock().await;
+        let reason = self.check_erasing(&mut pen, &by, session, &new.reason).await?;
+        let records = match new.subject {
+            Erasable::Event => self.with_its_copy(session, &new.record).await?,
+            Erasable::StudyEvent => {
+                let advice = "erase the reason of the session's event instead; the study's event is erased with it";
+                return Err(Refusal::Invalid(advice.to_owned()).into());
+            }
+            Erasable::Comment | Erasable::Answer | Erasable::Correction => {
+                self.with_its_notes(session, new.subject, new.record).await?
+            }
+        };
+        self.erase_records(by, session, records, &reason).await
+    }
+
+    async fn erase_records(
+        &self,
+        by: Actor,
+        session: SessionId,
+        records: Vec<(Erasable, String)>,
+        reason: &str,
+    ) -> Result<(), ConductError> {
+        let stamp = self.stamp();
+        let Actor { role: by, account } = by;
+        let erasure = |(subject, record)| Erasure { session, subject, record, reason: reason.to_owned(), by, stamp };
+        let erasures: Vec<Erasure> = records.into_iter().map(erasure).collect();
+        self.store.erase(&erasures, account.as_ref()).await?;
+
+        let reader = self.store.reader();
+        let comments = reader.comments(session).await?;
+        let events = reader.events(session).await?;
+        let mut live = self.live();
+        if let Some(course) = live.course_of(session) {
+            course.hear_again(comments.into_iter().map(|(_, comment)| comment));
+            course.read_again(events.into_iter().map(|(_, event)| event));
+            self.publish(&live);
+        }
+        Ok(())
+    }
+
+    /// The record itself and the notes on it, because a note may repeat the words.
+    async fn with_its_notes(
+        &self,
+        session: SessionId,
+        subject: Erasable,
+        record: String,
+    ) -> Result<Vec<(Erasable, String)>, ConductError> {
+        let reader = self.store.reader();
+        let corrections = reader.corrections(session).await?;
+        match subject {
+            Erasable::Comment => is_comment(&reader.comments(session).await?, &record)?,
+            Erasable::Answer => is_text(&reader.answers(session).await?, &record)?,
+            _ => is_note(&corrections, &record)?,
+        }
+
+        let notes = corrections.iter().filter(|stored| stored.correction.record == record);
+        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string())).collect::<Vec<_>>();
+        let mut records = vec![(subject, record)];
+        records.extend(notes);
+        Ok(records)
+    }
+
+    /// The session's event with this number, and the event of its study that repeats the reason.
+    async fn with_its_copy(&self, session: SessionId, number: &str) -> Result<Vec<(Erasable, String)>, ConductError> {
+        let reader = self.store.reader();
+        let events = reader.events(session).await?;
+        let found = events.iter().map(|(_, event)| event).find(|event| event.number.to_string() == number);
+        let event = found.ok_or_else(no_such_record)?;
+        if event.kind.reason().is_none() {
+            return Err(Refusal::conflict("only a reason can be erased; this event has none").into());
+        }
+
+        let mut records = vec![(Erasable::Event, format!("{session}/{}", event.number))];
+        if let Some(enrolment) = reader.enrolment(session).await? {
+            let of_study = reader.study_events(&enrolment.study).await?;
+            let copies = of_study.iter().filter(|copy| repeats(&copy.kind, session, &event.kind));
+            records.extend(copies.map(|copy| (Erasable::StudyEvent, format!("{}/{}", enrolment.study, copy.number))));
+        }
+        Ok(records)
+    }
+}
+
+/// Whether the study's event `of_study` repeats the event `of_session` of session `session`.
+fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind) -> bool {
+    match of_study {
+        StudyEventKind::SessionWithdrawn { session: about } => {
+            *about == session && matches!(of_session, EventKind::Withdrawn { .. })
+        }
+        StudyEventKind::SessionUnblinded { session: about } => {
+            *about == session && matches!(of_session, EventKind::Unblinded { .. })
+        }
+        _ => false,
+    }
+}
+
+fn is_comment(comments: &[(i64, Comment)], record: &str) -> Result<(), ConductError> {
+    let found = comments.iter().any(|(_, comment)| comment.key.to_string() == record);
+    if found { Ok(()) } else { Err(no_such_record()) }
+}
+
+fn is_text(answers: &[(i64, Answer)], record: &str) -> Result<(), ConductError> {
+    let found = answers.iter().find(|(_, answer)| answer.key.to_string() == record);
+    let (_, answer) = found.ok_or_else(no_such_record)?;
+    match answer.value {
+        AnswerValue::Text(_) => Ok(()),
+        AnswerValue::Point(_) | AnswerValue::Points(_) => {
+            Err(Refusal::conflict("only words can be erased; this answer is a number").into())
+        }
+    }
+}
+
+fn is_note(corrections: &[StoredCorrection], record: &str) -> Result<(), ConductError> {
+    let found = corrections.iter().find(|stored| stored.number.to_string() == record);
+    let stored = found.ok_or_else(no_such_record)?;
+    match stored.correction.field {
+        Field::Note => Ok(()),
+        Field::Participant | Field::Value => {
+            Err(Refusal::conflict("only a note can be erased; this correction is a value").into())
+        }
+    }
+}

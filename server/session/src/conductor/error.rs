@@ -1,0 +1,67 @@
+//! Errors of the conductor.
+
+use parfocal_base::ids::SessionId;
+use parfocal_records::store::StoreError;
+use parfocal_trial::refusal::Refusal;
+use parfocal_trial::study::refusal::StudyRefusal;
+
+/// The reason why the conductor did not do something.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ConductError {
+    /// There is no such session, segment or question, or it is not the one under way.
+    #[error("{0}")]
+    NotFound(String),
+    /// Only another role may do this.
+    #[error("{0}")]
+    Forbidden(String),
+    /// The session's state does not allow it; nothing was changed.
+    #[error("{0}")]
+    Conflict(String),
+    /// The request is invalid; the text says which part.
+    #[error("{0}")]
+    Invalid(String),
+    /// The disk or database failed; nothing was acknowledged.
+    #[error("could not be saved: {0}")]
+    Storage(String),
+    /// The session's protocol is of another version or is damaged.
+    #[error(
+        "session {session} was made with a protocol that this version cannot read ({reason}); \
+         use the version that made it, or another folder with --data-dir"
+    )]
+    Unreadable {
+        /// The session.
+        session: SessionId,
+        /// Why it cannot be read.
+        reason: String,
+    },
+}
+
+impl ConductError {
+    pub(super) fn no_session() -> Self {
+        Self::NotFound("there is no such session; reload the page".to_owned())
+    }
+}
+
+impl From<StoreError> for ConductError {
+    fn from(error: StoreError) -> Self {
+        Self::Storage(error.to_string())
+    }
+}
+
+impl From<StudyRefusal> for ConductError {
+    fn from(refusal: StudyRefusal) -> Self {
+        Refusal::from(refusal).into()
+    }
+}
+
+impl From<Refusal> for ConductError {
+    fn from(refusal: Refusal) -> Self {
+        let text = refusal.to_string();
+        match refusal {
+            Refusal::NotAllowed(_) => Self::Forbidden(text),
+            Refusal::UnknownSegment | Refusal::UnknownQuestion => Self::NotFound(text),
+            Refusal::Conflict(_) => Self::Conflict(text),
+            Refusal::Invalid(_) => Self::Invalid(text),
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Reports for the operator's and researcher's pages: participants, protocols, sessions, one session in detail.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
+use super::course::Course;
+use super::timeline::erased;
+use super::{ConductError, Conductor, ProtocolSummary};
+use parfocal_base::PolicyName;
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_records::store::{DeviceEvent, Latest, Participant, Reader, Recorder, SessionLine, standings};
+use parfocal_trial::account::Actor;
+use parfocal_trial::correction::{Field, Subject};
+use parfocal_trial::erasure::Erasable;
+use parfocal_trial::event::EventKind;
+use parfocal_trial::grace::Outstanding;
+use parfocal_trial::instruments::{Measure, in_words, measures, sus};
+use parfocal_trial::participant::ParticipantCode;
+use parfocal_trial::permission::{self, CurrentSession, Request};
+use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::role::Role;
+use parfocal_trial::view::LogLine;
+
+/// A session in detail, for the researcher. Contains the policies only after it was unblinded.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SessionDetail {
+    /// The session's line in the list.
+    #[serde(flatten)]
+    pub line: SessionLine,
+    /// The protocol's title for researchers.
+    pub researcher_title: String,
+    /// Algorithm that drew the order.
+    pub algorithm: &'static str,
+    /// SHA-256 with which the order was committed to when the session was made.
+    pub commitment: String,
+    /// The session's settings, in order.
+    pub settings_detail: Vec<SettingDetail>,
+    /// Answers that count, in the order they were given; none once the participant has withdrawn.
+    pub answers: Vec<AnswerLine>,
+    /// Corrections, oldest first. Once the participant has withdrawn, only those of the participant.
+    pub corrections: Vec<CorrectionLine>,
+    /// The participant's consents, oldest first; the latest counts.
+    pub consents: Vec<ConsentLine>,
+    /// The participant's withdrawal, if there is one.
+    pub withdrawal: Option<WithdrawalLine>,
+    /// Time, by the server's clock, until which what arrives counts; none while the session is under way.
+    #[schema(value_type = Option<String>)]
+    pub counts_until: Option<Timestamp>,
+    /// What may still arrive and would not count after unblinding.
+    pub outstanding: Option<Outstanding>,
+    /// Everything that happened, oldest first.
+    pub log: Vec<LogLine>,
+    /// What unblinding revealed; none before.
+    pub unblinding: Option<Unblinding>,
+}
+
+/// A setting of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SettingDetail {
+    /// Number of the setting, from 1.
+    pub setting: usize,
+    /// Identifier of the segment.
+    pub segment: SegmentId,
+    /// When inspection began, by the server's wall clock.
+    #[schema(value_type = Option<String>)]
+    pub started: Option<Timestamp>,
+    /// Time inspected without pauses, in seconds; none until the inspection is over.
+    pub inspected_seconds: Option<f64>,
+}
+
+/// An answer, as it is shown.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AnswerLine {
+    /// When it was recorded, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Setting, from 1; none for a closing question.
+    pub setting: Option<usize>,
+    /// The question's identifier.
+    pub question: String,
+    /// The question's text.
+    pub text: String,
+    /// The question's kind; none if it is not known.
+    pub kind: Option<&'static str>,
+    /// The answer's key.
+    pub key: IdempotencyKey,
+    /// The answer as it was given.
+    pub value: AnswerValue,
+    /// The answer in words.
+    pub words: String,
+    /// The corrected answer; none if it was not corrected.
+    pub corrected: Option<AnswerValue>,
+    /// The corrected answer in words.
+    pub corrected_words: Option<String>,
+    /// A researcher's note on the answer.
+    pub note: Option<String>,
+    /// When its words were erased, by the server's wall clock; none if they were not.
+    #[schema(value_type = Option<String>)]
+    pub erased: Option<Timestamp>,
+    /// Its scores, from the corrected answer if there is one; none if it has no score or an item is missing.
+    pub scores: Vec<Measure>,
+    /// The score of the System Usability Scale, 0 to 100, for its ten items.
+    pub sus_score: Option<f64>,
+    /// Whether it replaced an earlier answer.
+    pub changed: bool,
+    /// Whether another of the surgeon's devices gave a different answer; the timeline shows it.
+    pub devices_disagree: bool,
+}
+
+/// What unblinding revealed.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Unblinding {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Reason for the unblinding.
+    pub reason: String,
+    /// Whether the session was still under way.
+    pub emergency: bool,
+    /// The policy of each setting, in order.
+    #[schema(value_type = Vec<String>)]
+    pub policies: Vec<PolicyName>,
+}
+
+impl Conductor {
+    /// Reads the database.
+    #[must_use]
+    pub fn reader(&self) -> &Reader {
+        self.shared.store.reader()
+    }
+
+    /// Records what `by` looks at.
+    #[must_use]
+    pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
+        Recorder::of_server(&self.shared.store, by.into(), Arc::clone(&self.shared.clock))
+    }
+
+    /// Checks that the comments, answers and recordings of `session` may be read.
+    ///
+    /// # Errors
+    /// If its participant withdrew, or the database failed.
+    pub async fn check_reading(&self, session: SessionId) -> Result<(), ConductError> {
+        let withdrawn = self.shared.store.reader().is_withdrawn(session).await?;
+        Ok(permission::check_reading(withdrawn)?)
+    }
+
+    /// The participants, by code.
+    ///
+    /// # Errors
+    /// If the database failed.
+    pub async fn participants(&self) -> Result<Vec<Participant>, ConductError> {
+        Ok(self.shared.store.reader().participants().await?)
+    }
+
+    /// Adds a participant; an existing one stays.
+    ///
+    /// # Errors
+    /// If `code` is not a valid code, `by` may not add participants, or the disk failed.
+    pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
+        permission::check(by, Request::AddParticipant, CurrentSession::None)?;
+        let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
+        Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
+    }
+
+    /// The protocols, by name.
+    #[must_use]
+    pub fn protocols(&self) -> Vec<ProtocolSummary> {
+        self.shared.library.summaries()
+    }
+
+    /// The sessions, newest first; practice sessions only if `practice` is set.
+    ///
+    /// # Errors
+    /// If the database failed.
+    pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, ConductError> {
+        Ok(self.shared.store.reader().sessions(practice).await?)
+    }
+
+    /// Session `session` in detail.
+    ///
+    /// # Errors
+    /// If there is no such session, or the database failed.
+    pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
+        let course = self.shared.load(session).await?;
+        let withdrawal = self.withdrawal(&course).await?;
+        let mut answers = self.answer_lines(&course).await?;
+        let mut corrections = self.correction_lines(&course).await?;
+        if withdrawal.is_some() {
+            answers.clear();
+            // Corrections of the participant stay: they say who has withdrawn.
+            corrections.retain(|correction| correction.field == Field::Participant);
+        }
+
+        let lines = self.sessions(true).await?;
+        let line = lines.into_iter().find(|line| line.session == session);
+        let line = line.ok_or_else(|| ConductError::NotFound("there is no such session".to_owned()))?;
+        Ok(SessionDetail {
+            line,
+            researcher_title: course.protocol.researcher_title.clone(),
+            algorithm: course.made.algorithm.name(),
+            commitment: course.made.commitment.clone(),
+            settings_detail: settings(&course),
+            answers,
+            corrections,
+            consents: self.consent_lines(session).await?,
+            withdrawal,
+            counts_until: course.grace.until(),
+            outstanding: self.shared.outstanding(course.session(), course.grace).await?,
+            log: self.log(&course).await?,
+            unblinding: unblinding(&course),
+        })
+    }
+
+    /// The events of the session, and those of camera and lens since the session was made.
+    async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
+        let reader = self.shared.store.reader();
+        let clocks = &self.shared.run_clock.clocks;
+        let events = reader.events(course.session()).await?;
+        let devices = reader.device_events(course.session()).await?;
+
+        // In the order in which things happened, even if the wall clock was changed in between.
+        let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
+        for (run, event) in events {
+            let text = event.kind.in_words(|segment| course.setting(segment));
+            let account = event.account.as_ref().map(ToString::to_string);
+            let has_reason = event.kind.reason().is_some_and(|reason| !reason.is_empty());
+            let erasable_event = has_reason.then_some(event.number);
+            let line = LogLine { at: event.wall, by: event.by, account, text, erasable_event };
+            lines.push((clocks.wall(run, event.at), line));
+        }
+
+        let made = lines.first().map(|(at, _)| *at);
+        for (_, run, DeviceEvent { wall, at, device, message, .. }) in devices {
+            let at = clocks.wall(run, at);
+            if Some(at) >= made {
+                let text = format!("The {device}: {message}");
+                let line = LogLine { at: wall, by: Role::System, account: None, text, erasable_event: None };
+                lines.push((at, line));
+            }
+        }
+
+        lines.extend(self.beside(course.session()).await?);
+        lines.sort_by_key(|(at, _)| *at);
+        Ok(lines.into_iter().map(|(_, line)| line).collect())
+    }
+
+    async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
+        let clocks = &self.shared.run_clock.clocks;
+        let answers = self.shared.store.reader().answers(course.session()).await?;
+        let standings = standings(&answers, clocks);
+        let corrections = Latest::of(&self.shared.store.reader().corrections(course.session()).await?);
+        let erasures = self.shared.store.reader().erasures(course.session()).await?;
+
+        let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();
+        for ((run, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {
+            let question = course.protocol.question(&answer.question, answer.segment.is_some());
+            let kind = question.map(|question| &question.kind);
+            let corrected = corrections.value(&answer.key);
+            let line = AnswerLine {
+                at: answer.stamp.wall,
+                setting: answer.segment.map(|segment| course.setting(segment)),
+                text: question.map(|question| question.text.clone()).unwrap_or_default(),
+                sus_score: match (kind, &standing.value) {
+                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
+                    _ => None,
+                },
+                kind: kind.map(QuestionKind::name),
+                key: answer.key,
+                words: in_words(kind, &standing.value),
+                corrected_words: corrected.as_ref().map(|value| in_words(kind, value)),
+                note: corrections.note(Subject::Answer, &answer.key).map(str::to_owned),
+                erased: erased(&erasures, Erasable::Answer, &answer.key),
+                scores: kind.map_or_else(Vec::new, |kind| scores(kind, corrected.as_ref().unwrap_or(&standing.value))),
+                corrected,
+                question: answer.question,
+                value: standing.value,
+                changed: standing.revision > 1,
+                devices_disagree: standing.disagrees,
+            };
+
+            lines.push((clocks.said(run, answer.stamp.at, &answer.origin), line));
+        }
+
+        lines.sort_by_key(|(given, _)| *given);
+        Ok(lines.into_iter().map(|(_, line)| line).collect())
+    }
+}
+
+/// The scores of an answer without missing items. The weights of a workload index are left out.
+fn scores(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
+    let told = |measure: &Measure| measure.score && measure.value.is_some() && !measure.name.starts_with("weight-of-");
+    measures(kind, value).into_iter().filter(told).collect()
+}
+
+fn settings(course: &Course) -> Vec<SettingDetail> {
+    let detail = |(&segment, setting): (&SegmentId, usize)| {
+        let of_it = || course.events.iter().filter(move |event| event.kind.segment() == Some(segment));
+        SettingDetail {
+            setting,
+            segment,
+            started: of_it()
+                .find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }))
+                .map(|event| event.wall),
+            inspected_seconds: of_it().find_map(|event| match event.kind {
+                EventKind::SegmentFinished { inspected_ms, .. } => {
+                    Some(std::time::Duration::from_millis(inspected_ms).as_secs_f64())
+                }
+                _ => None,
+            }),
+        }
+    };
+
+    course.state.plan().segments.iter().zip(1..).map(detail).collect()
+}
+
+fn unblinding(course: &Course) -> Option<Unblinding> {
+    course.events.iter().find_map(|event| match &event.kind {
+        EventKind::Unblinded { reason, emergency } => Some(Unblinding {
+            at: event.wall,
+            reason: reason.clone(),
+            emergency: *emergency,
+            policies: course.made.segments.iter().map(|(_, policy)| policy.clone()).collect(),
+        }),
+        _ => None,
+    })
+}

@@ -1,0 +1,403 @@
+//! A session over time: when each setting was inspected, the focal path, and the comments and answers.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::course::Course;
+use super::{ConductError, Conductor};
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_records::store::{Answer, Latest, PathPoint, Recorded, RunClocks, StoredErasure, standings};
+use parfocal_trial::correction::Subject;
+use parfocal_trial::erasure::Erasable;
+use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::permission;
+use parfocal_trial::protocol::Record;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::CommentContent;
+use parfocal_trial::role::Role;
+use parfocal_trial::standing::Standing;
+use parfocal_trial::voice::Ending;
+
+/// A session over time. Seconds count from its start by the server's clocks, pauses included.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Timeline {
+    /// When each setting was inspected.
+    pub settings: Vec<SettingSpan>,
+    /// When the session was paused and the lens held where it was.
+    pub pauses: Vec<PauseSpan>,
+    /// The focal path.
+    pub points: Vec<TimelinePoint>,
+    /// The comments.
+    pub comments: Vec<TimelineComment>,
+    /// Answers that do not count, although they are their device's latest.
+    pub set_aside: Vec<SetAside>,
+}
+
+/// When a setting was inspected.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SettingSpan {
+    /// Setting, from 1.
+    pub setting: usize,
+    /// Start, in seconds.
+    pub from: f64,
+    /// End, in seconds; none while it lasts.
+    pub to: Option<f64>,
+}
+
+/// When the session was paused, by a person or by a restart of the server.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PauseSpan {
+    /// Start, in seconds. For a restart: when the server ended, as far as is known.
+    pub from: f64,
+    /// End, in seconds; none while it lasts.
+    pub to: Option<f64>,
+    /// Reason in words.
+    pub reason: String,
+}
+
+/// A point of the focal path.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelinePoint {
+    /// Setting, from 1.
+    pub setting: i64,
+    /// When the frame was exposed, in seconds.
+    pub seconds: f64,
+    /// Number of the frame.
+    pub frame: i64,
+    /// Requested focal power, 0 to 1.
+    pub asked: f64,
+    /// Focal power at which the frame was exposed, 0 to 1.
+    pub measured: Option<f64>,
+    /// The optimum, 0 to 1, if a simulation knows it.
+    pub optimal: Option<f64>,
+    /// The policy's focus metric, on a scale of its own; only after the session was unblinded.
+    pub metric: Option<f64>,
+}
+
+/// A comment on the timeline.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelineComment {
+    /// The comment's key.
+    pub key: IdempotencyKey,
+    /// When it was stored, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.
+    pub seconds: f64,
+    /// Setting, from 1; none outside settings.
+    pub setting: Option<usize>,
+    /// Number of the frame that was on screen.
+    pub frame: Option<u64>,
+    /// Whether it arrived after the time in which what a surgeon's device held still counted.
+    pub late: bool,
+    /// The content of the comment; empty if it was erased.
+    #[serde(flatten)]
+    pub said: CommentContent,
+    /// A researcher's note on the comment; for a voice comment, its transcript.
+    pub note: Option<String>,
+    /// The recording of a voice comment; none for other comments.
+    pub voice: Option<TimelineVoice>,
+    /// When its words were erased, by the server's wall clock; none if they were not.
+    #[schema(value_type = Option<String>)]
+    pub erased: Option<Timestamp>,
+}
+
+/// The recording of a voice comment.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelineVoice {
+    /// Media type; none until a part of the recording has arrived.
+    pub media_type: Option<String>,
+    /// Length in seconds.
+    pub seconds: f64,
+    /// Why the recording ended; none if it was cut off or still continues.
+    pub ended: Option<Ending>,
+    /// Number of pieces, of about a second each, that have not arrived although later ones have.
+    pub missing: usize,
+}
+
+/// An answer that does not count: a later one from another device differs, or it arrived too late.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SetAside {
+    /// When it was stored, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// When it was given, in seconds: the time that it waited on the surgeon's device is subtracted.
+    pub seconds: f64,
+    /// Setting, from 1; none for a closing question.
+    pub setting: Option<usize>,
+    /// The question's identifier.
+    pub question: String,
+    /// The question's text.
+    pub text: String,
+    /// The answer.
+    pub value: AnswerValue,
+    /// The answer that counts instead; none if there is none.
+    pub counted: Option<AnswerValue>,
+    /// Whether it arrived too late.
+    pub late: bool,
+}
+
+impl Conductor {
+    /// Session `session` over time, as `by` may see it. The focal path is thinned to about `points` points per setting.
+    ///
+    /// # Errors
+    /// If there is no such session, its participant withdrew, or the database failed.
+    pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
+        let course = self.shared.load(session).await?;
+        permission::check_reading(course.state.withdrawn())?;
+        let with_metric = permission::may_see_metric(by, course.state.unblinded());
+        let reader = self.shared.store.reader();
+        let runs = &self.shared.run_clock.clocks;
+        let events = reader.events(session).await?;
+        let events: Vec<(Timestamp, Event)> =
+            events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
+        let start = start(&course, &events);
+        let point = |point: PathPoint| TimelinePoint {
+            seconds: seconds(start, runs.wall(point.run, point.exposed)),
+            setting: point.setting,
+            frame: point.frame,
+            asked: point.asked,
+            measured: point.measured,
+            optimal: point.optimal,
+            metric: point.metric.filter(|_| with_metric),
+        };
+
+        let notes = Latest::of(&reader.corrections(session).await?);
+        let erasures = reader.erasures(session).await?;
+        let mut voice = reader.voice(session).await?;
+        let comments = reader.comments(session).await?;
+        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+            key: comment.key,
+            note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
+            erased: erased(&erasures, Erasable::Comment, &comment.key),
+            voice: (comment.said == CommentContent::Voice)
+                .then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
+            at: comment.stamp.wall,
+            seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
+            setting: comment.segment.map(|segment| course.setting(segment)),
+            frame: comment.frame,
+            late: comment.late,
+            said: comment.said,
+        });
+
+        let answers = reader.answers(session).await?;
+        let events: Vec<(f64, &EventKind)> =
+            events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
+        let points: Vec<TimelinePoint> = reader.focal_path(session, points).await?.into_iter().map(point).collect();
+        Ok(Timeline {
+            settings: settings(&course, &events),
+            pauses: pauses(&events, &points),
+            points,
+            comments: comments.collect(),
+            set_aside: set_aside(&course, &answers, runs, start),
+        })
+    }
+}
+
+/// The zero of the session's seconds: its start, or the time when it was made if it has not started.
+fn start(course: &Course, events: &[(Timestamp, Event)]) -> Timestamp {
+    let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
+    started.map_or(course.made.stamp.wall, |(at, _)| *at)
+}
+
+/// The facts about a session that are needed to play its recordings.
+#[derive(Debug, Clone)]
+pub struct Played {
+    start: Timestamp,
+    clocks: Arc<RunClocks>,
+    /// What the protocol asks to record.
+    pub asked: Record,
+    /// Whether the session has ended.
+    pub ended: bool,
+}
+
+impl Played {
+    /// Seconds from the session's start to the moment `monotonic_ns` of run `run`; negative before the start.
+    #[must_use]
+    pub fn seconds_at(&self, run: i64, monotonic_ns: i64) -> f64 {
+        let at = Moment::from_nanos(u64::try_from(monotonic_ns).unwrap_or(0));
+        seconds(self.start, self.clocks.wall(run, at))
+    }
+
+    /// Seconds from the session's start to `wall`, by the wall clock alone.
+    #[must_use]
+    pub fn seconds_of(&self, wall: Timestamp) -> f64 {
+        seconds(self.start, wall)
+    }
+}
+
+impl Conductor {
+    /// The facts about `session` that are needed to play its recordings.
+    ///
+    /// # Errors
+    /// If `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
+    pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
+        let course = self.shared.load(session).await?;
+        permission::check_reading(course.state.withdrawn())?;
+        permission::check_playing(by, course.state.unblinded())?;
+
+        let clocks = Arc::clone(&self.shared.run_clock.clocks);
+        let events = self.shared.store.reader().events(session).await?;
+        let events: Vec<_> = events.into_iter().map(|(run, event)| (clocks.wall(run, event.at), event)).collect();
+        Ok(Played {
+            start: start(&course, &events),
+            clocks,
+            asked: course.protocol.record,
+            ended: course.state.phase().has_ended(),
+        })
+    }
+}
+
+fn told_of(recorded: &Recorded) -> TimelineVoice {
+    TimelineVoice {
+        media_type: recorded.media_type().map(|media_type| media_type.name().to_owned()),
+        seconds: recorded.seconds(),
+        ended: recorded.ended(),
+        missing: recorded.missing(),
+    }
+}
+
+/// When the words of the record with this key were erased; `None` if they were not.
+pub(super) fn erased(erasures: &[StoredErasure], subject: Erasable, key: &IdempotencyKey) -> Option<Timestamp> {
+    let key = key.to_string();
+    let its_own = |stored: &&StoredErasure| stored.erasure.subject == subject && stored.erasure.record == key;
+    erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
+}
+
+fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {
+    let standings = standings(answers, runs);
+    let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
+    let aside = answers.iter().zip(&standings).filter(|((_, answer), standing)| is_aside(answer, standing));
+    let told = aside.map(|((run, answer), _)| {
+        let question = course.protocol.question(&answer.question, answer.segment.is_some());
+        SetAside {
+            at: answer.stamp.wall,
+            seconds: seconds(start, runs.said(*run, answer.stamp.at, &answer.origin)).max(0.0),
+            setting: answer.segment.map(|segment| course.setting(segment)),
+            question: answer.question.clone(),
+            text: question.map(|question| question.text.clone()).unwrap_or_default(),
+            value: answer.value.clone(),
+            counted: course.state.answer(answer.segment, &answer.question).cloned(),
+            late: answer.late,
+        }
+    });
+
+    told.collect()
+}
+
+fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
+    let mut spans: Vec<SettingSpan> = Vec::new();
+    for &(at, kind) in events {
+        match kind {
+            EventKind::SegmentStarted { segment } => {
+                spans.push(SettingSpan { setting: course.setting(*segment), from: at, to: None });
+            }
+            EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    spans
+}
+
+/// When the session was paused. A restart is recorded only when the server is back, but the pause starts when the
+/// server ended: when the setting's clock stopped, or when the last frame before was exposed, whichever is later.
+fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
+    let mut spans: Vec<PauseSpan> = Vec::new();
+    let mut inspecting = false;
+    // When the inspection last began or resumed, and how many milliseconds of the setting had been inspected by then.
+    let mut since = 0.0;
+    let mut before = 0;
+    for &(at, kind) in events {
+        match kind {
+            EventKind::SegmentStarted { .. } => {
+                inspecting = true;
+                since = at;
+                before = 0;
+            }
+            EventKind::SegmentFinished { .. } => inspecting = false,
+            EventKind::Paused { inspected_ms, .. } | EventKind::ServerRestarted { inspected_ms } => {
+                if spans.last().is_none_or(|span| span.to.is_some()) {
+                    let restarted = matches!(kind, EventKind::ServerRestarted { .. });
+                    let clock = since + milliseconds(inspected_ms.saturating_sub(before));
+                    let frame = points.iter().rev().map(|point| point.seconds).find(|&seconds| seconds < at);
+                    let ended = frame.map_or(clock, |frame| frame.max(clock)).min(at);
+                    let from = if restarted && inspecting { ended } else { at };
+                    spans.push(PauseSpan { from, to: None, reason: kind.in_words(|_| 0) });
+                }
+
+                before = *inspected_ms;
+            }
+            EventKind::Resumed | EventKind::Completed | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+                since = at;
+            }
+            _ => {}
+        }
+    }
+
+    spans
+}
+
+/// Converts milliseconds to seconds.
+fn milliseconds(count: u64) -> f64 {
+    Duration::from_millis(count).as_secs_f64()
+}
+
+fn seconds(from: Timestamp, to: Timestamp) -> f64 {
+    to.duration_since(from).as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parfocal_base::ids::SegmentId;
+
+    #[test]
+    fn a_restart_holds_from_where_the_clock_stood_and_a_pause_from_where_it_was_asked_for() {
+        let segment = SegmentId(uuid::Uuid::nil());
+        let paused = |inspected_ms| EventKind::Paused { reason: "phone".to_owned(), inspected_ms };
+        let restarted = |inspected_ms| EventKind::ServerRestarted { inspected_ms };
+        let events = [
+            (5.0, EventKind::SegmentStarted { segment }),
+            (15.0, paused(10_000)),
+            (20.0, EventKind::Resumed),
+            // Inspected for 4 s more, so until 24 s. Back after 16 s. Restarted again before anyone resumed.
+            (40.0, restarted(14_000)),
+            (50.0, restarted(14_000)),
+            (60.0, EventKind::Resumed),
+            (66.0, EventKind::SegmentFinished { segment, inspected_ms: 20_000 }),
+            // No clock runs during the questions.
+            (80.0, restarted(20_000)),
+        ];
+
+        let events: Vec<(f64, &EventKind)> = events.iter().map(|(at, kind)| (*at, kind)).collect();
+        let at = |seconds| TimelinePoint {
+            setting: 1,
+            seconds,
+            frame: 1,
+            asked: 0.5,
+            measured: None,
+            optimal: None,
+            metric: None,
+        };
+        let spans = |points: &[TimelinePoint]| -> Vec<(f64, Option<f64>)> {
+            pauses(&events, points).iter().map(|span| (span.from, span.to)).collect()
+        };
+        assert_eq!(spans(&[]), [(15.0, Some(20.0)), (24.0, Some(60.0)), (80.0, None)]);
+        // The clock is stored once a second; a frame after that gives a later time.
+        assert_eq!(spans(&[at(5.0), at(24.7), at(40.1)])[1], (24.7, Some(60.0)));
+        assert_eq!(pauses(&events, &[])[0].reason, "Paused: phone");
+    }
+}

@@ -1,0 +1,86 @@
+//! Makes each role's view of a session. The views contain no policies.
+
+use std::collections::BTreeMap;
+
+use super::course::{Course, LATEST};
+use parfocal_base::clock::Moment;
+use parfocal_trial::event::Event;
+use parfocal_trial::phase::Phase;
+use parfocal_trial::question::AnswerValue;
+use parfocal_trial::session::PauseCause;
+use parfocal_trial::view::{LogLine, OperatorView, SurgeonView};
+
+/// The surgeon's and the operator's view of `course` at `now`. `because` says why the last attempt to record a stop
+/// failed.
+pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
+    let surgeon = surgeon(course, now);
+    let withdrawn = course.state.withdrawn();
+    let readable = course.latest_comments.iter().rev().filter(|_| !withdrawn);
+    let operator = OperatorView {
+        surgeon: surgeon.clone(),
+        study: course.study.clone(),
+        participant: course.made.participant.clone(),
+        protocol: course.made.protocol.clone(),
+        consent_required: course.protocol.consent.clone(),
+        consent: course.consent.clone(),
+        withdrawn,
+        unrecorded_because: because.filter(|_| course.is_unrecorded()).map(str::to_owned),
+        latest_comments: readable.cloned().collect(),
+        log: log(course),
+    };
+
+    (surgeon, operator)
+}
+
+fn surgeon(course: &Course, now: Moment) -> SurgeonView {
+    let state = &course.state;
+    let inspected = state.inspected(now);
+    let inspecting = state.phase() == Phase::Inspecting;
+    SurgeonView {
+        session: course.session(),
+        phase: state.phase(),
+        paused: state.paused().is_some(),
+        may_resume: state.paused() == Some(PauseCause::Restart),
+        unrecorded: course.is_unrecorded(),
+        practice: course.made.practice,
+        title: course.protocol.title.clone(),
+        segment: state.segment(),
+        setting: setting(course),
+        settings: state.plan().segments.len(),
+        remaining_seconds: inspecting.then(|| state.plan().limit.saturating_sub(inspected).as_secs_f64()),
+        prompt: course.protocol.prompt_at(inspected).filter(|_| inspecting).map(|prompt| prompt.text.clone()),
+        quick_comments: course.protocol.quick_comments.clone(),
+        voice: course.protocol.voice,
+        questions: state.questions().to_vec(),
+        answers: answers(course),
+        comments: course.comments,
+    }
+}
+
+/// Number of the current setting, from 1; at the end, of the last one. 0 before the start.
+fn setting(course: &Course) -> usize {
+    let state = &course.state;
+    match state.phase() {
+        Phase::Ready => 0,
+        Phase::Notice | Phase::Inspecting | Phase::Questions => state.done() + 1,
+        Phase::Closing | Phase::Completed | Phase::Aborted => state.done().min(state.plan().segments.len()),
+    }
+}
+
+fn answers(course: &Course) -> BTreeMap<String, AnswerValue> {
+    let state = &course.state;
+    let kept = |id: &String| state.answer(state.segment(), id).cloned();
+    state.questions().iter().filter_map(|question| Some((question.id.clone(), kept(&question.id)?))).collect()
+}
+
+/// The latest events in words. The reason for an unblinding may name a policy, so only the researcher sees it.
+fn log(course: &Course) -> Vec<LogLine> {
+    let line = |event: &Event| {
+        let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));
+        let unrecorded = if course.is_recorded(event.number) { "" } else { " (not recorded yet)" };
+        let account = event.account.as_ref().map(ToString::to_string);
+        let text = format!("{text}{unrecorded}");
+        LogLine { at: event.wall, by: event.by, account, text, erasable_event: None }
+    };
+    course.events.iter().rev().take(LATEST).map(line).collect()
+}

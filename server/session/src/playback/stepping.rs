@@ -1,0 +1,149 @@
+//! Steps a policy over a recording: what it sees in each frame, and which focal power it would have requested. The lens
+//! does not follow the policy: every frame shows what the lens did during the recording.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use parfocal_autofocus::{Observation, Policy};
+use parfocal_base::FocalPower;
+use parfocal_devices::camera::FrameImage;
+use parfocal_imaging::{Calibration, ContentArea, GrayImage, Reconstructor, RgbImage, content_area};
+use parfocal_pipeline::control::Eye;
+use parfocal_pipeline::live::{AreaWatch, DETECT_EVERY};
+use parfocal_recording::{FrameRow, Recording, RecordingError};
+
+/// Why a policy could not be stepped over the whole recording.
+#[derive(Debug, thiserror::Error)]
+pub enum SteppingError {
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A frame has no patch.
+    #[error("frame {frame} holds nothing to focus on: {reason}")]
+    NoPatch {
+        /// Index of the frame, from 0.
+        frame: usize,
+        /// Why no patch was found.
+        reason: Arc<str>,
+    },
+    /// The policy returned an invalid focal power.
+    #[error("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1")]
+    InvalidTarget {
+        /// Index of the frame, from 0.
+        frame: usize,
+        /// Value that the policy returned.
+        target: f64,
+    },
+}
+
+/// A policy's step on one frame. Focal powers are normalised to 0..=1.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Step {
+    /// Index of the frame, from 0.
+    pub frame: usize,
+    /// Number that the camera gave the frame.
+    pub frame_number: u64,
+    /// End of the exposure, in nanoseconds since the recording's start.
+    pub time_ns: i64,
+    /// Left column of the patch, in mosaic cells.
+    pub patch_x: usize,
+    /// Top row of the patch, in mosaic cells.
+    pub patch_y: usize,
+    /// Focal power at the exposure, as given to the policy.
+    pub focal_power: f64,
+    /// Focus metric of the policy; none if it has none.
+    pub metric: Option<f64>,
+    /// Focal power that the policy requests after the frame.
+    pub target: f64,
+    /// Focal power that was requested after the frame when the recording was made.
+    pub recorded_asked: f64,
+    /// Best focal power, if the recording is simulated; otherwise none.
+    pub recorded_optimal: Option<f64>,
+}
+
+/// Steps a policy over a recording, frame by frame.
+pub struct Stepping<'a> {
+    recording: &'a Recording,
+    policy: Box<dyn Policy>,
+    reconstructor: Reconstructor,
+    eye: Eye,
+    areas: AreaWatch,
+    area: Option<ContentArea>,
+    rgb: RgbImage,
+    gray: GrayImage,
+    next: usize,
+}
+
+impl<'a> Stepping<'a> {
+    /// Prepares `policy` for the first frame of `recording`, which was made with `calibration`.
+    #[must_use]
+    pub fn new(recording: &'a Recording, calibration: &Calibration, policy: Box<dyn Policy>) -> Self {
+        let reconstructor = Reconstructor::new(calibration);
+        Self {
+            recording,
+            policy,
+            eye: Eye::new(reconstructor.clone()),
+            reconstructor,
+            areas: AreaWatch::default(),
+            area: None,
+            rgb: RgbImage::default(),
+            gray: GrayImage::default(),
+            next: 0,
+        }
+    }
+
+    fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, SteppingError> {
+        let mosaic = self.recording.frame(frame)?;
+
+        // Looks for the content area as often as the server does, beginning with the first frame.
+        if (frame as u64).is_multiple_of(DETECT_EVERY) {
+            self.reconstructor.reconstruct(&mosaic, &mut self.rgb, &mut self.gray);
+            if let Some(news) = self.areas.see(content_area::detect(&self.gray)) {
+                self.area = news;
+            }
+        }
+
+        let image = FrameImage::Mosaic(Arc::new(mosaic));
+        let patch = self.eye.find(&image, self.area.as_ref());
+        let patch = patch.map_err(|reason| SteppingError::NoPatch { frame, reason: reason.message })?;
+        let view = self.eye.look(&image, patch, self.policy.field_of_view());
+
+        let focal_power = self.exposed_at(frame, row);
+        let decision = self.policy.step(&Observation { view: &view, focal_power });
+        let target = decision.target;
+        let target = FocalPower::new(target).map_err(|_| SteppingError::InvalidTarget { frame, target })?;
+
+        Ok(Step {
+            frame,
+            frame_number: row.number,
+            time_ns: row.time,
+            patch_x: patch.x,
+            patch_y: patch.y,
+            focal_power: focal_power.get(),
+            metric: decision.metric,
+            target: target.get(),
+            recorded_asked: row.asked,
+            recorded_optimal: FocalPower::new(row.optimal).ok().map(FocalPower::get),
+        })
+    }
+
+    /// Focal power at the middle of the frame's exposure. If the lens did not report it, the focal power that was
+    /// requested after the previous frame.
+    fn exposed_at(&self, frame: usize, row: FrameRow) -> FocalPower {
+        let before = frame.checked_sub(1).map_or(row.asked, |before| self.recording.rows()[before].asked);
+        let known = FocalPower::new(row.measured).or_else(|_| FocalPower::new(before));
+        known.unwrap_or(FocalPower::MIDDLE)
+    }
+}
+
+impl Iterator for Stepping<'_> {
+    type Item = Result<Step, SteppingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let frame = self.next;
+        let row = *self.recording.rows().get(frame)?;
+        self.next += 1;
+        Some(self.step(frame, row))
+    }
+}

@@ -1,0 +1,276 @@
+//! Recordings made while the server runs: mosaics when the operator asks for them, and what a protocol asks for, from a
+//! session's start to its end. A trial never waits for a recording, and continues without one.
+
+mod parts;
+mod running;
+mod starting;
+mod status;
+mod view;
+
+pub use parts::Parts;
+pub use starting::StartError;
+pub use status::RecordingStatus;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::Mutex as Pen;
+use tokio::task::spawn_blocking;
+use tokio::time::{Instant, interval};
+
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::SessionId;
+use parfocal_recording::{Ended, Intake, compressed_size, room};
+use parfocal_trial::protocol::Record;
+use running::Running;
+
+/// Interval at which we check whether a recording has ended by itself.
+const TICK: Duration = Duration::from_secs(1);
+/// Interval at which a frame is compressed while nothing is recorded, to estimate how long the disk would last.
+const MEASURE: Duration = Duration::from_secs(10);
+/// Longest wait for that frame.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Records at most one thing at a time. Clone freely.
+#[derive(Clone)]
+pub struct Recordings(Arc<Shared>);
+
+struct Shared {
+    parts: Parts,
+    state: Mutex<State>,
+    /// Held while a recording is being started or stopped.
+    pen: Pen<()>,
+}
+
+#[derive(Default)]
+struct State {
+    active: Option<Active>,
+    /// The session for which a recording was last started or attempted. A recording that ended early is not started
+    /// again.
+    followed: Option<SessionId>,
+    /// Message to the operator about the last recording.
+    notice: Option<Notice>,
+    /// Compressed size of a frame in bytes, as measured last.
+    frame_bytes: Option<u64>,
+}
+
+/// How a recording ended, or why it did not start, for the operator.
+struct Notice {
+    text: String,
+    /// Whether something went wrong.
+    warns: bool,
+}
+
+/// A recording under way.
+struct Active {
+    what: Running,
+    /// Whether a protocol asked for it.
+    by_protocol: bool,
+    began: Moment,
+}
+
+impl Recordings {
+    /// A recorder that records nothing yet. It follows protocols only while [`Recordings::run`] is awaited.
+    #[must_use]
+    pub fn new(parts: Parts) -> Self {
+        Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
+    }
+
+    /// Follows the sessions, and notices when a recording ends by itself. Never ends.
+    pub async fn run(self) {
+        let mut sessions = self.0.parts.conductor.operator_view();
+        let mut ticks = interval(TICK);
+        let mut measured: Option<Instant> = None;
+
+        loop {
+            tokio::select! {
+                changed = sessions.changed() => if changed.is_err() { return },
+                _ = ticks.tick() => {}
+            }
+            self.follow().await;
+            self.notice_the_end().await;
+
+            if self.0.state().active.is_none() && measured.is_none_or(|at| at.elapsed() >= MEASURE) {
+                measured = Some(Instant::now());
+                self.measure().await;
+            }
+        }
+    }
+
+    /// Begins to record mosaics.
+    ///
+    /// # Errors
+    /// If a recording is already under way, the camera has no mosaics, or the disk has no room.
+    pub async fn start(&self) -> Result<(), StartError> {
+        let _pen = self.0.pen.lock().await;
+        if self.0.state().active.is_some() {
+            return Err(StartError::UnderWay);
+        }
+        self.begin(Record::Mosaic, None).await
+    }
+
+    /// Ends the recording under way, if one is, and stores what was recorded.
+    pub async fn stop(&self) {
+        let _pen = self.0.pen.lock().await;
+        self.end().await;
+    }
+
+    /// The state of recording, for the operator's page.
+    #[must_use]
+    pub fn status(&self) -> RecordingStatus {
+        let parts = &self.0.parts;
+        let status = parts.status.borrow().clone();
+        let room = room(&parts.folder).ok();
+        let state = self.0.state();
+
+        let mut told = RecordingStatus {
+            unavailable: parts.size.is_none().then(|| StartError::NoMosaics.to_string()),
+            notice: state.notice.as_ref().map(|notice| notice.text.clone()),
+            notice_warns: state.notice.as_ref().is_some_and(|notice| notice.warns),
+            free_bytes: room.map(|room| room.available),
+            reserve_bytes: room.map(|room| room.reserve),
+            ..RecordingStatus::default()
+        };
+
+        let idle = state.frame_bytes.map(|bytes| bytes as f64 * status.camera.fps);
+        told.bytes_per_second = idle.filter(|_| parts.size.is_some());
+
+        if let Some(active) = &state.active {
+            let progress = active.what.progress();
+            let seconds = parts.clock.now().since(active.began).as_secs_f64();
+            let measured = (progress.frames > 0).then(|| progress.bytes as f64 / progress.frames as f64);
+            told.bytes_per_second = measured.map(|bytes| bytes * status.camera.fps).or(told.bytes_per_second);
+            told.recording = Some(active.what.kind());
+            told.folder = active.what.folder().file_name().map(|name| name.to_string_lossy().into_owned());
+            told.by_protocol = active.by_protocol;
+            told.seconds = Some(seconds);
+            told.frames = progress.frames;
+            told.lost = progress.lost;
+            told.bytes = progress.bytes;
+        }
+
+        let rate = told.bytes_per_second.filter(|rate| *rate > 0.0);
+        told.seconds_left = room.zip(rate).map(|(room, rate)| room.spare() as f64 / rate);
+        told
+    }
+
+    /// Starts the recording that the session under way asks for, and ends it with the session.
+    async fn follow(&self) {
+        let wanted = self.0.parts.conductor.to_record();
+        let followed = self.0.state().followed;
+
+        match wanted {
+            Some((session, what)) if followed != Some(session) => {
+                let _pen = self.0.pen.lock().await;
+                self.0.state().followed = Some(session);
+                self.end().await;
+                if let Err(error) = self.begin(what, Some(session)).await {
+                    tracing::error!(%error, "a session is not being recorded");
+                    let text = format!("This session is not being recorded. {error}");
+                    self.0.state().notice = Some(Notice { text, warns: true });
+                }
+            }
+            None if followed.is_some() => {
+                let _pen = self.0.pen.lock().await;
+                self.0.state().followed = None;
+                if self.0.state().active.as_ref().is_some_and(|active| active.by_protocol) {
+                    self.end().await;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    async fn notice_the_end(&self) {
+        let _pen = self.0.pen.lock().await;
+        let ended = self.0.state().active.as_ref().is_some_and(|active| active.what.progress().ended.is_some());
+        if ended {
+            self.end().await;
+        }
+    }
+
+    /// Begins to record. The caller must hold the pen, and no recording may be under way.
+    async fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
+        let shared = Arc::clone(&self.0);
+        let stopped = |_| StartError::Failed("the server is ending".to_owned());
+        spawn_blocking(move || shared.begin(what, session)).await.map_err(stopped)?
+    }
+
+    /// Ends the recording under way, if there is one. The caller must hold the pen.
+    async fn end(&self) {
+        let Some(active) = self.0.state().active.take() else { return };
+        self.0.parts.tap.disconnect();
+
+        let folder = active.what.folder().display().to_string();
+        let Ok(progress) = spawn_blocking(move || active.what.stop()).await else { return };
+        tracing::info!(folder, frames = progress.frames, lost = progress.lost, "a recording ended");
+
+        let lost = match progress.lost {
+            0 => String::new(),
+            lost => format!(" {lost} frames were lost, because this machine or its disk was too slow."),
+        };
+        let because = match progress.ended {
+            Some(Ended::Stopped) | None => String::new(),
+            Some(Ended::DiskNearlyFull) => {
+                " The recording stopped by itself, because the disk is nearly full; the trial goes on.".to_owned()
+            }
+            Some(Ended::Failed(problem)) => format!(" The recording stopped: {problem}. The trial goes on."),
+        };
+        let warns = !(because.is_empty() && lost.is_empty());
+        let text = format!("{} frames are saved in {folder}.{because}{lost}", progress.frames);
+        self.0.state().notice = Some(Notice { text, warns });
+    }
+
+    /// Compresses one frame to measure its size in bytes.
+    async fn measure(&self) {
+        if self.0.parts.size.is_none() {
+            return;
+        }
+
+        let (intake, frames) = Intake::new(1);
+        {
+            // Hold the pen, so that no recording starts between the check and the connection.
+            let _pen = self.0.pen.lock().await;
+            if self.0.state().active.is_none() {
+                self.0.parts.tap.connect(intake);
+            }
+        }
+
+        let shared = Arc::clone(&self.0);
+        let size = spawn_blocking(move || {
+            let shot = frames.recv_timeout(PATIENCE).ok();
+            let state = shared.state();
+            if state.active.is_none() {
+                shared.parts.tap.disconnect();
+            }
+            drop(state);
+            shot.and_then(|shot| compressed_size(&shot.mosaic).ok())
+        });
+
+        if let Ok(Some(bytes)) = size.await {
+            self.0.state().frame_bytes = Some(bytes as u64);
+        }
+    }
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins to record. `session` is the session whose protocol asked for it, if one did.
+    fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
+        let began = self.parts.clock.now();
+        let Some(running) = starting::start(&self.parts, what, session, began)? else { return Ok(()) };
+
+        tracing::info!(folder = %running.folder().display(), "a recording began");
+        let mut state = self.state();
+        state.notice = None;
+        if let Running::Mosaic(recorder) = &running {
+            // Connect while the state is locked, so that a measurement does not disconnect the tap.
+            self.parts.tap.connect(recorder.intake());
+        }
+        state.active = Some(Active { what: running, by_protocol: session.is_some(), began });
+        Ok(())
+    }
+}

@@ -1,0 +1,232 @@
+//! Events: everything that happens to a session, in order. They are the only source of truth: the session's state is
+//! computed from them.
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use super::account::AccountName;
+use super::role::Role;
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::SegmentId;
+
+/// Something that happened to a session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Number of the event in its session: from 1, without gaps.
+    pub number: u32,
+    /// Role that caused the event.
+    pub by: Role,
+    /// Personal account of the person who caused the event, if signed in.
+    pub account: Option<AccountName>,
+    /// Time by the monotonic clock of the server's run.
+    pub at: Moment,
+    /// Time by the server's wall clock.
+    pub wall: Timestamp,
+    /// What happened, with its details.
+    pub kind: EventKind,
+}
+
+/// What happened. `inspected_ms`: time inspected in the segment so far, without pauses, in milliseconds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum EventKind {
+    /// The session was made, and its order was drawn.
+    Created,
+    /// The first notice was shown.
+    Started,
+    /// The notice was tapped; inspection began.
+    SegmentStarted {
+        /// Segment that started.
+        segment: SegmentId,
+    },
+    /// Inspection ended. At the time limit it is the system that ends it.
+    SegmentFinished {
+        /// Segment that finished.
+        segment: SegmentId,
+        /// Total time inspected, milliseconds.
+        inspected_ms: u64,
+    },
+    /// The questions after a segment, or the closing questions, were done.
+    QuestionsFinished {
+        /// Segment that the questions are about; none for the closing questions.
+        segment: Option<SegmentId>,
+    },
+    /// The session was paused.
+    Paused {
+        /// Reason for the pause; may be empty.
+        reason: String,
+        /// Time inspected so far, milliseconds.
+        inspected_ms: u64,
+    },
+    /// The session was resumed.
+    Resumed,
+    /// The server stopped during the session and was started again. The session is paused where it was.
+    ServerRestarted {
+        /// Known time inspected, milliseconds: up to a second less than the true time.
+        inspected_ms: u64,
+    },
+    /// The session ran to its end, with all required answers.
+    Completed,
+    /// The session was ended early.
+    Aborted {
+        /// Reason for the abort.
+        reason: String,
+        /// Time inspected in the current segment, milliseconds.
+        inspected_ms: u64,
+    },
+    /// The participant withdrew. Exports leave out the session's data.
+    Withdrawn {
+        /// Reason for the withdrawal.
+        reason: String,
+    },
+    /// The policies that ran were revealed.
+    Unblinded {
+        /// Reason for the unblinding.
+        reason: String,
+        /// Whether it was an emergency: the session was still under way, or its study was still blinded.
+        emergency: bool,
+    },
+}
+
+impl EventKind {
+    /// The kind's name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Created => "created",
+            Self::Started => "started",
+            Self::SegmentStarted { .. } => "segment-started",
+            Self::SegmentFinished { .. } => "segment-finished",
+            Self::QuestionsFinished { .. } => "questions-finished",
+            Self::Paused { .. } => "paused",
+            Self::Resumed => "resumed",
+            Self::ServerRestarted { .. } => "server-restarted",
+            Self::Completed => "completed",
+            Self::Aborted { .. } => "aborted",
+            Self::Withdrawn { .. } => "withdrawn",
+            Self::Unblinded { .. } => "unblinded",
+        }
+    }
+
+    /// The segment that the event is about, if any.
+    #[must_use]
+    pub const fn segment(&self) -> Option<SegmentId> {
+        match self {
+            Self::SegmentStarted { segment } | Self::SegmentFinished { segment, .. } => Some(*segment),
+            Self::QuestionsFinished { segment } => *segment,
+            _ => None,
+        }
+    }
+
+    /// Time inspected in the segment up to the event, milliseconds; none if the event does not record it.
+    #[must_use]
+    pub const fn inspected_ms(&self) -> Option<u64> {
+        match self {
+            Self::SegmentFinished { inspected_ms, .. }
+            | Self::Paused { inspected_ms, .. }
+            | Self::ServerRestarted { inspected_ms }
+            | Self::Aborted { inspected_ms, .. } => Some(*inspected_ms),
+            _ => None,
+        }
+    }
+
+    /// The reason that was given, which may be empty. None for events that have no reason.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Paused { reason, .. }
+            | Self::Aborted { reason, .. }
+            | Self::Withdrawn { reason }
+            | Self::Unblinded { reason, .. } => Some(reason),
+            _ => None,
+        }
+    }
+
+    /// A copy without the reason.
+    #[must_use]
+    pub fn without_reason(&self) -> Self {
+        let mut kind = self.clone();
+        match &mut kind {
+            Self::Paused { reason, .. }
+            | Self::Aborted { reason, .. }
+            | Self::Withdrawn { reason }
+            | Self::Unblinded { reason, .. } => reason.clear(),
+            _ => {}
+        }
+        kind
+    }
+
+    /// A copy without what only the researcher may read: the reason for unblinding, which may name a policy.
+    #[must_use]
+    pub fn for_the_blinded(&self) -> Self {
+        match self {
+            Self::Unblinded { .. } => self.without_reason(),
+            other => other.clone(),
+        }
+    }
+
+    /// A description in words. `setting` returns the number of a segment, from 1.
+    #[must_use]
+    pub fn in_words(&self, setting: impl Fn(SegmentId) -> usize) -> String {
+        match self {
+            Self::Created => "Session made".to_owned(),
+            Self::Started => "Session started".to_owned(),
+            Self::SegmentStarted { segment } => format!("Setting {} started", setting(*segment)),
+            Self::SegmentFinished { segment, inspected_ms } => {
+                format!("Setting {} finished after {}", setting(*segment), seconds(*inspected_ms))
+            }
+            Self::QuestionsFinished { segment: Some(segment) } => {
+                format!("Questions on setting {} done", setting(*segment))
+            }
+            Self::QuestionsFinished { segment: None } => "Closing questions done".to_owned(),
+            Self::Paused { reason, .. } => because("Paused", reason),
+            Self::Resumed => "Resumed".to_owned(),
+            Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
+            Self::Completed => "Session completed".to_owned(),
+            Self::Aborted { reason, .. } => because("Session aborted", reason),
+            Self::Withdrawn { reason } => because("Withdrawn", reason),
+            Self::Unblinded { reason, .. } if reason.is_empty() => "Unblinded by the researcher".to_owned(),
+            Self::Unblinded { reason, emergency: false } => format!("Unblinded: {reason}"),
+            Self::Unblinded { reason, emergency: true } => format!("Unblinded in an emergency: {reason}"),
+        }
+    }
+}
+
+/// `what` with its reason. The reason may be empty, because none was given or because it was erased.
+fn because(what: &str, reason: &str) -> String {
+    if reason.is_empty() { what.to_owned() } else { format!("{what}: {reason}") }
+}
+
+fn seconds(milliseconds: u64) -> String {
+    format!("{:.1} s", milliseconds as f64 / 1000.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_is_the_tag_in_json() {
+        let segment = SegmentId(uuid::Uuid::nil());
+        let kinds = [
+            EventKind::Created,
+            EventKind::Started,
+            EventKind::SegmentStarted { segment },
+            EventKind::SegmentFinished { segment, inspected_ms: 1 },
+            EventKind::QuestionsFinished { segment: None },
+            EventKind::Paused { reason: "🫖".to_owned(), inspected_ms: 1 },
+            EventKind::Resumed,
+            EventKind::ServerRestarted { inspected_ms: 1 },
+            EventKind::Completed,
+            EventKind::Aborted { reason: String::new(), inspected_ms: 0 },
+            EventKind::Withdrawn { reason: "changed their mind".to_owned() },
+            EventKind::Unblinded { reason: String::new(), emergency: true },
+        ];
+
+        for kind in kinds {
+            let json = serde_json::to_value(&kind).unwrap();
+            assert_eq!(json["kind"], kind.name());
+            assert_eq!(serde_json::from_value::<EventKind>(json).unwrap(), kind);
+        }
+    }
+}

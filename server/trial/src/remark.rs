@@ -1,0 +1,131 @@
+//! A surgeon's comments and answers as the page sends them, each with the device and the time of its origin.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::question::AnswerValue;
+use parfocal_base::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+
+/// A comment as a surgeon's browser sends it.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+pub struct NewComment {
+    /// Idempotency key, made by the browser. The same key again means the same comment.
+    pub key: IdempotencyKey,
+    /// Session that the surgeon's page was showing when the comment was made.
+    pub session: SessionId,
+    /// Segment that the page was showing, if any.
+    pub segment: Option<SegmentId>,
+    /// Number of the frame that was on the screen.
+    pub frame: Option<u64>,
+    /// Run of the server that counted the frame, as given in the frame's header.
+    #[serde(default)]
+    pub run: Option<i64>,
+    /// Device and time of the comment.
+    #[serde(flatten)]
+    pub origin: Origin,
+    /// Content of the comment.
+    #[serde(flatten)]
+    pub said: CommentContent,
+}
+
+/// Device and time of a comment or answer, as the surgeon's page reports them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct Origin {
+    /// Device on which it was given.
+    #[serde(default)]
+    pub device: Option<DeviceId>,
+    /// Number that grows with every comment or answer on the device, in all its tabs. Gaps have no meaning.
+    #[serde(default)]
+    pub sequence: Option<i64>,
+    /// When it was given: milliseconds since 1970 by the browser's clock.
+    #[serde(default)]
+    pub client_millis: Option<i64>,
+    /// Milliseconds that it waited on the device before this attempt to send it.
+    #[serde(default)]
+    pub waited_millis: Option<i64>,
+    /// Clock that measured the wait.
+    #[serde(default)]
+    pub waited_by: Option<WaitClock>,
+}
+
+impl Origin {
+    /// A copy without a negative wait. If the page does not name the clock of a wait, it is the wall clock, which older
+    /// pages used.
+    #[must_use]
+    pub fn plausible(self) -> Self {
+        let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);
+        let waited_by = waited_millis.map(|_| self.waited_by.unwrap_or(WaitClock::WallClock));
+        Self { waited_millis, waited_by, ..self }
+    }
+}
+
+/// The clock with which a page measured how long a comment or answer waited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WaitClock {
+    /// The page's monotonic clock, which nobody can set.
+    PageClock,
+    /// The device's wall clock. It is used if the page was reloaded or the device slept in the meantime.
+    WallClock,
+}
+
+impl WaitClock {
+    /// The clock's name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PageClock => "page-clock",
+            Self::WallClock => "wall-clock",
+        }
+    }
+
+    /// The clock with this name, if there is one.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::PageClock, Self::WallClock].into_iter().find(|clock| clock.name() == name)
+    }
+}
+
+/// The content of a comment.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", content = "text", rename_all = "kebab-case")]
+pub enum CommentContent {
+    /// A typed text.
+    Text(String),
+    /// One of the protocol's quick comments.
+    Quick(String),
+    /// A mark without words ("Mark this moment").
+    Mark,
+    /// A spoken comment. Its recording follows in pieces.
+    Voice,
+}
+
+/// An answer as a surgeon's browser sends it. If there are several answers to a question, the one given last counts, in
+/// whatever order they arrive. Items that it leaves open keep their earlier values. The other answers stay in the log.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+pub struct NewAnswer {
+    /// Idempotency key, made by the browser. The same key again means the same answer.
+    pub key: IdempotencyKey,
+    /// Session in which the answer was given.
+    pub session: SessionId,
+    /// Segment that the question is about; none for the closing questions.
+    pub segment: Option<SegmentId>,
+    /// Id of the question.
+    pub question: String,
+    /// Value of the answer.
+    pub value: AnswerValue,
+    /// Device and time of the answer.
+    #[serde(flatten)]
+    pub origin: Origin,
+}
+
+/// The number of comments and answers that a surgeon's device still holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct Holding {
+    /// Session in which they were given.
+    pub session: SessionId,
+    /// Device that holds them.
+    pub device: DeviceId,
+    /// Number of comments and answers whose saving the device has not seen confirmed, half-written ones included.
+    pub holding: u32,
+}

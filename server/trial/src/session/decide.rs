@@ -1,0 +1,216 @@
+//! Decides what an action causes: the events to record, no events if it was done before, or a refusal. This includes
+//! the decision which role may do what.
+
+use std::time::Duration;
+
+use super::{PauseCause, SessionState};
+use crate::action::Action;
+use crate::answers::is_whole;
+use crate::event::EventKind;
+use crate::phase::Phase;
+use crate::question::Question;
+use crate::reason;
+use crate::refusal::Refusal;
+use crate::role::Role;
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::SegmentId;
+
+/// The events that `action` by `by` causes at `now`. Empty if the action was done before (a double click, a stale tab).
+///
+/// # Errors
+/// If `by` may not do this, or the action does not fit the state of the session.
+pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    allowed(state, by, action)?;
+    match action {
+        Action::Start => start(state),
+        Action::Acknowledge { segment } => acknowledge(state, *segment),
+        Action::FinishSegment { segment } => finish_segment(state, *segment, now),
+        Action::FinishQuestions { segment: Some(segment) } => finish_questions(state, *segment),
+        Action::FinishQuestions { segment: None } => finish_closing(state),
+        Action::Pause { reason } => pause(state, reason, now),
+        Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
+        Action::Abort { reason } => abort(state, reason, now),
+        Action::Withdraw { reason } => withdraw(state, reason),
+        Action::Unblind { reason, .. } => unblind(state, reason),
+    }
+}
+
+/// The events that the passing of time causes: the end of a segment at its time limit.
+#[must_use]
+pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
+    if !state.running() || state.inspected(now) < state.plan.limit {
+        return Vec::new();
+    }
+    state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
+}
+
+/// The events that a restart of the server causes. `inspected` is the known time inspected in the segment.
+#[must_use]
+pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
+    if state.ended() || state.phase == Phase::Ready {
+        return Vec::new();
+    }
+    let inspected = inspected.clamp(state.inspected.min(state.plan.limit), state.plan.limit);
+    vec![EventKind::ServerRestarted { inspected_ms: milliseconds(inspected) }]
+}
+
+fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusal> {
+    let (who, fits): (&str, bool) = match action {
+        Action::Start | Action::Pause { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
+        Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
+        Action::FinishSegment { .. } => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
+        Action::Resume => {
+            let surgeon_may = state.paused != Some(PauseCause::Operator);
+            ("the operator", by == Role::Operator || (by == Role::Surgeon && surgeon_may))
+        }
+        Action::Withdraw { .. } => ("the operator or the researcher", matches!(by, Role::Operator | Role::Researcher)),
+        Action::Unblind { .. } => ("the researcher", by == Role::Researcher),
+    };
+
+    if fits { Ok(()) } else { Err(Refusal::only(who)) }
+}
+
+/// The phase of `segment` if it is the current one; `None` if it is already done.
+///
+/// # Errors
+/// If the session has no such segment or has not reached it, or was aborted.
+fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
+    let position = state.plan.position(segment).ok_or(Refusal::UnknownSegment)?;
+    if position < state.done {
+        return Ok(None);
+    }
+    if state.phase == Phase::Aborted {
+        return Err(Refusal::conflict("the session was aborted"));
+    }
+    if position > state.done || state.segment().is_none() {
+        return Err(Refusal::conflict("this setting has not been reached"));
+    }
+    Ok(Some(state.phase))
+}
+
+fn start(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
+    if state.phase != Phase::Ready {
+        return Ok(Vec::new());
+    }
+    match &state.plan.consent {
+        Some(required) if state.consented.as_ref() != Some(required) => Err(Refusal::Conflict(format!(
+            "the protocol requires the participant's consent to version '{required}' of the text; record it first"
+        ))),
+        _ => Ok(vec![EventKind::Started]),
+    }
+}
+
+fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Notice) => {
+            going_on(state)?;
+            Ok(vec![EventKind::SegmentStarted { segment }])
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn finish_segment(state: &SessionState, segment: SegmentId, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Notice) => Err(Refusal::conflict("this setting has not begun")),
+        Some(Phase::Inspecting) => {
+            going_on(state)?;
+            Ok(finish(state, segment, state.inspected(now)))
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Questions) => {
+            going_on(state)?;
+            answered(state, Some(segment), &state.plan.after_segment)?;
+            Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
+        }
+        Some(_) => Err(Refusal::conflict("the questions on this setting have not been asked")),
+        None => Ok(Vec::new()),
+    }
+}
+
+fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
+    match state.phase {
+        Phase::Completed => Ok(Vec::new()),
+        Phase::Closing => {
+            going_on(state)?;
+            answered(state, None, &state.plan.closing)?;
+            Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
+        }
+        _ => Err(Refusal::conflict("the closing questions have not been asked")),
+    }
+}
+
+fn finish(state: &SessionState, segment: SegmentId, inspected: Duration) -> Vec<EventKind> {
+    let finished = EventKind::SegmentFinished { segment, inspected_ms: milliseconds(inspected) };
+    if state.plan.after_segment.is_empty() { with_completion(state, finished) } else { vec![finished] }
+}
+
+/// The event `last`, which ends the current segment, and the session's completion if nothing follows.
+fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
+    let completes = state.done + 1 == state.plan.segments.len() && state.plan.closing.is_empty();
+    let mut events = vec![last];
+    events.extend(completes.then_some(EventKind::Completed));
+    events
+}
+
+fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    match state.phase {
+        Phase::Ready => return Err(Refusal::conflict("the session has not started")),
+        Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
+        _ => {}
+    }
+
+    if state.paused == Some(PauseCause::Operator) {
+        return Ok(Vec::new());
+    }
+    let reason = reason::optional(reason)?;
+    Ok(vec![EventKind::Paused { reason, inspected_ms: milliseconds(state.inspected(now)) }])
+}
+
+fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    let reason = reason::needed(reason)?;
+    match state.phase {
+        Phase::Completed => return Err(Refusal::conflict("the session is complete; nothing is left to abort")),
+        Phase::Aborted => return Ok(Vec::new()),
+        _ => {}
+    }
+    Ok(vec![EventKind::Aborted { reason, inspected_ms: milliseconds(state.inspected(now)) }])
+}
+
+fn withdraw(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    let reason = reason::needed(reason)?;
+    if state.withdrawn {
+        return Ok(Vec::new());
+    }
+    if !state.ended() {
+        return Err(Refusal::conflict("the session is under way; abort it first, then withdraw it"));
+    }
+    Ok(vec![EventKind::Withdrawn { reason }])
+}
+
+fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    let reason = reason::needed(reason)?;
+    if state.unblinded {
+        return Ok(Vec::new());
+    }
+    Ok(vec![EventKind::Unblinded { reason, emergency: !state.ended() }])
+}
+
+fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Question]) -> Result<(), Refusal> {
+    let whole = |question: &Question| state.answer(segment, &question.id).is_some_and(is_whole);
+    let open = questions.iter().find(|question| !question.optional && !whole(question));
+    open.map_or(Ok(()), |question| Err(Refusal::Conflict(format!("still to be answered: {}", question.text))))
+}
+
+fn going_on(state: &SessionState) -> Result<(), Refusal> {
+    if state.paused.is_some() { Err(Refusal::conflict("the session is paused")) } else { Ok(()) }
+}
+
+fn milliseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,282 @@
+//! The session's state machine. Events are the only source of truth: [`SessionState::apply`] folds them into a state,
+//! and [`decide`] says which events an action causes. Neither reads a clock, and neither stores anything elsewhere.
+//!
+//! ```text
+//! Ready -Start-> Notice -Acknowledge-> Inspecting -FinishSegment, or time is up-> Questions -FinishQuestions-+
+//!                  ^                                                                                          |
+//!                  +------------------------------- while settings are left ---------------------------------+
+//!                                                                                                             |
+//!                                    Completed <-FinishQuestions- Closing <-----------------------------------+
+//! ```
+//! If there are no questions, their step is skipped. Every phase from Notice to Closing can be paused and aborted.
+
+mod decide;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+pub use decide::{decide, decide_restart, decide_time};
+
+use super::event::{Event, EventKind};
+use super::phase::Phase;
+use super::protocol::Protocol;
+use super::question::{AnswerValue, Question};
+use super::standing::{GivenAnswer, counted};
+use parfocal_base::clock::Moment;
+use parfocal_base::ids::SegmentId;
+
+/// The parts of a session that never change and that determine its course.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The segments, in order.
+    pub segments: Vec<SegmentId>,
+    /// Maximum time inspected in a segment.
+    pub limit: Duration,
+    /// Questions asked after each segment.
+    pub after_segment: Vec<Question>,
+    /// Closing questions, asked at the end.
+    pub closing: Vec<Question>,
+    /// Version of the consent text that the participant must have consented to before the start; none if the protocol
+    /// requires no consent.
+    pub consent: Option<String>,
+}
+
+impl Plan {
+    /// The plan of a session with this protocol and these segments.
+    #[must_use]
+    pub fn new(protocol: &Protocol, segments: Vec<SegmentId>) -> Self {
+        Self {
+            segments,
+            limit: protocol.segment_limit,
+            after_segment: protocol.after_segment.clone(),
+            closing: protocol.closing.clone(),
+            consent: protocol.consent.clone(),
+        }
+    }
+
+    /// Place of `segment` in the session, from 0.
+    #[must_use]
+    pub fn position(&self, segment: SegmentId) -> Option<usize> {
+        self.segments.iter().position(|&known| known == segment)
+    }
+}
+
+/// What paused a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PauseCause {
+    /// The operator. Only the operator can resume the session.
+    Operator,
+    /// A restart of the server. The surgeon can resume the session too.
+    Restart,
+}
+
+/// The state of a session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionState {
+    plan: Plan,
+    phase: Phase,
+    done: usize,
+    /// Number of segments whose inspection has ended, so that their questions may be answered.
+    asked: usize,
+    paused: Option<PauseCause>,
+    inspected: Duration,
+    running_since: Option<Moment>,
+    unblinded: bool,
+    withdrawn: bool,
+    /// Version of the consent text that the participant consented to last.
+    consented: Option<String>,
+    answers: BTreeMap<(Option<SegmentId>, String), Answered>,
+}
+
+/// The answers to one question.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Answered {
+    /// All answers, in the order of their arrival.
+    given: Vec<GivenAnswer>,
+    /// The answer that counts.
+    counts: Option<AnswerValue>,
+}
+
+impl SessionState {
+    /// The state of a new session.
+    #[must_use]
+    pub const fn new(plan: Plan) -> Self {
+        Self {
+            plan,
+            phase: Phase::Ready,
+            done: 0,
+            asked: 0,
+            paused: None,
+            inspected: Duration::ZERO,
+            running_since: None,
+            unblinded: false,
+            withdrawn: false,
+            consented: None,
+            answers: BTreeMap::new(),
+        }
+    }
+
+    /// The state after `events`, which are all events from the first on. Keeps the present answers and the consent.
+    #[must_use]
+    pub fn replayed(&self, events: &[Event]) -> Self {
+        let mut state = Self::new(self.plan.clone());
+        state.answers.clone_from(&self.answers);
+        state.consented.clone_from(&self.consented);
+        for event in events {
+            state.apply(event);
+        }
+        state
+    }
+
+    /// The session's plan.
+    #[must_use]
+    pub const fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The session's phase. It does not change while the session is paused.
+    #[must_use]
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// What paused the session; none if it is not paused.
+    #[must_use]
+    pub const fn paused(&self) -> Option<PauseCause> {
+        self.paused
+    }
+
+    /// Whether the session was completed or aborted.
+    #[must_use]
+    pub const fn ended(&self) -> bool {
+        self.phase.has_ended()
+    }
+
+    /// Whether the session was unblinded.
+    #[must_use]
+    pub const fn unblinded(&self) -> bool {
+        self.unblinded
+    }
+
+    /// Whether the participant withdrew.
+    #[must_use]
+    pub const fn withdrawn(&self) -> bool {
+        self.withdrawn
+    }
+
+    /// Records a consent to version `text_version` of the consent text.
+    pub fn keep_consent(&mut self, text_version: &str) {
+        self.consented = Some(text_version.to_owned());
+    }
+
+    /// Number of segments that are done, including their questions.
+    #[must_use]
+    pub const fn done(&self) -> usize {
+        self.done
+    }
+
+    /// The current segment, from its notice to the end of its questions; none outside that.
+    #[must_use]
+    pub fn segment(&self) -> Option<SegmentId> {
+        let under_way = matches!(self.phase, Phase::Notice | Phase::Inspecting | Phase::Questions);
+        self.plan.segments.get(self.done).copied().filter(|_| under_way)
+    }
+
+    /// Time inspected in the current segment, without pauses, and never more than the limit.
+    #[must_use]
+    pub fn inspected(&self, now: Moment) -> Duration {
+        let running = self.running_since.map_or(Duration::ZERO, |since| now.since(since));
+        (self.inspected + running).min(self.plan.limit)
+    }
+
+    /// Whether the segment's clock is running.
+    #[must_use]
+    pub const fn running(&self) -> bool {
+        self.running_since.is_some()
+    }
+
+    /// The questions that are asked now.
+    #[must_use]
+    pub fn questions(&self) -> &[Question] {
+        match self.phase {
+            Phase::Questions => &self.plan.after_segment,
+            Phase::Closing => &self.plan.closing,
+            _ => &[],
+        }
+    }
+
+    /// The answer to `question` that counts. The question was asked after `segment`, or at the end if that is `None`.
+    #[must_use]
+    pub fn answer(&self, segment: Option<SegmentId>, question: &str) -> Option<&AnswerValue> {
+        self.answers.get(&(segment, question.to_owned()))?.counts.as_ref()
+    }
+
+    /// Adds an answer that has arrived. Of all answers to a question, the one given last counts.
+    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, given: GivenAnswer) {
+        let answered = self.answers.entry((segment, question.to_owned())).or_default();
+        answered.given.push(given);
+        answered.counts = counted(&answered.given);
+    }
+
+    /// Whether answers to the questions about `segment` (`None`: the closing questions) are kept. They always are once
+    /// the questions have been shown. [`Grace`](super::grace::Grace) decides whether a late answer counts.
+    #[must_use]
+    pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
+        match segment {
+            None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.plan.segments.len(),
+            Some(segment) => self.plan.position(segment).is_some_and(|position| position < self.asked),
+        }
+    }
+
+    /// Applies an event.
+    pub fn apply(&mut self, event: &Event) {
+        match &event.kind {
+            EventKind::Created | EventKind::QuestionsFinished { segment: None } => {}
+            EventKind::Started => self.phase = Phase::Notice,
+            EventKind::SegmentStarted { .. } => {
+                self.phase = Phase::Inspecting;
+                self.inspected = Duration::ZERO;
+                self.running_since = Some(event.at);
+            }
+            EventKind::SegmentFinished { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                self.asked = self.done + 1;
+                if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
+            }
+            EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),
+            EventKind::Paused { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = Some(PauseCause::Operator);
+            }
+            EventKind::Resumed => {
+                self.paused = None;
+                self.running_since = (self.phase == Phase::Inspecting).then_some(event.at);
+            }
+            EventKind::ServerRestarted { inspected_ms } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = self.paused.or(Some(PauseCause::Restart));
+            }
+            EventKind::Completed => self.phase = Phase::Completed,
+            EventKind::Aborted { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = None;
+                self.phase = Phase::Aborted;
+            }
+            EventKind::Withdrawn { .. } => self.withdrawn = true,
+            EventKind::Unblinded { .. } => self.unblinded = true,
+        }
+    }
+
+    fn stop_clock(&mut self, inspected_ms: u64) {
+        self.inspected = Duration::from_millis(inspected_ms);
+        self.running_since = None;
+    }
+
+    const fn leave_segment(&mut self) {
+        self.done += 1;
+        self.inspected = Duration::ZERO;
+        self.phase = if self.done < self.plan.segments.len() { Phase::Notice } else { Phase::Closing };
+    }
+}

@@ -1,0 +1,131 @@
+//! Decides which place of its list a new session gets. The rules of the definition decide, not a person.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::definition::{Definition, PlaceRules, Repetition, Replacement, Site};
+use super::refusal::StudyRefusal;
+use crate::phase::SessionStatus;
+use parfocal_base::ids::SessionId;
+
+/// A session of a study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Enrolled {
+    /// Id of the session.
+    pub session: SessionId,
+    /// Code of the session's participant, as it was recorded.
+    pub participant: String,
+    /// Corrected code of the participant; none if it was not corrected.
+    pub corrected_participant: Option<String>,
+    /// Name of the session's site.
+    pub site: String,
+    /// Name of the session's protocol.
+    pub protocol: String,
+    /// Place in the list for the site and the protocol, from 1.
+    pub place: usize,
+    /// Whether the session is under way, completed or aborted.
+    pub status: SessionStatus,
+    /// Whether the session was unblinded.
+    pub unblinded: bool,
+    /// Whether the session's surgeon withdrew.
+    pub withdrawn: bool,
+}
+
+impl Enrolled {
+    /// The surgeon whose session it was: the corrected code if there is one, otherwise the recorded one.
+    #[must_use]
+    pub fn surgeon(&self) -> &str {
+        self.corrected_participant.as_ref().unwrap_or(&self.participant)
+    }
+
+    /// What happens to the session's place; none if the session is valid, that is, neither withdrawn nor aborted.
+    const fn replacement(&self, rules: PlaceRules) -> Option<Replacement> {
+        let rule = match (self.withdrawn, self.status) {
+            (true, _) => rules.withdrawn,
+            (false, SessionStatus::Aborted) => rules.aborted,
+            (false, SessionStatus::UnderWay | SessionStatus::Completed) => return None,
+        };
+        // A person who knows the order could tell it to the next surgeon.
+        Some(match rule {
+            Replacement::SamePlace if self.unblinded => Replacement::NextSpare,
+            rule => rule,
+        })
+    }
+
+    /// Whether another session of the same surgeon with the same protocol is a repetition: this session is valid, or
+    /// its place is not replaced.
+    fn stands(&self, rules: PlaceRules) -> bool {
+        matches!(self.replacement(rules), None | Some(Replacement::Keep))
+    }
+}
+
+/// The place (from 1) of a new session of `participant` at `site` with `protocol`. `sessions` are all sessions of the
+/// study, in the order in which they were made.
+///
+/// # Errors
+/// If the participant may not have a session, or no place is left.
+pub fn next_place(
+    definition: &Definition,
+    sessions: &[Enrolled],
+    site: &Site,
+    protocol: &str,
+    participant: &str,
+) -> Result<usize, StudyRefusal> {
+    let rules = definition.rules;
+    if sessions.iter().any(|session| session.surgeon() == participant && session.withdrawn) {
+        return Err(StudyRefusal::Withdrew { participant: participant.to_owned() });
+    }
+
+    let list: Vec<&Enrolled> =
+        sessions.iter().filter(|session| session.site == site.name && session.protocol == protocol).collect();
+    // Counts sessions at all sites: a surgeon who works at two sites is still one surgeon.
+    let repeats = sessions
+        .iter()
+        .any(|session| session.surgeon() == participant && session.protocol == protocol && session.stands(rules));
+    if repeats && rules.repeated == Repetition::Refuse {
+        return Err(StudyRefusal::Repeated { participant: participant.to_owned() });
+    }
+
+    if let Some(place) = given_back(&list, rules) {
+        return Ok(place);
+    }
+
+    let next = list.iter().map(|session| session.place).max().unwrap_or(0) + 1;
+    let opened = spares_opened(&list, rules) + usize::from(repeats);
+    let open = site.places().min(site.surgeons + opened);
+    if next > open {
+        return Err(StudyRefusal::UsedUp {
+            site: site.name.clone(),
+            open,
+            places: site.places(),
+            advice: definition.when_used_up.clone(),
+        });
+    }
+    Ok(next)
+}
+
+/// The first place that its latest session freed.
+fn given_back(list: &[&Enrolled], rules: PlaceRules) -> Option<usize> {
+    let places: BTreeSet<usize> = list.iter().map(|session| session.place).collect();
+    places.into_iter().find(|&place| {
+        let mut at_this_place = list.iter().filter(move |session| session.place == place);
+        // Once the order of a place is known, no session may take it again.
+        let known = at_this_place.clone().any(|session| session.unblinded);
+        let latest = at_this_place.next_back();
+        !known && latest.is_some_and(|session| session.replacement(rules) == Some(Replacement::SamePlace))
+    })
+}
+
+/// The number of spare places that the sessions of a list have opened.
+fn spares_opened(list: &[&Enrolled], rules: PlaceRules) -> usize {
+    let mut latest = BTreeMap::new();
+    for session in list {
+        latest.insert(session.place, session);
+    }
+    let opens = latest.into_values().filter(|session| session.replacement(rules) == Some(Replacement::NextSpare));
+    let replaced = opens.count();
+
+    let mut standing = BTreeSet::new();
+    let standing_sessions = list.iter().filter(|session| session.stands(rules));
+    let repeated = standing_sessions.filter(|session| !standing.insert(session.surgeon())).count();
+    replaced + repeated
+}
