@@ -225,7 +225,7 @@ mod tests {
     }
 
     fn vectors() -> Vectors {
-        serde_json::from_str(include_str!("../../../../tests/vectors/wilcoxon.json")).unwrap()
+        serde_json::from_str(include_str!("../../../tests/vectors/wilcoxon.json")).unwrap()
     }
 
     #[test]
