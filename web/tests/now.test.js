@@ -26,6 +26,7 @@ const SURGEON = {
   refused: false,
   unsent: false,
   unsaved: false,
+  over: false,
 };
 const OPERATOR = {
   known: true,
@@ -48,6 +49,17 @@ function operatorView(told) {
     ...told,
   };
 }
+
+test("a tablet whose link ended with its session keeps its last words, whatever becomes of the connection", () => {
+  const over = { ...SURGEON, over: true, missed: true };
+  const ended = { ...VIEW, phase: /** @type {const} */ ("completed") };
+  assert.equal(surgeonWords({ ...over, view: ended }), "You are done. Give the tablet back.");
+  assert.equal(
+    surgeonWords({ ...over, view: ended, unsaved: true }),
+    "Keep this page open until everything is saved.",
+  );
+  assert.match(surgeonWords({ ...over, view: null }), /Scan the operator’s code/);
+});
 
 test("each phase has a line of its own, which fits on a tablet’s screen", () => {
   const surgeon = PHASES.map((phase) => surgeonWords({ ...SURGEON, view: { ...VIEW, phase } }));

@@ -36,7 +36,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     })
     .await;
 
-    surgeon.sees("#comment-state", "Saved here, not sent yet: 1 comment").await;
+    surgeon.sees("#comment-state", "Saved here: 1 comment").await;
     surgeon.sees("#comment-state", "the disk is full").await;
     shoot(surgeon, "surgeon-13-full-disk").await;
     surgeon.reload().await;

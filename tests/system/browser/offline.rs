@@ -63,7 +63,7 @@ impl Theatre {
 
     /// Waits until the tablet says that it holds `many` unsent items.
     async fn holds(&self, many: &str) {
-        self.surgeon.sees("#comment-state", &format!("Saved here, not sent yet: {many}.")).await;
+        self.surgeon.sees("#comment-state", &format!("Saved here: {many}. Sent when the network is back.")).await;
     }
 
     /// Reloads the surgeon's page while no server answers; the page opens anyway.

@@ -56,7 +56,7 @@ async fn a_session(operator: &Browser) {
     assert_eq!(operator.value("#study").await, "");
     operator.select("#study", "scope-2026/leeds").await;
     operator.select("#protocol", "pair").await;
-    assert_eq!(operator.count("#protocol option").await, 1, "the study's protocols alone");
+    assert_eq!(operator.count("#protocol option").await, 2, "“Choose…” and the study’s protocol alone");
     shoot(operator, "operator-11-study").await;
 
     // The operator's link is not enough: the page asks to sign in, in a dialog, and keeps the selection.

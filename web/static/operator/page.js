@@ -35,15 +35,19 @@ let wrong = false;
 /** Whether the server has said which session, if any, is under way. */
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
-const viewer = new Viewer(byId("view"), "operator");
+const viewer = new Viewer(byId("view"), "operator", byId("colour"));
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
-const refreshChoices = followChoices(redrawFocus, followAnswer);
+const choices = followChoices(redrawFocus, followAnswer);
 
 /** @param {Api.OperatorView | null} next */
 function followSession(next) {
-  if (session && !next) refreshChoices();
+  if (session && !next) {
+    choices.refresh();
+    // After practice the same participant comes next, after a real session another one.
+    choices.forget(!session.practice);
+  }
   session = next;
   known = true;
   sessionCard.follow(session);
@@ -101,7 +105,7 @@ viewer.live.listen({
     }
     contact.heard();
     serverAnswered();
-    refreshChoices();
+    choices.refresh();
   },
 });
 
@@ -121,4 +125,4 @@ setInterval(() => {
   sessionCard.drawTime();
   drawNow();
 }, TICK_MS);
-refreshChoices();
+choices.refresh();

@@ -138,3 +138,13 @@ export function protocolWords({ researcher_title: title, settings, segment_secon
   const length = `${title}: ${settings} settings of at most ${clockText(seconds)}`;
   return practice ? `${length}. This is practice, kept apart from real data.` : `${length}.`;
 }
+
+/**
+ * Protocols in the order in which they are offered: practice first, so that the real trial is never the nearest.
+ *
+ * @template {{ practice: boolean }} Protocol
+ * @param {Protocol[]} protocols
+ */
+export function practiceFirst(protocols) {
+  return [...protocols].sort((a, b) => Number(b.practice) - Number(a.practice));
+}

@@ -14,8 +14,9 @@ const TALL_LETTERS = 90;
  *
  * @param {import("./comments.js").Comments} comments
  * @param {import("./outbox.js").Outbox} outbox
+ * @param {import("./voice_outbox.js").VoiceOutbox} voice
  */
-export function commentBox(comments, outbox) {
+export function commentBox(comments, outbox, voice) {
   const box = byId("comment", HTMLTextAreaElement);
   const mark = byId("mark", HTMLButtonElement);
   const send = byId("send", HTMLButtonElement);
@@ -107,6 +108,7 @@ export function commentBox(comments, outbox) {
     comments.hear(change);
     draw();
   });
+  voice.subscribe(draw);
   followDrafts(followOtherTabs);
   // A page that was asleep may have missed an event.
   document.addEventListener("visibilitychange", () => followOtherTabs());

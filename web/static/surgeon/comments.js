@@ -49,6 +49,7 @@ export class Comments {
   #outbox;
   #drafts;
   #here;
+  #voice;
   /** The number of each setting that was on screen, by its segment. @type {Map<string, number>} */
   #numbers = new Map();
   /** @type {import("./drafts.js").Draft | null} */
@@ -64,11 +65,13 @@ export class Comments {
    * @param {import("./outbox.js").Outbox} outbox
    * @param {import("./drafts.js").Drafts} drafts
    * @param {() => Place | null} here null outside a session
+   * @param {Pick<import("./voice_outbox.js").VoiceOutbox, "heldUp" | "durable" | "trouble">} voice
    */
-  constructor(outbox, drafts, here) {
+  constructor(outbox, drafts, here, voice) {
     this.#outbox = outbox;
     this.#drafts = drafts;
     this.#here = here;
+    this.#voice = voice;
   }
 
   /** @param {Api.SurgeonView | null} state */
@@ -240,19 +243,21 @@ export class Comments {
   }
 
   /**
-   * Whether all comments are saved, with the text to show.
+   * Whether all comments are saved, with the text to show. Recordings that wait with them are told on the same line.
    *
    * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
    */
   get status() {
     const waiting = this.#outbox.waiting.filter((entry) => entry.path === PATH).length;
-    if (waiting === 0) {
+    const recordings = this.#voice.heldUp;
+    if (waiting === 0 && recordings === 0) {
       return { kind: "saved", text: this.#saved === 0 ? "" : `${counted(this.#saved, "comment")} saved` };
     }
 
-    const { trouble, durable } = this.#outbox;
-    if (trouble === null) return { kind: "saving", text: "Saving…" };
-    return { kind: "unsaved", text: `${heldWords(counted(waiting, "comment"), durable)} ${trouble}` };
+    const trouble = this.#outbox.trouble ?? this.#voice.trouble;
+    if (trouble === null && recordings === 0) return { kind: "saving", text: "Saving…" };
+    const durable = this.#outbox.durable && this.#voice.durable;
+    return { kind: "unsaved", text: heldWords({ comments: waiting, recordings, durable, trouble }) };
   }
 }
 

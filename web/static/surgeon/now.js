@@ -16,10 +16,13 @@ import { minuteText } from "../shared/text.js";
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} unsent whether there is a comment in the box
  * @property {boolean} unsaved whether any comment or answer is not saved yet
+ * @property {boolean} over whether this tablet's link has ended; `view` is then the end of its session, or null
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved }) {
+export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved, over }) {
+  if (over && view !== null) return endWords(unsent, unsaved);
+  if (over) return unsaved ? KEEP_OPEN : "Scan the operator’s code to open the next session.";
   if (missed) return unreachableWords(view, heardAt, refused);
   if (!known) return "Connecting to the server…";
   if (view === null) return "Nothing to do yet: wait for the operator to start a trial.";
@@ -44,13 +47,15 @@ export function nowWords({ view, known, missed, heardAt, refused, unsent, unsave
   }
 }
 
+const KEEP_OPEN = "Keep this page open until everything is saved.";
+
 /**
  * @param {boolean} unsent
  * @param {boolean} unsaved
  */
 function endWords(unsent, unsaved) {
   if (unsent) return "Save or delete the comment in the box.";
-  return unsaved ? "Keep this page open until everything is saved." : "You are done. Give the tablet back.";
+  return unsaved ? KEEP_OPEN : "You are done. Give the tablet back.";
 }
 
 /**

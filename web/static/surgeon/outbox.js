@@ -6,6 +6,7 @@
 // next opened.
 
 import { inWords, Refused } from "../shared/api.js";
+import { NO_CONNECTION } from "./words.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
@@ -294,7 +295,7 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, "No connection. This page keeps trying.");
+    this.trouble = inWords(error, NO_CONNECTION);
     const heard = error instanceof Refused;
     this.#tell(entry, "waiting", this.trouble, heard);
     return heard;

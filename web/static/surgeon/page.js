@@ -1,6 +1,6 @@
 // The surgeon's page: follows the session's state as the server sends it. It looks the same for every policy.
 
-import { get, post, Refused } from "../shared/api.js";
+import { get, inWords, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
@@ -49,13 +49,16 @@ let endsAt = null;
 /** @type {QuestionPanel | null} */
 let questionPanel = null;
 let panelDrawn = "";
+/** Whether this tablet's link has ended, and why if its session had not. */
+let over = false;
+let overBecause = "";
 
 const outbox = openOutbox();
 const contact = new Contact(clock, lastView.read());
-const viewer = new Viewer(byId("view"), "surgeon");
-const comments = new Comments(outbox, drafts, here);
-const box = commentBox(comments, outbox);
+const viewer = new Viewer(byId("view"), "surgeon", byId("colour"));
 const voice = openVoiceOutbox();
+const comments = new Comments(outbox, drafts, here, voice);
+const box = commentBox(comments, outbox, voice);
 const mayRecord = byId("talk").dataset.microphone === "true";
 const talk = new Talk({
   outbox: voice,
@@ -213,6 +216,7 @@ function drawNow() {
     refused: contact.isCertificateOver,
     unsent: comments.unsent,
     unsaved: outbox.waiting.length + voice.waiting > 0,
+    over,
   };
   setText(byId("now"), nowWords(facts));
 }
@@ -230,8 +234,20 @@ function followStatus(status) {
 
 function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
-  const words = isEnded(state) ? kept() : mayResume ? saved() : "";
-  const key = JSON.stringify([known, session, phase, paused, segment, questions, mayResume, words, advice()]);
+  const words = over || isEnded(state) ? kept() : mayResume ? saved() : "";
+  const key = JSON.stringify([
+    known,
+    over,
+    overBecause,
+    session,
+    phase,
+    paused,
+    segment,
+    questions,
+    mayResume,
+    words,
+    advice(),
+  ]);
   if (key === panelDrawn) return;
   panelDrawn = key;
   questionPanel = null;
@@ -240,6 +256,9 @@ function drawPanel() {
 
 function panelContent() {
   if (!known) return null;
+  if (over && !isEnded(state)) {
+    return card("centred", "Not open to this tablet", overBecause);
+  }
   if (!state) {
     const text = "You can look around. When the operator starts a trial, it begins here.";
     return card("aside", "No trial is under way", text);
@@ -319,6 +338,28 @@ voice.subscribe(() => {
   if (state) drawPanel();
 });
 
+/**
+ * The tablet's link has ended. If its session has, too, the last words on the page stay as they were. What the tablet
+ * holds is still sent.
+ */
+async function leave() {
+  over = true;
+  forgetPage();
+  lastView.forget();
+  viewer.end();
+  if (!isEnded(state)) followServer(null);
+  drawPanel();
+  drawNow();
+  if (isEnded(state)) return;
+
+  // The server's answer says why.
+  overBecause = await get("/api/surgeon/session").then(
+    () => "",
+    (error) => inWords(error),
+  );
+  drawPanel();
+}
+
 /* Wiring */
 
 byId("comment").addEventListener("input", () => {
@@ -331,12 +372,7 @@ viewer.live.listen({
   heard: () => contact.heard(),
   session: followServer,
   status: followStatus,
-  // The session is over for this tablet. What the tablet holds is still sent. The server's answer says the rest.
-  over: () => {
-    forgetPage();
-    followServer(null);
-    refresh();
-  },
+  over: leave,
   connection: (open) => {
     if (!open) {
       contact.lost();

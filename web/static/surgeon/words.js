@@ -68,14 +68,24 @@ export function savedWords(refused, waiting) {
   return kept.trim() || "Everything you said is saved.";
 }
 
+/** Why something was not sent, if no server answered. */
+export const NO_CONNECTION = "No connection. This page keeps trying.";
+
 /**
- * Says where something is kept that the server does not have yet.
+ * One line about what the server does not have yet: where it is kept, and what will become of it.
  *
- * @param {string} what such as `2 comments`
- * @param {boolean} durable whether this device keeps it over a reload
+ * @param {object} held
+ * @param {number} held.comments
+ * @param {number} held.recordings
+ * @param {boolean} held.durable whether this device keeps all of it over a reload
+ * @param {string | null} held.trouble why the last attempt to send failed
  */
-export function heldWords(what, durable) {
-  return durable
-    ? `Saved here, not sent yet: ${what}.`
-    : `Kept on this page only, so do not close it: ${what}.`;
+export function heldWords({ comments, recordings, durable, trouble }) {
+  const what = [
+    comments > 0 && counted(comments, "comment"),
+    recordings > 0 && counted(recordings, "recording"),
+  ];
+  const where = durable ? "Saved here" : "Kept on this page only, so do not close it";
+  const then = trouble === NO_CONNECTION ? "Sent when the network is back." : (trouble ?? "");
+  return `${where}: ${what.filter(Boolean).join(", ")}. ${then}`.trim();
 }
