@@ -180,8 +180,17 @@ impl Theatre {
         self.surgeon.sees_no("[data-question=sharpness]").await;
     }
 
-    /// The surgeon selects point `point` of the scale called `name`.
+    /// The surgeon selects point `point` of the scale called `name`, again and again until the page accepts the tap: it
+    /// ignores taps right after the questions have appeared.
     pub async fn choose(&self, name: &str, point: u8) {
-        self.surgeon.click(&format!("input[name='{name}'][value='{point}']")).await;
+        let input = format!("input[name='{name}'][value='{point}']");
+        self.surgeon.click(&input).await;
+        until("the point to be chosen", || async {
+            self.surgeon.is(&input, "checked").await || {
+                self.surgeon.try_click(&input).await;
+                false
+            }
+        })
+        .await;
     }
 }

@@ -5,7 +5,7 @@ import { askIn } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { BY_HAND, UNTOLD } from "./focus_card.js";
-import { practiceFirst, protocolWords } from "./session_words.js";
+import { asCode, practiceFirst, protocolWords } from "./session_words.js";
 
 /** @typedef {{ value: string, label: string, disabled?: boolean, hidden?: boolean }} Option */
 
@@ -160,6 +160,10 @@ export function followChoices(drawn, prepare) {
   for (const way of ["pointerenter", "focus"]) participants.addEventListener(way, refresh);
   // A researcher may have opened or closed a study.
   for (const way of ["pointerenter", "focus"]) studies.addEventListener(way, refresh);
+  const typed = byId("code", HTMLInputElement);
+  typed.addEventListener("input", () => {
+    typed.value = asCode(typed.value);
+  });
   byId("add-participant").onclick = () => {
     askIn(byId("participant-dialog", HTMLDialogElement), byId("participant-trouble"), add);
   };

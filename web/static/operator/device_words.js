@@ -17,7 +17,7 @@ function milliseconds(micros) {
  */
 export function lamps(status) {
   const { camera, lens } = status;
-  const lost = camera.lost > 0 ? ` · ${camera.lost} lost` : "";
+  const lost = camera.lost > 0 ? ` · ${camera.lost} lost since the server’s start` : "";
   const isHeld = status.held !== null && status.held !== "paused";
 
   return [

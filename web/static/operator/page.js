@@ -14,7 +14,7 @@ import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
 import { nowWords } from "./now.js";
-import { followRecording } from "./recording_card.js";
+import { followRecording, forgetNotice } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
 import { followLink, offerLink } from "./surgeon_link.js";
 import { Traces } from "./traces.js";
@@ -48,6 +48,7 @@ function followSession(next) {
     // After practice the same participant comes next, after a real session another one.
     choices.forget(!session.practice);
   }
+  if (known && next && next.session !== session?.session) forgetNotice();
   session = next;
   known = true;
   sessionCard.follow(session);

@@ -33,6 +33,8 @@ export class SessionCard {
 
   /** @param {View | null} session */
   follow(session) {
+    // The button that was pressed goes away, and would take the focus to the page's beginning.
+    const isHere = byId("session-card").contains(document.activeElement);
     this.#session = session;
     const seconds = session?.remaining_seconds;
     this.#endsAt = seconds == null ? null : performance.now() + seconds * 1000;
@@ -42,6 +44,7 @@ export class SessionCard {
     byId("follow").hidden = session === null;
     this.#drawBadges();
     if (session) this.#draw(session);
+    if (isHere) focusNext();
   }
 
   /** @param {View} session */
@@ -195,6 +198,20 @@ export class SessionCard {
       tellTrouble(byId("session-trouble"), error);
     }
   }
+}
+
+/** Gives the focus to what comes next in the card, if it was lost. */
+function focusNext() {
+  const active = document.activeElement;
+  const isLost = active === null || active === document.body || active.getClientRects().length === 0;
+  if (!isLost) return;
+  /** @type {HTMLElement | null} */
+  const next =
+    document.querySelector("#session-actions .primary") ??
+    document.querySelector("#session-actions button:not(.danger)") ??
+    document.querySelector("#session-actions button");
+  const inForm = byId("participant");
+  (byId("running").hidden ? inForm : next)?.focus();
 }
 
 /**

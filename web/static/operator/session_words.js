@@ -11,11 +11,12 @@ export function isOver({ phase }) {
 }
 
 /** @param {View} view */
-export function phaseWords({ phase, setting, settings }) {
+export function phaseWords(view) {
+  const { phase, setting, settings } = view;
   const which = `Setting ${setting} of ${settings}`;
   switch (phase) {
     case "ready":
-      return "Ready to start";
+      return lacksConsent(view) ? "Consent is missing" : "Ready to start";
     case "notice":
       return `${which}: waiting for the surgeon to tap`;
     case "inspecting":
@@ -147,4 +148,13 @@ export function protocolWords({ researcher_title: title, settings, segment_secon
  */
 export function practiceFirst(protocols) {
   return [...protocols].sort((a, b) => Number(b.practice) - Number(a.practice));
+}
+
+/**
+ * A code as it was meant: `s01` is S01. What has no digit may be a name, which is never taken.
+ *
+ * @param {string} typed
+ */
+export function asCode(typed) {
+  return /\d/.test(typed) ? typed.toUpperCase() : typed;
 }

@@ -57,7 +57,7 @@ async function unblind() {
   const asked = {
     heading: isEmergency ? "Emergency unblinding" : "Unblind this session",
     consequence: study ? ofStudy : ended ? usual : emergency,
-    confirm: open ? "Unblind anyway" : undefined,
+    confirm: open ? "Unblind anyway, although a tablet may still hold comments or answers" : undefined,
     go: isEmergency ? "Unblind now" : "Unblind",
     danger: true,
   };

@@ -81,6 +81,7 @@ async function openPlayer(shown) {
       length: lengthOf(shown),
       moved: followPlayhead,
     });
+    byId("comment-list").classList.add("beside-player");
     byId("comments-play").hidden = shown.comments.length === 0;
     byId("timeline").addEventListener("click", seek);
   } catch (error) {
@@ -109,6 +110,7 @@ function seek(event) {
 
 /** @param {Api.TimelineComment[]} comments */
 function listComments(comments) {
+  setText(byId("comment-count"), comments.length === 0 ? "" : String(comments.length));
   lines = comments.map((comment, index) => {
     const words = commentWords(comment);
     const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);

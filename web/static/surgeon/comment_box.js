@@ -2,9 +2,10 @@
 
 import { byId, make, setText } from "../shared/dom.js";
 import { followDrafts } from "./device.js";
+import { isKeyboardUp } from "./room.js";
 
 /** A second tap on the same button within this time is ignored. */
-const SAME_TAP_MS = 700;
+const SAME_TAP_MS = 1000;
 
 /** A text longer than this gets a taller box. */
 const TALL_LETTERS = 90;
@@ -31,9 +32,10 @@ export function commentBox(comments, outbox, voice) {
     comments.follow(state);
     box.disabled = comments.disabled;
     byId("compose").hidden = comments.disabled && state !== null;
-    box.placeholder = state ? "Write what you see" : "Comments are kept once a trial begins";
-
     const looking = state?.phase === "inspecting";
+    const invitation = looking ? "Write what you see" : "Write a comment";
+    box.placeholder = state ? invitation : "Comments are kept once a trial begins";
+
     mark.hidden = !looking;
     drawQuick(looking ? state.quick_comments : []);
     draw();
@@ -83,7 +85,8 @@ export function commentBox(comments, outbox, voice) {
    * @param {import("./comments.js").Said} what
    */
   function tap(button, what) {
-    if (tapped.has(button) || !comments.say(what)) return;
+    const entry = tapped.has(button) ? null : comments.say(what);
+    if (!entry) return;
     tapped.add(button);
     button.classList.add("taken");
     setTimeout(() => {
@@ -93,9 +96,12 @@ export function commentBox(comments, outbox, voice) {
   }
 
   function submit() {
-    if (!comments.submit()) return;
+    const entry = comments.submit();
+    if (!entry) return;
     draw();
-    box.focus();
+    // A box that takes the focus by itself would keep a tablet's keyboard up, over the picture.
+    if (isKeyboardUp()) box.blur();
+    else box.focus();
   }
 
   /** @param {string | null} [taken] */

@@ -22,7 +22,7 @@ const OFFERED_LETTERS = 16;
  */
 
 /** @typedef {Omit<Place, "session">} Begun where a comment was begun */
-/** @typedef {{ kind: "text" | "quick", text: string } | { kind: "mark" }} Said */
+/** @typedef {{ kind: "text" | "quick" | "withdrawal", text: string } | { kind: "mark" }} Said */
 
 /**
  * A comment in the form that the server expects.
@@ -181,30 +181,46 @@ export class Comments {
     this.#draft?.write(text === "" ? null : { text, begun: this.#begun });
   }
 
-  /** Sends the text in the box. Returns whether there was anything to send. */
+  /** Sends the text in the box. Returns the entry; null if there was nothing to send. */
   submit() {
     const here = this.#here();
     const text = this.text.trim();
-    if (!here || text === "") return false;
+    if (!here || text === "") return null;
 
     // The comment counts as made now, no matter when it was begun.
     const { key } = this.#draft?.take() ?? {};
-    this.#outbox.add(PATH, comment({ kind: "text", text }, { ...here, ...this.#begun }), null, { key });
+    const said = comment({ kind: "text", text }, { ...here, ...this.#begun });
+    const entry = this.#outbox.add(PATH, said, null, { key });
     this.write("");
     this.trouble = "";
-    return true;
+    return entry;
   }
 
   /**
-   * Sends a quick comment or a mark. Returns false if there is no session to which it could belong.
+   * Sends a quick comment or a mark. Returns the entry; null if there is no session to which it could belong.
    *
    * @param {Said} what
    */
   say(what) {
     const here = this.#here();
-    if (!here) return false;
-    this.#outbox.add(PATH, comment(what, here));
-    return true;
+    return here && this.#outbox.add(PATH, comment(what, here));
+  }
+
+  /**
+   * Takes back a comment. It stays in the record, marked as taken back.
+   *
+   * @param {import("./outbox.js").Entry} entry
+   */
+  withdraw({ body }) {
+    const { key, session, segment, frame, run } = body;
+    this.#outbox.add(PATH, comment({ kind: "withdrawal", text: key }, { session, segment, frame, run }));
+  }
+
+  /** How many comments wait. One that was taken back is no longer told. */
+  get #waiting() {
+    const bodies = this.#outbox.waiting.filter(({ path }) => path === PATH).map(({ body }) => body);
+    const withdrawn = new Set(bodies.filter(({ kind }) => kind === "withdrawal").map(({ text }) => text));
+    return bodies.filter(({ kind, key }) => kind !== "withdrawal" && !withdrawn.has(key)).length;
   }
 
   /**
@@ -248,7 +264,7 @@ export class Comments {
    * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
    */
   get status() {
-    const waiting = this.#outbox.waiting.filter((entry) => entry.path === PATH).length;
+    const waiting = this.#waiting;
     const recordings = this.#voice.heldUp;
     if (waiting === 0 && recordings === 0) {
       return { kind: "saved", text: this.#saved === 0 ? "" : `${counted(this.#saved, "comment")} saved` };
@@ -273,5 +289,6 @@ function begunAt({ segment, setting, frame, run }) {
 function refusedWords({ kind, text }) {
   if (kind === "text") return "The comment was not saved and is back in the box";
   if (kind === "mark") return "The mark was not saved";
+  if (kind === "withdrawal") return "The comment was not taken back";
   return `“${text}” was not saved`;
 }

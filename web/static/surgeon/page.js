@@ -22,19 +22,31 @@ import {
   origins,
   reloadForMicrophone,
   storage,
+  store,
 } from "./device.js";
+import { followDimmer } from "./dimmer.js";
 import { Holding } from "./holding.js";
-import { record } from "./microphone.js";
+import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { nowWords } from "./now.js";
 import { forgetPage, keepPage } from "./offline.js";
-import { card, showPanel } from "./panel.js";
+import { card, guardPanel, showPanel } from "./panel.js";
 import { QuestionPanel } from "./question_panel.js";
 import { onTopOf } from "./questions.js";
+import { keepRoom } from "./room.js";
 import { keepStorage } from "./storage_words.js";
 import { Talk } from "./talk.js";
 import { talkButton } from "./talk_button.js";
-import { headline, isEnded, readyWords, savedWords, simulatedWords, steps, timeLeft } from "./words.js";
+import {
+  endsSoon,
+  headline,
+  isEnded,
+  readyWords,
+  savedWords,
+  simulatedWords,
+  steps,
+  timeLeft,
+} from "./words.js";
 
 const TICK_MS = 250;
 
@@ -128,6 +140,7 @@ function follow(next) {
   drawBar();
   box.follow(state);
   talking.follow(state);
+  followMicrophone();
   drawPanel();
   // Only after the form was removed, because removing it hands over the text that was in it.
   sendLeftAnswers(outbox, drafts, state);
@@ -181,6 +194,42 @@ function isStillMeant(action) {
   return !("segment" in action) || action.segment === (state.segment ?? null);
 }
 
+/* Microphone */
+
+/** Whether the microphone was opened for this session, or why it could not be; empty while it is not known. */
+let microphone = "";
+
+/** Opens the microphone before the trial if the browser lets it, and closes it when no session can use it any more. */
+async function followMicrophone() {
+  if (!state?.voice || isEnded(state)) {
+    closeMicrophone();
+    microphone = "";
+    return;
+  }
+  const isAsked = microphone === "" && state.phase === "ready" && whyNoMicrophone(mayRecord) === "";
+  if (isAsked && (await mayOpenMicrophone())) await tryMicrophone();
+}
+
+async function tryMicrophone() {
+  try {
+    await openMicrophone();
+    microphone = "The microphone is ready.";
+  } catch (error) {
+    microphone = error instanceof Error ? error.message : "The microphone could not be opened.";
+  }
+  drawPanel();
+}
+
+/** The button that asks for the microphone before the trial; null where it need not. */
+function microphoneButton() {
+  if (!state?.voice || microphone !== "" || whyNoMicrophone(mayRecord) !== "") return null;
+  return make(
+    "button",
+    { type: "button", className: "primary", onclick: tryMicrophone },
+    "Try the microphone",
+  );
+}
+
 /* Bar */
 
 function drawBar() {
@@ -202,9 +251,16 @@ function drawBar() {
   drawTime();
 }
 
+/** Seconds left of the setting's time; null if it has no limit or is not known. */
+function secondsLeft() {
+  return endsAt === null ? null : (endsAt - performance.now()) / 1000;
+}
+
 function drawTime() {
-  const left = endsAt === null ? null : (endsAt - performance.now()) / 1000;
-  setText(byId("remaining"), timeLeft(state, left));
+  const left = secondsLeft();
+  const remaining = byId("remaining");
+  setText(remaining, timeLeft(state, left));
+  remaining.classList.toggle("soon", endsSoon(state, left));
 }
 
 function drawNow() {
@@ -216,6 +272,7 @@ function drawNow() {
     refused: contact.isCertificateOver,
     unsent: comments.unsent,
     unsaved: outbox.waiting.length + voice.waiting > 0,
+    soon: endsSoon(state, secondsLeft()),
     over,
   };
   setText(byId("now"), nowWords(facts));
@@ -260,20 +317,21 @@ function panelContent() {
     return card("centred", "Not open to this tablet", overBecause);
   }
   if (!state) {
-    const text = "You can look around. When the operator starts a trial, it begins here.";
-    return card("aside", "No trial is under way", text);
+    return card("aside idle", "No trial is under way. You can look around.", "");
   }
   if (state.paused && !isEnded(state)) return pausedCard(state);
 
   switch (state.phase) {
     case "ready":
-      return card("aside", state.title, [readyWords(state), ...advice()].join(" "));
+      return card("aside", state.title, [readyWords(state), ...advice()].join(" "), microphoneButton());
     case "questions":
       return questions(state, `Setting ${state.setting}: a few questions`);
     case "closing":
       return questions(state, "Final questions");
     case "completed":
-      return card("centred", "Thank you", `The trial is complete. ${kept()}`);
+      return state.practice
+        ? card("centred", "Practice is over", `That was practice; it does not count. ${kept()}`)
+        : card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
       return card("centred", "The session was ended", `There is nothing more to do. ${kept()}`);
     default:
@@ -283,7 +341,7 @@ function panelContent() {
 
 /** What people have to do before the trial starts, because the browser does not do it. */
 function advice() {
-  return [awake.advice, storage].filter((words) => words !== "");
+  return [awake.advice, storage, microphone].filter((words) => words !== "");
 }
 
 function kept() {
@@ -408,6 +466,9 @@ addEventListener("pagehide", () => {
   if (heardAt !== null) lastView.touch({ heardAt, certificateEnd });
 });
 
+guardPanel();
+keepRoom();
+followDimmer(byId("brightness", HTMLInputElement), store);
 setInterval(tick, TICK_MS);
 keepPage();
 refresh();

@@ -31,6 +31,19 @@ export function steps(state) {
   });
 }
 
+/** The end of a setting is told this many seconds before. */
+const SOON_SECONDS = 10;
+
+/**
+ * Whether the setting's time ends in a moment.
+ *
+ * @param {View | null} state
+ * @param {number | null} seconds left of the setting's time; null if it has no limit
+ */
+export function endsSoon(state, seconds) {
+  return state?.phase === "inspecting" && !state.paused && seconds !== null && seconds <= SOON_SECONDS;
+}
+
 /**
  * @param {View | null} state
  * @param {number | null} seconds left of the setting's time; null if it has no limit
