@@ -143,7 +143,7 @@ mod tests {
     use parfocal_imaging::Patch;
 
     fn registered(file: &str) -> (Registry, PolicyName) {
-        let name = PolicyName::new(&format!("file:{}/tests/vectors/{file}", env!("CARGO_MANIFEST_DIR")));
+        let name = PolicyName::new(&format!("file:{}/../../tests/vectors/{file}", env!("CARGO_MANIFEST_DIR")));
         (with_file(Registry::default(), &name), name)
     }
 

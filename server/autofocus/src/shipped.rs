@@ -173,7 +173,7 @@ mod tests {
         let error = with().err().unwrap().to_string();
         assert!(error.contains("mgm-learned.safetensors") && error.contains("the weights are damaged"), "{error}");
 
-        std::fs::copy("policies/mgm-learned.safetensors", &file).unwrap();
+        std::fs::copy("../../policies/mgm-learned.safetensors", &file).unwrap();
         assert!(with().unwrap().build(&PolicyName::new("parfocal")).is_ok());
     }
 }
