@@ -5,8 +5,9 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
-# GigE Vision and USB3 Vision come in wherever their libraries are; nothing needs them.
-FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
+# GigE Vision and USB3 Vision come in wherever their libraries are; nothing needs them. The shell asks when it comes to
+# the command, because .ci/setup may install the libraries just before.
+FEATURES := $$(.ci/features)
 
 # A Debian package of the release build: target/parfocal_VERSION_amd64.deb.
 package:
@@ -33,7 +34,7 @@ check: lint web unit interface readme packaged
 lint:
 	cargo fmt --check
 	cargo clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
-	$(if $(FEATURES),cargo clippy --release --locked -- --deny warnings)
+	[ -z "$(FEATURES)" ] || cargo clippy --release --locked -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -46,8 +47,9 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
+# One failing test does not keep the others from running.
 unit:
-	cargo test --release --locked $(FEATURES)
+	cargo test --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
