@@ -70,6 +70,7 @@ pub struct Canvas {
 
 impl Canvas {
     /// A canvas of `side` x `side` zeros.
+    #[must_use]
     pub fn blank(side: usize) -> Self {
         Self { side, data: vec![0.0; side * side] }
     }

@@ -33,11 +33,15 @@ struct WrittenFile {
 
 impl Folder {
     /// Begins an export to the folder `out`, which must be new or empty.
+    ///
+    /// # Errors
+    /// If the folder `out` exists already, or the temporary one cannot be made.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         Ok(Self::to(Destination::Folder(NewFolder::beside(out)?)))
     }
 
     /// Begins an export into the ZIP file `zip`.
+    #[must_use]
     pub fn zipped(zip: ZipStream) -> Self {
         Self::to(Destination::Zip(Box::new(zip)))
     }
@@ -47,6 +51,9 @@ impl Folder {
     }
 
     /// Begins the CSV file of the rows `R`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn begin<R: Row>(&mut self) -> Result<CsvFile<'_, R>, ExportError> {
         let name = R::TABLE.file();
         self.destination.begin(&name)?;
@@ -68,6 +75,9 @@ impl Folder {
     }
 
     /// Writes a whole table.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub async fn table<R: Row>(&mut self, rows: &[R]) -> Result<(), ExportError> {
         let mut file = self.begin()?;
         for row in rows {
@@ -77,6 +87,9 @@ impl Folder {
     }
 
     /// Writes `content` as file `name`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub async fn file(&mut self, name: &str, content: &[u8]) -> Result<(), ExportError> {
         self.destination.begin(name)?;
         self.destination.write(name, content).await?;
@@ -86,11 +99,17 @@ impl Folder {
     }
 
     /// Writes `value` as JSON file `name`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub async fn json(&mut self, name: &str, value: &Value) -> Result<(), ExportError> {
         self.file(name, format!("{value:#}\n").as_bytes()).await
     }
 
     /// Writes the Frictionless description: `package` with the tables written so far.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub async fn describe(&mut self, package: &Value) -> Result<(), ExportError> {
         let mut package = package.clone();
         package["resources"] = Value::Array(std::mem::take(&mut self.resources));
@@ -98,6 +117,9 @@ impl Folder {
     }
 
     /// Writes the checksums and completes the export. Returns the names of its files.
+    ///
+    /// # Errors
+    /// If the last files cannot be written, or the folder cannot be renamed.
     pub async fn finish(mut self) -> Result<Vec<String>, ExportError> {
         self.files.sort();
         let lines: Vec<String> = self.files.iter().map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();

@@ -168,22 +168,26 @@ pub struct Meaning {
 }
 
 /// A column that means `description`, has no unit, and has been there since the first format.
+#[must_use]
 pub const fn means(description: &'static str) -> Meaning {
     Meaning { unit: "", description, since: 1 }
 }
 
 impl Meaning {
     /// The same in `unit`.
+    #[must_use]
     pub const fn in_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
     }
 
     /// The same in a column that exports have since `format`.
+    #[must_use]
     pub const fn since(self, format: u64) -> Self {
         Self { since: format, ..self }
     }
 
     /// The column called `name`.
+    #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
         Column { name, kind, unit: self.unit, description: self.description, since: self.since }
     }
