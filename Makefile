@@ -9,13 +9,14 @@ ARGS ?=
 # the command, because .ci/setup may install the libraries just before.
 FEATURES := $$(.ci/features)
 
-# A Debian package of the release build: target/parfocal_VERSION_amd64.deb.
+# What a release consists of, in target/: a Debian package, the Python package (wheel and source archive), an SBOM, checksums.
+# The program tells what it is made of: `cargo audit bin target/release/parfocal`.
 package:
 	@.ci/setup package
-	@cargo build --release --locked $(FEATURES)
-	@deploy/debian/build
+	@cargo auditable build --release --locked $(FEATURES)
+	@FEATURES="$(lastword $(FEATURES))" deploy/release
 
-.PHONY: run test package check lint web web-types unit interface readme packaged bench screenshots fuzz endurance
+.PHONY: run test package check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -27,7 +28,7 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint web unit interface readme packaged
+check: lint web unit interface python readme packaged
 
 # Tests and program are one build, so all is checked as it is shipped and compiled once. `cargo test` alone makes a
 # development build, which is faster after a change.
@@ -54,6 +55,14 @@ unit:
 # What HTTP answers, against its own description, as each role.
 interface:
 	.ci/schemathesis $(FEATURES)
+
+# The Python package: format, lint, types, tests.
+python:
+	.ci/python
+
+# After a change of the HTTP interface and `make web-types`: the Python package's types and methods.
+python-interface:
+	python3 python/tools/generate_interface.py
 
 readme:
 	.ci/readme
