@@ -14,7 +14,7 @@ FEATURES := $$(.ci/features)
 package:
 	@.ci/setup package
 	@cargo auditable build --release --locked $(FEATURES)
-	@FEATURES="$(lastword $(FEATURES))" deploy/release
+	@FEATURES="$(FEATURES)" deploy/release
 
 .PHONY: run test package check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
 
