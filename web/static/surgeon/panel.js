@@ -1,11 +1,13 @@
 // The panel over the picture. It shows cards, each with a single message, or the questions.
 
 import { byId, make } from "../shared/dom.js";
-import { TapGuard } from "./tap_guard.js";
+import { NOT_MEANT_MS, TapGuard } from "./tap_guard.js";
 
 /** @typedef {{ className: string, nodes: HTMLElement[] }} Content */
 
 const guard = new TapGuard();
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let freshTimer;
 
 /**
  * @param {string} className classes of the panel; they decide where the card is placed
@@ -27,6 +29,10 @@ export function showPanel(content) {
   // What the surgeon has just pressed may be hidden now, and would take the focus with it.
   const lost = isLost(document.activeElement);
   guard.shown(performance.now());
+  // Whoever looks from outside sees when the panel takes taps.
+  panel.dataset.fresh = "true";
+  clearTimeout(freshTimer);
+  freshTimer = setTimeout(() => delete panel.dataset.fresh, NOT_MEANT_MS + 20);
   panel.hidden = content === null;
   panel.className = `panel ${content?.className ?? ""}`;
   panel.replaceChildren(...(content?.nodes ?? []));
