@@ -78,7 +78,7 @@ fn collect(folder: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
 
 thread_local! {
     static EXPORT: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(|folder| {
-        let template = Path::new(ROOT).join("tests/trial/export-of-format-6");
+        let template = Path::new(ROOT).join("tests/vectors/export");
         for entry in fs::read_dir(template).unwrap() {
             let file = entry.unwrap().path();
             fs::copy(&file, folder.join(file.file_name().unwrap())).unwrap();

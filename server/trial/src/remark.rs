@@ -49,8 +49,8 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// A copy without a negative wait. If the page does not name the clock of a wait, it is the wall clock, which older
-    /// pages used.
+    /// A copy without a negative wait. A wait whose clock is not named counts as measured by the wall clock, which is
+    /// the less certain one.
     #[must_use]
     pub fn plausible(self) -> Self {
         let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);

@@ -191,7 +191,7 @@ impl Recorder {
 
         // Chains the session's telemetry first, so that the export can prove it.
         if let Access::Exported { session, .. } = access {
-            chain::seal(&mut transaction, &session.to_string(), &wall, false).await?;
+            chain::seal(&mut transaction, &session.to_string(), &wall).await?;
         }
 
         let done = sqlx::query(

@@ -225,15 +225,13 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before that, chains what an earlier version recorded, and the telemetry that the run
-/// before left unchained.
+/// Records the start of a run. Before that, chains the telemetry that the run before left unchained.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
 
     let mut connection = trial.acquire().await?;
     let mut transaction = begin(&mut connection).await?;
-    chain::adopt(&mut transaction, &wall).await?;
     seal_what_was_left(&mut transaction, &wall).await?;
 
     let done = sqlx::query(
@@ -264,7 +262,7 @@ async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Re
     let sessions = sqlx::query_scalar("SELECT DISTINCT session FROM events WHERE run = (SELECT max(run) FROM events)");
     let sessions: Vec<String> = sessions.fetch_all(&mut *connection).await?;
     for session in sessions {
-        chain::seal(connection, &session, wall, false).await?;
+        chain::seal(connection, &session, wall).await?;
     }
     Ok(())
 }
@@ -308,7 +306,7 @@ async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall:
 }
 
 /// Keeps other accounts of the machine out of the folder and its files, which hold seeds, policies and what surgeons
-/// said. Earlier versions let every account read them. If the rights cannot be changed, the server runs all the same
+/// said. If the rights cannot be changed, the server runs all the same
 /// and logs a warning.
 fn keep_private(folder: &Path) {
     let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));

@@ -275,16 +275,13 @@ fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
 fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
     let device: Option<String> = row.try_get("device")?;
     let waited_by: Option<String> = row.try_get("waited_by")?;
-    let origin = Origin {
+    Ok(Origin {
         device: device.map(|_| parsed(row, "device")).transpose()?,
         sequence: row.try_get("sequence")?,
         client_millis: row.try_get("client_millis")?,
         waited_millis: row.try_get("waited_ms")?,
         waited_by: waited_by.as_deref().and_then(WaitClock::named),
-    };
-
-    // Records of older versions name no clock. It was the wall clock.
-    Ok(origin.plausible())
+    })
 }
 
 fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {

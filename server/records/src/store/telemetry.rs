@@ -218,7 +218,7 @@ async fn seal(connection: &mut SqliteConnection, segments: &BTreeSet<SegmentId>,
     }
 
     for session in sessions {
-        chain::seal(&mut transaction, &session, wall, false).await?;
+        chain::seal(&mut transaction, &session, wall).await?;
     }
     Ok(transaction.commit().await?)
 }

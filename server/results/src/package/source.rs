@@ -53,9 +53,7 @@ impl Source {
 
         let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
         let export = ExportFiles::of(folder);
-        let package = export.json("datapackage.json").map_err(unreadable)?;
-        let told = &package["parfocal"];
-        let format = told["format"].as_u64().unwrap_or(1);
+        let format = export.format().map_err(unreadable)?;
         if format != FORMAT {
             return Err(PackageError::OtherFormat { folder: folder.to_owned(), found: format, expected: FORMAT });
         }
@@ -70,6 +68,8 @@ impl Source {
             }
         }
 
+        let package = export.json("datapackage.json").map_err(unreadable)?;
+        let told = &package["parfocal"];
         let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let cell = |file: &str, column: &str| {

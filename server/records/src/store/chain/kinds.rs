@@ -15,8 +15,6 @@ pub struct Kind {
     pub select: &'static str,
     /// SQL condition that picks one record by its key. The parts of the key, divided by slashes, are its parameters.
     pub one: &'static str,
-    /// SQL expression for the order in which records are kept.
-    pub order: &'static str,
 }
 
 const RUN: Kind = Kind {
@@ -26,7 +24,6 @@ const RUN: Kind = Kind {
     sealed: &["weights", "seed"],
     select: "SELECT CAST(run AS TEXT) AS chain_key, NULL AS chain_session, run AS chain_order, * FROM runs",
     one: "run = ?",
-    order: "run",
 };
 
 const PARTICIPANT: Kind = Kind {
@@ -36,7 +33,6 @@ const PARTICIPANT: Kind = Kind {
     sealed: &[],
     select: "SELECT code AS chain_key, NULL AS chain_session, 0 AS chain_order, * FROM participants",
     one: "code = ?",
-    order: "wall, code",
 };
 
 const SESSION: Kind = Kind {
@@ -63,7 +59,6 @@ const SESSION: Kind = Kind {
              SELECT segment FROM segments AS g WHERE g.session = sessions.session ORDER BY setting)) AS segments
          FROM sessions",
     one: "session = ?",
-    order: "rowid",
 };
 
 // Two columns hold the kind of an event. If they differ, neither is believed.
@@ -78,7 +73,6 @@ const EVENT: Kind = Kind {
          CASE payload ->> 'emergency' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END AS emergency,
          payload ->> 'reason' AS reason FROM events",
     one: "session = ? AND number = ?",
-    order: "(SELECT s.rowid FROM sessions AS s WHERE s.session = events.session), events.number",
 };
 
 const COMMENT: Kind = Kind {
@@ -104,11 +98,8 @@ const COMMENT: Kind = Kind {
     sealed: &["text"],
     select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, kind,
          iif(frame < 0, format('%u', frame), frame) AS frame, frame_run, wall, run, monotonic_ns, client_millis,
-         iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
-         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
-         iif(late, 'true', 'false') AS late, text FROM comments",
+         waited_ms, waited_by, device, sequence, iif(late, 'true', 'false') AS late, text FROM comments",
     one: "key = ?",
-    order: "number",
 };
 
 const ANSWER: Kind = Kind {
@@ -131,11 +122,9 @@ const ANSWER: Kind = Kind {
     ],
     sealed: &["given_value"],
     select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, question,
-         wall, run, monotonic_ns, client_millis, iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
-         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
+         wall, run, monotonic_ns, client_millis, waited_ms, waited_by, device, sequence,
          iif(late, 'true', 'false') AS late, value AS given_value FROM answers",
     one: "key = ?",
-    order: "number",
 };
 
 const DEVICE: Kind = Kind {
@@ -146,7 +135,6 @@ const DEVICE: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, number, wall, run,
          monotonic_ns, device, iif(working, 'true', 'false') AS working, message FROM device_events",
     one: "number = ?",
-    order: "number",
 };
 
 const ACCESS: Kind = Kind {
@@ -157,7 +145,6 @@ const ACCESS: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
          FROM accesses",
     one: "number = ?",
-    order: "number",
 };
 
 const CORRECTION: Kind = Kind {
@@ -168,7 +155,6 @@ const CORRECTION: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
          FROM corrections",
     one: "number = ?",
-    order: "number",
 };
 
 const CONSENT: Kind = Kind {
@@ -179,7 +165,6 @@ const CONSENT: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
          FROM consents",
     one: "number = ?",
-    order: "number",
 };
 
 const ERASURE: Kind = Kind {
@@ -190,7 +175,6 @@ const ERASURE: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
          FROM erasures",
     one: "number = ?",
-    order: "number",
 };
 
 const STUDY: Kind = Kind {
@@ -201,7 +185,6 @@ const STUDY: Kind = Kind {
     select: "SELECT study AS chain_key, NULL AS chain_session, rowid AS chain_order, study, definition_sha256, sites,
          wall FROM studies",
     one: "study = ?",
-    order: "rowid",
 };
 
 const STUDY_EVENT: Kind = Kind {
@@ -212,7 +195,6 @@ const STUDY_EVENT: Kind = Kind {
     select: "SELECT study || '/' || number AS chain_key, NULL AS chain_session, 0 AS chain_order, study, number, wall,
          run, monotonic_ns, role, person, kind, session AS about_session, commitment, reason FROM study_events",
     one: "study = ? AND number = ?",
-    order: "study, number",
 };
 
 const STUDY_SESSION: Kind = Kind {
@@ -223,7 +205,6 @@ const STUDY_SESSION: Kind = Kind {
     select: "SELECT session AS chain_key, session AS chain_session, 0 AS chain_order, session, study, site, protocol,
          place FROM study_sessions",
     one: "session = ?",
-    order: "session",
 };
 
 const ACCOUNT_EVENT: Kind = Kind {
@@ -234,7 +215,6 @@ const ACCOUNT_EVENT: Kind = Kind {
     select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, *
          FROM account_events",
     one: "number = ?",
-    order: "number",
 };
 
 const ACTOR: Kind = Kind {
@@ -244,7 +224,6 @@ const ACTOR: Kind = Kind {
     sealed: &[],
     select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, * FROM actors",
     one: "number = ?",
-    order: "number",
 };
 
 // The sound itself is in none of these columns. Its hash is, and stays when the sound is erased.
@@ -270,7 +249,6 @@ const VOICE_PIECE: Kind = Kind {
         "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, number, session,
          comment, piece, media_type, through_ms, ended, bytes, sha256, wall, run, monotonic_ns FROM voice_pieces",
     one: "number = ?",
-    order: "number",
 };
 
 /// Every kind except telemetry, which is chained in blocks.

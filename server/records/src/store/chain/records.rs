@@ -42,13 +42,6 @@ pub async fn one(connection: &mut SqliteConnection, kind: &Kind, key: &str) -> R
     Ok(record(kind, &row)?.1)
 }
 
-/// The keys of all records of `kind`, in the order in which they are kept.
-pub async fn keys(connection: &mut SqliteConnection, kind: &Kind) -> Result<Vec<String>, StoreError> {
-    let sql = format!("{} ORDER BY {}", kind.select, kind.order);
-    let rows = sqlx::query(AssertSqlSafe(sql)).fetch_all(connection).await?;
-    Ok(rows.iter().map(|row| row.try_get("chain_key")).collect::<Result<_, _>>()?)
-}
-
 /// Every record except telemetry, by kind and key.
 pub async fn all(connection: &mut SqliteConnection) -> Result<BTreeMap<(&'static str, String), Record>, StoreError> {
     let mut found = BTreeMap::new();

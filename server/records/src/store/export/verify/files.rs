@@ -66,13 +66,21 @@ impl ExportFiles {
         })
     }
 
-    /// The format of the export, which says what columns it has.
-    pub(super) fn format(&self) -> Result<u64, String> {
-        let format = self.json("datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
-        if format > FORMAT {
-            return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+    /// The number of the export's format.
+    ///
+    /// # Errors
+    /// If datapackage.json cannot be read or does not state it.
+    pub fn format(&self) -> Result<u64, String> {
+        let format = self.json("datapackage.json")?["parfocal"]["format"].as_u64();
+        format.ok_or_else(|| "datapackage.json does not state the format of the export".to_owned())
+    }
+
+    /// Refuses an export of another format, whose tables are not known here.
+    pub(super) fn check_format(&self) -> Result<(), String> {
+        match self.format()? {
+            FORMAT => Ok(()),
+            other => Err(format!("another version of parfocal wrote it (format {other}); verify it with that version")),
         }
-        Ok(format)
     }
 
     /// The names of the columns of CSV file `file`.

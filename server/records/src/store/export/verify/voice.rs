@@ -18,7 +18,7 @@ struct Piece {
     sha256: String,
 }
 
-/// Checks the recordings of an export whose format has them.
+/// Checks the recordings of an export.
 pub(super) fn voice(export: &ExportFiles) -> Outcome {
     let pieces = pieces(export)?;
     let erased = erased(export)?;
