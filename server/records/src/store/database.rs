@@ -19,6 +19,7 @@ use parfocal_base::files::make_private;
 use parfocal_base::{BlurRate, PolicyName};
 
 use super::counts::Counts;
+use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
@@ -179,16 +180,30 @@ impl Store {
         self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Telemetry)
     }
 
+    /// Writes records, in a turn of their own. What `write` has committed is on disk when this returns.
+    pub(super) async fn write<T>(
+        &self,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let turn = self.turn().await;
+        turn.write(&self.inner.trial, write).await
+    }
+
+    /// Writes telemetry, in a turn of its own.
+    pub(super) async fn write_telemetry<T>(
+        &self,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let turn = self.telemetry_turn().await;
+        turn.write(&self.inner.telemetry, write).await
+    }
+
     /// Records that a device started or stopped working.
     ///
     /// # Errors
     /// If the disk or database fails.
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let recorded = insert_device_event(&mut connection, self.inner.run, event).await;
-        turn.end(connection, &recorded);
-        recorded
+        self.write(async |connection| insert_device_event(connection, self.inner.run, event).await).await
     }
 
     /// Adds participant `code`. A participant that exists already stays as it is.
@@ -196,11 +211,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let added = insert_participant(&mut connection, code, &wall.to_string()).await;
-        turn.end(connection, &added);
-        added
+        self.write(async |connection| insert_participant(connection, code, &wall.to_string()).await).await
     }
 
     /// Limits the database to `pages` pages, so that tests can simulate a full disk.
@@ -234,21 +245,18 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let mut transaction = begin(&mut connection).await?;
     seal_what_was_left(&mut transaction, &wall).await?;
 
-    let done = sqlx::query(
-        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, blur, weights, seed)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(&wall)
-    .bind(nanoseconds(run.at))
-    .bind(env!("CARGO_PKG_VERSION"))
-    .bind(&run.camera)
-    .bind(&run.lens)
-    .bind(&run.calibration)
-    .bind(run.blur.map(BlurRate::get))
-    .bind(weights)
-    .bind(run.seed.map(u64::cast_signed))
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("runs")
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(run.at))
+        .set("version", env!("CARGO_PKG_VERSION"))
+        .set("camera", &run.camera)
+        .set("lens", &run.lens)
+        .set("calibration", &run.calibration)
+        .set("blur", run.blur.map(BlurRate::get))
+        .set("weights", weights)
+        .set("seed", run.seed.map(u64::cast_signed))
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid();
     chain::append(&mut transaction, "run", &number.to_string(), &wall).await?;
@@ -274,17 +282,15 @@ async fn insert_device_event(
 ) -> Result<(), StoreError> {
     let wall = event.wall.to_string();
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
-    )
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(event.at))
-    .bind(&event.device)
-    .bind(event.working)
-    .bind(&event.message)
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("device_events")
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(event.at))
+        .set("device", &event.device)
+        .set("working", event.working)
+        .set("message", &event.message)
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "device", &number, &wall).await?;

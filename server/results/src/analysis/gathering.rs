@@ -1,11 +1,11 @@
 //! Reads from the database what is analysed of a study's sessions: numbers by setting, and words.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::outcomes::{is_ranking, of_answer, of_motion, of_ranks, rank_name};
 use super::report::{AnalysedSession, SettingWords, Words};
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_records::store::{Latest, Motion, Reader, RunClocks, StoreError, StoredSession, standings};
+use parfocal_records::store::{Erased, Latest, Motion, Reader, RunClocks, StoreError, StoredSession, standings};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
@@ -123,12 +123,7 @@ impl<'a> Gathering<'a> {
         corrections: &Latest,
     ) -> Result<GatheredSession, StoreError> {
         let session = self.gathered.session;
-        let erased: BTreeSet<(Erasable, String)> = reader
-            .erasures(session)
-            .await?
-            .into_iter()
-            .map(|stored| (stored.erasure.subject, stored.erasure.record))
-            .collect();
+        let erased = Erased::by(&reader.erasures(session).await?);
 
         for motion in reader.motions_of_ended(session).await? {
             self.take_motion(&motion);
@@ -144,7 +139,7 @@ impl<'a> Gathering<'a> {
                 CommentContent::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
             };
             // The sound may be erased while its transcript is kept.
-            let erased = !is_typed && erased.contains(&(Erasable::Comment, comment.key.to_string()));
+            let erased = !is_typed && erased.at(Erasable::Comment, &comment.key).is_some();
             self.take_words(comment.segment, Words { question: None, text, late: comment.late, erased });
         }
 
@@ -153,7 +148,7 @@ impl<'a> Gathering<'a> {
         for ((_, answer), standing) in answers.iter().zip(standings).filter(|(_, standing)| standing.counts) {
             let Some(question) = self.protocol.question(&answer.question, answer.segment.is_some()) else { continue };
             let value = corrections.value(&answer.key).unwrap_or(standing.value);
-            let erased = erased.contains(&(Erasable::Answer, answer.key.to_string()));
+            let erased = erased.at(Erasable::Answer, &answer.key).is_some();
             self.take_answer(question, answer.segment, &value, erased);
         }
 

@@ -1,11 +1,9 @@
 //! Erases words, together with everything that the database has about them.
 
-use std::collections::BTreeSet;
-
 use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Answer, Comment, Erasure, StoredCorrection};
+use parfocal_records::store::{Answer, Comment, Erased, Erasure, StoredCorrection};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -72,10 +70,9 @@ impl Shared {
         let notes = notes.filter(|stored| stored.correction.field == Field::Note);
         let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
 
-        let erased = reader.erasures(session).await?;
-        let erased: BTreeSet<(Erasable, String)> =
-            erased.into_iter().map(|stored| (stored.erasure.subject, stored.erasure.record)).collect();
-        let left = comments.chain(answers).chain(notes).filter(|record| !erased.contains(record));
+        let erased = Erased::by(&reader.erasures(session).await?);
+        let is_left = |(subject, record): &(Erasable, String)| erased.at(*subject, record).is_none();
+        let left = comments.chain(answers).chain(notes).filter(is_left);
         Ok(left.collect())
     }
 

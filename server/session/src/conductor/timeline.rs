@@ -11,7 +11,7 @@ use super::course::Course;
 use super::{ConductError, Conductor};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{Answer, Latest, PathPoint, Recorded, RunClocks, StoredErasure, standings};
+use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
@@ -20,6 +20,7 @@ use parfocal_trial::protocol::Record;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
+use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::standing::Standing;
 use parfocal_trial::voice::Ending;
 
@@ -168,13 +169,13 @@ impl Conductor {
         };
 
         let notes = Latest::of(&reader.corrections(session).await?);
-        let erasures = reader.erasures(session).await?;
+        let erased = Erased::by(&reader.erasures(session).await?);
         let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
         let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
             key: comment.key,
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
-            erased: erased(&erasures, Erasable::Comment, &comment.key),
+            erased: erased.at(Erasable::Comment, &comment.key),
             voice: (comment.said == CommentContent::Voice)
                 .then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
             at: comment.stamp.wall,
@@ -262,13 +263,6 @@ fn told_of(recorded: &Recorded) -> TimelineVoice {
     }
 }
 
-/// When the words of the record with this key were erased; `None` if they were not.
-pub(super) fn erased(erasures: &[StoredErasure], subject: Erasable, key: &IdempotencyKey) -> Option<Timestamp> {
-    let key = key.to_string();
-    let its_own = |stored: &&StoredErasure| stored.erasure.subject == subject && stored.erasure.record == key;
-    erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
-}
-
 fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {
     let standings = standings(answers, runs);
     let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
@@ -291,22 +285,12 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
 }
 
 fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
-    let mut spans: Vec<SettingSpan> = Vec::new();
-    for &(at, kind) in events {
-        match kind {
-            EventKind::SegmentStarted { segment } => {
-                spans.push(SettingSpan { setting: course.setting(*segment), from: at, to: None });
-            }
-            EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
-                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
-                    open.to = Some(at);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    spans
+    let span = |Inspection { segment, began, ended, .. }: Inspection<f64>| SettingSpan {
+        setting: course.setting(segment),
+        from: began,
+        to: ended,
+    };
+    inspections(events.iter().copied()).into_iter().map(span).collect()
 }
 
 /// When the session was paused. A restart is recorded only when the server is back, but the pause starts when the

@@ -11,6 +11,7 @@
 //! If there are no questions, their step is skipped. Every phase from Notice to Closing can be paused and aborted.
 
 mod decide;
+mod inspections;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 pub use decide::{decide, decide_restart, decide_time};
+pub use inspections::{Inspection, inspections};
 
 use super::event::{Event, EventKind};
 use super::phase::Phase;

@@ -7,6 +7,7 @@ use super::form::{Entry, Head, link, sealed};
 use super::kinds::{Kind, kind};
 use super::records::{Record, one};
 use crate::store::StoreError;
+use crate::store::insert::Insert;
 
 /// A row to be written.
 pub struct NewRow<'a> {
@@ -80,30 +81,23 @@ pub async fn insert(connection: &mut SqliteConnection, row: NewRow<'_>) -> Resul
 
     let number = before.number + 1;
     let hash = link(number, &before.hash, &entry.hash());
-    sqlx::query(
-        "INSERT INTO chain (number, wall, kind, key, session, place, salt, sealed, content, previous, hash)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(number)
-    .bind(&entry.wall)
-    .bind(&entry.kind)
-    .bind(&entry.key)
-    .bind(Some(&entry.session).filter(|session| !session.is_empty()))
-    .bind(entry.place)
-    .bind(&entry.salt)
-    .bind(&entry.sealed)
-    .bind(&entry.content)
-    .bind(&before.hash)
-    .bind(&hash)
-    .execute(&mut *connection)
-    .await?;
+    Insert::into("chain")
+        .set("number", number)
+        .set("wall", &entry.wall)
+        .set("kind", &entry.kind)
+        .set("key", &entry.key)
+        .set("session", Some(&entry.session).filter(|session| !session.is_empty()))
+        .set("place", entry.place)
+        .set("salt", &entry.salt)
+        .set("sealed", &entry.sealed)
+        .set("content", &entry.content)
+        .set("previous", &before.hash)
+        .set("hash", &hash)
+        .execute(connection)
+        .await?;
 
     if !row.sealed_salt.is_empty() {
-        sqlx::query("INSERT INTO chain_salts (number, salt) VALUES (?, ?)")
-            .bind(number)
-            .bind(&row.sealed_salt)
-            .execute(connection)
-            .await?;
+        Insert::into("chain_salts").set("number", number).set("salt", &row.sealed_salt).execute(connection).await?;
     }
 
     Ok(Head { number, hash })

@@ -1,5 +1,5 @@
 //! The data dictionary: every table of an export, with a struct for its rows. A new column is a new field here, and the
-//! compiler shows where its value is still missing.
+//! compiler shows where its value is still missing. `open()` and `sealed()` say which columns the chain hashes, and how.
 
 use jiff::Timestamp;
 
@@ -44,16 +44,16 @@ table! {
     /// A start of the server.
     #[derive(Debug, Clone)]
     RunRow {
-        run: i64 = means("Start of the server, counting from 1"),
-        wall: Timestamp = means("The wall clock at the start").in_unit("UTC"),
-        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns"),
-        version: String = means("Version of parfocal"),
-        camera: String = means("The camera"),
-        lens: String = means("The lens"),
-        calibration: String = means("The sensor's calibration: name, unit, version and date"),
+        run: i64 = means("Start of the server, counting from 1").open(),
+        wall: Timestamp = means("The wall clock at the start").in_unit("UTC").open(),
+        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns").open(),
+        version: String = means("Version of parfocal").open(),
+        camera: String = means("The camera").open(),
+        lens: String = means("The lens").open(),
+        calibration: String = means("The sensor's calibration: name, unit, version and date").open(),
         blur: Option<f64> =
             means("How fast the optic blurs a unit of focal power, as the policies were told; else empty")
-                .in_unit("px"),
+                .in_unit("px").open(),
     }
 }
 
@@ -65,21 +65,21 @@ table! {
     /// A session.
     #[derive(Debug, Clone)]
     SessionRow {
-        session: SessionId = SESSION,
-        participant: String = means("Participant's code"),
-        protocol: String = means("Protocol's name; its text is protocol.toml"),
-        protocol_sha256: String = means("SHA-256 of protocol.toml"),
-        practice: bool = means("Whether it is practice, never to be mixed with real data"),
-        algorithm: &'static str = means("Algorithm that drew the order from the seed"),
+        session: SessionId = SESSION.open(),
+        participant: String = means("Participant's code").open(),
+        protocol: String = means("Protocol's name; its text is protocol.toml").open(),
+        protocol_sha256: String = means("SHA-256 of protocol.toml").open(),
+        practice: bool = means("Whether it is practice, never to be mixed with real data").open(),
+        algorithm: &'static str = means("Algorithm that drew the order from the seed").open(),
         commitment: String =
-            means("SHA-256 published when the session was made; commits to seed and order"),
-        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC"),
-        run: i64 = means("Start of the server that made it; see runs"),
+            means("SHA-256 published when the session was made; commits to seed and order").open(),
+        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC").open(),
+        run: i64 = means("Start of the server that made it; see runs").open(),
         status: SessionStatus = means("under-way, completed or aborted"),
         settings: i64 = means("Settings in all"),
         finished_settings: i64 = means("Settings inspected to the end"),
         comments: i64 = means("Comments kept"),
-        monotonic_ns: i64 = MONOTONIC,
+        monotonic_ns: i64 = MONOTONIC.open(),
         unblinded: &'static str =
             means("no; after-end; emergency-after-end; or while-under-way, which is emergency unblinding, too"),
         counts_until: Option<Timestamp> = means(
@@ -124,25 +124,25 @@ table! {
     #[derive(Debug, Clone)]
     CommentRow {
         number: usize = means("Order of the comment in the session, from 1"),
-        key: IdempotencyKey = KEY,
-        session: SessionId = SESSION,
+        key: IdempotencyKey = KEY.open(),
+        session: SessionId = SESSION.open(),
         setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT,
+        segment: Option<SegmentId> = SEGMENT.open(),
         kind: &'static str = means(
             "text (typed), quick (one tap), mark (\"mark this moment\") or voice (said aloud; see voice)",
-        ),
-        text: Option<String> = means("What was said, as it was said; empty for a mark and for voice"),
-        frame: Option<u64> = means("Number of the frame on the surgeon's screen"),
-        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        client_millis: Option<i64> = CLIENT_MILLIS,
-        waited_ms: Option<i64> = WAITED,
-        waited_by: Option<&'static str> = WAITED_BY,
-        device: Option<DeviceId> = DEVICE,
-        sequence: Option<i64> = SEQUENCE,
-        late: bool = LATE,
+        ).open(),
+        text: Option<String> = means("What was said, as it was said; empty for a mark and for voice").sealed(),
+        frame: Option<u64> = means("Number of the frame on the surgeon's screen").open(),
+        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        client_millis: Option<i64> = CLIENT_MILLIS.open(),
+        waited_ms: Option<i64> = WAITED.open(),
+        waited_by: Option<&'static str> = WAITED_BY.open(),
+        device: Option<DeviceId> = DEVICE.open(),
+        sequence: Option<i64> = SEQUENCE.open(),
+        late: bool = LATE.open(),
         erased: Option<Timestamp> = ERASED,
     }
 }
@@ -156,11 +156,11 @@ table! {
     #[derive(Debug, Clone)]
     AnswerRow {
         number: usize = means("Order of the answer in the session, from 1"),
-        key: IdempotencyKey = KEY,
-        session: SessionId = SESSION,
+        key: IdempotencyKey = KEY.open(),
+        session: SessionId = SESSION.open(),
         setting: Option<usize> = means("Setting asked about, from 1; empty for a closing question"),
-        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
-        question: String = means("Question's id in the protocol"),
+        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question").open(),
+        question: String = means("Question's id in the protocol").open(),
         question_text: Option<String> = means("The question as the surgeon read it"),
         kind: Option<&'static str> = means(
             "text, likert, visual-analogue, ranking, sus, nasa-tlx, surg-tlx or recognition",
@@ -179,22 +179,22 @@ table! {
         ),
         given_value: Option<String> = means(
             "JSON: what was given this time, before items of a questionnaire given earlier were joined to it",
-        ),
+        ).sealed(),
         sus_score: Option<f64> = means("System Usability Scale score, 0..100").in_unit("points"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
         given: Timestamp = means(
             "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one \
              device are ordered by sequence all the same",
         )
         .in_unit("UTC"),
-        client_millis: Option<i64> = CLIENT_MILLIS,
-        waited_ms: Option<i64> = WAITED,
-        waited_by: Option<&'static str> = WAITED_BY,
-        device: Option<DeviceId> = DEVICE,
-        sequence: Option<i64> = SEQUENCE,
-        late: bool = LATE,
+        client_millis: Option<i64> = CLIENT_MILLIS.open(),
+        waited_ms: Option<i64> = WAITED.open(),
+        waited_by: Option<&'static str> = WAITED_BY.open(),
+        device: Option<DeviceId> = DEVICE.open(),
+        sequence: Option<i64> = SEQUENCE.open(),
+        late: bool = LATE.open(),
         disagrees: bool = means(
             "Whether it is its device's last answer to the question, and another device's last answer \
              differs",
@@ -242,20 +242,20 @@ table! {
     /// A correction.
     #[derive(Debug, Clone)]
     CorrectionRow {
-        number: i64 = means("Order of the record in the database"),
-        session: SessionId = SESSION,
-        subject: &'static str = means("What was corrected: session, answer or comment"),
-        record: String = means("The key of the answer or comment, or the session's id"),
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        subject: &'static str = means("What was corrected: session, answer or comment").open(),
+        record: String = means("The key of the answer or comment, or the session's id").open(),
         field: &'static str = means(
             "What of it: participant, value (of an answer, JSON), or note (beside an answer or a comment)",
-        ),
-        old_value: String = means("What stood there so far"),
-        new_value: String = means("What is right"),
-        reason: String = means("Why, as the researcher said"),
-        role: Role = means("Who did it: researcher"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        ).open(),
+        old_value: String = means("What stood there so far").sealed(),
+        new_value: String = means("What is right").sealed(),
+        reason: String = means("Why, as the researcher said").sealed(),
+        role: Role = means("Who did it: researcher").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
         erased: Option<Timestamp> = ERASED,
     }
 }
@@ -268,16 +268,16 @@ table! {
     /// A consent.
     #[derive(Debug, Clone)]
     ConsentRow {
-        number: i64 = means("Order of the record in the database"),
-        session: SessionId = SESSION,
-        text_version: String = means("Version of the text"),
-        given_on: String = means("The day on which it was given, YYYY-MM-DD"),
-        obtained_by: String = means("Who obtained it: initials or a code"),
-        medium: &'static str = means("paper or screen"),
-        role: Role = means("Who recorded it: operator"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        text_version: String = means("Version of the text").open(),
+        given_on: String = means("The day on which it was given, YYYY-MM-DD").open(),
+        obtained_by: String = means("Who obtained it: initials or a code").sealed(),
+        medium: &'static str = means("paper or screen").open(),
+        role: Role = means("Who recorded it: operator").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 
@@ -289,15 +289,15 @@ table! {
     /// An erasure.
     #[derive(Debug, Clone)]
     ErasureRow {
-        number: i64 = means("Order of the record in the database"),
-        session: SessionId = SESSION,
-        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event"),
-        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER"),
-        reason: String = means("Why, as the researcher said"),
-        role: Role = means("Who did it: researcher"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event").open(),
+        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER").open(),
+        reason: String = means("Why, as the researcher said").sealed(),
+        role: Role = means("Who did it: researcher").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 
@@ -328,24 +328,24 @@ table! {
     /// An event.
     #[derive(Debug, Clone)]
     EventRow {
-        session: SessionId = SESSION,
-        number: u32 = means("Order of the event in the session, from 1"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
+        session: SessionId = SESSION.open(),
+        number: u32 = means("Order of the event in the session, from 1").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)").open(),
         kind: &'static str = means(
             "created, started, segment-started, segment-finished, questions-finished, paused, resumed, \
              server-restarted, completed, aborted, withdrawn or unblinded",
-        ),
+        ).open(),
         setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT,
+        segment: Option<SegmentId> = SEGMENT.open(),
         inspected_ms: Option<u64> =
-            means("Time inspected in the segment by then, without pauses").in_unit("ms"),
+            means("Time inspected in the segment by then, without pauses").in_unit("ms").open(),
         reason: Option<String> = means(
             "Reason given; that of an unblinding is only in allocation.json, as it may name a policy",
-        ),
-        emergency: Option<bool> = means("For an unblinding: whether the session was still under way"),
+        ).sealed(),
+        emergency: Option<bool> = means("For an unblinding: whether the session was still under way").open(),
     }
 }
 
@@ -361,13 +361,13 @@ table! {
     /// A change in the state of camera or lens.
     #[derive(Debug, Clone)]
     DeviceRow {
-        number: i64 = means("Order of the record in the database"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        device: String = means("camera or lens"),
-        working: bool = means("Whether it worked from then on"),
-        message: String = means("What it said of itself, or what was changed"),
+        number: i64 = means("Order of the record in the database").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        device: String = means("camera or lens").open(),
+        working: bool = means("Whether it worked from then on").open(),
+        message: String = means("What it said of itself, or what was changed").open(),
     }
 }
 
@@ -411,15 +411,15 @@ table! {
     /// A look at the evidence.
     #[derive(Debug, Clone)]
     AccessRow {
-        number: i64 = means("Order of the record in the database"),
-        wall: Timestamp = WALL,
+        number: i64 = means("Order of the record in the database").open(),
+        wall: Timestamp = WALL.open(),
         run: Option<i64> =
-            means("Start of the server that recorded it; empty for the command line"),
-        monotonic_ns: Option<i64> = MONOTONIC,
-        role: String = means("Who: researcher, or command-line"),
-        kind: String = means("path-viewed, recording-viewed or exported"),
-        session: SessionId = SESSION,
-        detail: Option<String> = means("Of an export: blinded or unblinded"),
+            means("Start of the server that recorded it; empty for the command line").open(),
+        monotonic_ns: Option<i64> = MONOTONIC.open(),
+        role: String = means("Who: researcher, or command-line").open(),
+        kind: String = means("path-viewed, recording-viewed or exported").open(),
+        session: SessionId = SESSION.open(),
+        detail: Option<String> = means("Of an export: blinded or unblinded").open(),
     }
 }
 
@@ -431,11 +431,11 @@ table! {
     /// A study.
     #[derive(Debug, Clone)]
     StudyRow {
-        study: String = means("The study's name: the same at every site"),
+        study: String = means("The study's name: the same at every site").open(),
         title: String = means("Its title"),
-        definition_sha256: String = means("SHA-256 of study.toml: the same at every site"),
-        sites: String = means("JSON: the names of its sites that this database runs"),
-        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC"),
+        definition_sha256: String = means("SHA-256 of study.toml: the same at every site").open(),
+        sites: String = means("JSON: the names of its sites that this database runs").open(),
+        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC").open(),
         stage: &'static str = means("planned, open, closed, locked or unblinded"),
         commitment: Option<String> =
             means("SHA-256 published when it was first opened; commits to the orders of all its places here"),
@@ -450,11 +450,11 @@ table! {
     /// The place of a session in a study.
     #[derive(Debug, Clone)]
     StudySessionRow {
-        session: SessionId = SESSION,
-        study: String = means("The study's name"),
-        site: String = means("The site's name"),
-        protocol: String = means("The protocol's name"),
-        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order"),
+        session: SessionId = SESSION.open(),
+        study: String = means("The study's name").open(),
+        site: String = means("The site's name").open(),
+        protocol: String = means("The protocol's name").open(),
+        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order").open(),
     }
 }
 
@@ -468,20 +468,20 @@ table! {
     /// An event of a study.
     #[derive(Debug, Clone)]
     StudyEventRow {
-        study: String = means("The study's name"),
-        number: i64 = means("Order of the event in the study, from 1"),
-        wall: Timestamp = WALL,
-        run: Option<i64> = means("Start of the server that recorded it; empty for the command line"),
-        monotonic_ns: Option<i64> = MONOTONIC,
-        role: String = means("How it was recorded: researcher (on the page), or command-line"),
-        person: String = means("Who, as the person said"),
+        study: String = means("The study's name").open(),
+        number: i64 = means("Order of the event in the study, from 1").open(),
+        wall: Timestamp = WALL.open(),
+        run: Option<i64> = means("Start of the server that recorded it; empty for the command line").open(),
+        monotonic_ns: Option<i64> = MONOTONIC.open(),
+        role: String = means("How it was recorded: researcher (on the page), or command-line").open(),
+        person: String = means("Who, as the person said").open(),
         kind: String = means(
             "planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded, which is \
              emergency unblinding of one session",
-        ),
-        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study"),
-        commitment: Option<String> = means("Of the first opening: commits to all orders"),
-        reason: String = means("Reason given"),
+        ).open(),
+        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study").open(),
+        commitment: Option<String> = means("Of the first opening: commits to all orders").open(),
+        reason: String = means("Reason given").sealed(),
     }
 }
 
@@ -494,12 +494,12 @@ table! {
     /// The account behind a record.
     #[derive(Debug, Clone, sqlx::FromRow)]
     ActorRow {
-        number: i64 = means("Order of the row in the database"),
-        kind: String = means("Kind of the record, as in chain.csv"),
-        record: String = means("Key of the record, as in chain.csv"),
-        session: String = means("Session id"),
-        account: String = means("The account's name"),
-        display: String = means("The person's name then"),
+        number: i64 = means("Order of the row in the database").open(),
+        kind: String = means("Kind of the record, as in chain.csv").open(),
+        record: String = means("Key of the record, as in chain.csv").open(),
+        session: String = means("Session id").open(),
+        account: String = means("The account's name").open(),
+        display: String = means("The person's name then").open(),
     }
 }
 
@@ -543,18 +543,18 @@ table! {
     /// A piece of a recording.
     #[derive(Debug, Clone)]
     VoicePieceRow {
-        number: i64 = means("Order of the record in the database"),
-        session: SessionId = SESSION,
-        comment: IdempotencyKey = means("Key of the comment, as in comments.csv"),
-        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another"),
-        media_type: &'static str = means("What it is, as the browser recorded it"),
-        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms"),
-        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice"),
-        bytes: i64 = means("Its length"),
-        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").open(),
+        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another").open(),
+        media_type: &'static str = means("What it is, as the browser recorded it").open(),
+        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms").open(),
+        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice").open(),
+        bytes: i64 = means("Its length").open(),
+        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 

@@ -36,6 +36,19 @@ pub struct Column {
     pub unit: &'static str,
     /// What it means.
     pub description: &'static str,
+    /// Whether and how the chain hashes it.
+    pub proof: Proof,
+}
+
+/// Whether and how the chain hashes a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Proof {
+    /// Not at all: it follows from other columns or from other records.
+    None,
+    /// Openly: no export withholds it.
+    Open,
+    /// With a salt: it can be withheld or erased.
+    Sealed,
 }
 
 /// The format of exports that this version writes. A change of the tables or their columns gives it another number.
@@ -160,12 +173,13 @@ impl<T: Cell> Cell for Option<T> {
 pub struct Meaning {
     unit: &'static str,
     description: &'static str,
+    proof: Proof,
 }
 
-/// A column that means `description` and has no unit.
+/// A column that means `description`, has no unit, and is not hashed.
 #[must_use]
 pub const fn means(description: &'static str) -> Meaning {
-    Meaning { unit: "", description }
+    Meaning { unit: "", description, proof: Proof::None }
 }
 
 impl Meaning {
@@ -175,10 +189,22 @@ impl Meaning {
         Self { unit, ..self }
     }
 
+    /// The same in a column that the chain hashes openly.
+    #[must_use]
+    pub const fn open(self) -> Self {
+        Self { proof: Proof::Open, ..self }
+    }
+
+    /// The same in a column that the chain hashes with a salt.
+    #[must_use]
+    pub const fn sealed(self) -> Self {
+        Self { proof: Proof::Sealed, ..self }
+    }
+
     /// The column called `name`.
     #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
-        Column { name, kind, unit: self.unit, description: self.description }
+        Column { name, kind, unit: self.unit, description: self.description, proof: self.proof }
     }
 }
 
@@ -359,7 +385,7 @@ mod tests {
     use super::*;
 
     fn column(kind: Type) -> Column {
-        Column { name: "text", kind, unit: "", description: "" }
+        Column { name: "text", kind, unit: "", description: "", proof: Proof::None }
     }
 
     #[test]

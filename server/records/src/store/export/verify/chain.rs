@@ -11,7 +11,7 @@ use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
 use crate::store::chain::{
-    Block, Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, netstring,
+    Block, Entry, Fields, Head, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
 };
 use crate::store::export::description::{ALL, ChainRow};
 use crate::store::export::table::Row;
@@ -152,20 +152,11 @@ fn records(export: &ExportFiles) -> Result<BTreeMap<(&'static str, String), Reco
     let mut found = BTreeMap::new();
     // Some kinds have no table in exports: of participants, an export has only the session's code.
     let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table);
-    for kind in KINDS.iter().filter(told) {
+    for kind in kinds().iter().filter(told) {
         for mut row in rows(export, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
-            let key = match kind.name {
-                "run" => cell(&row, "run"),
-                "session" | "study-session" => cell(&row, "session"),
-                "event" => format!("{}/{}", cell(&row, "session"), cell(&row, "number")),
-                "device" | "access" | "correction" | "consent" | "erasure" | "actor" | "voice-piece" => {
-                    cell(&row, "number")
-                }
-                "study" => cell(&row, "study"),
-                "study-event" => format!("{}/{}", cell(&row, "study"), cell(&row, "number")),
-                _ => cell(&row, "key"),
-            };
+            let key: Vec<String> = kind.key.iter().map(|column| cell(&row, column)).collect();
+            let key = key.join("/");
 
             if kind.name == "session" {
                 row.insert("segments".to_owned(), export.cells("segments.csv", "segment")?.join(","));
@@ -177,12 +168,12 @@ fn records(export: &ExportFiles) -> Result<BTreeMap<(&'static str, String), Reco
             }
 
             let all = |columns: &[&str]| columns.iter().map(|column| cell(&row, column)).collect();
-            let session = if matches!(kind.name, "run" | "device") { String::new() } else { cell(&row, "session") };
+            let session = if kind.of_session { cell(&row, "session") } else { String::new() };
             let record = Record {
                 session,
                 order: cell(&row, "number").parse().unwrap_or_default(),
-                open: all(kind.open),
-                sealed: (!withheld).then(|| all(kind.sealed)),
+                open: all(&kind.open),
+                sealed: (!withheld).then(|| all(&kind.sealed)),
             };
             if found.insert((kind.name, key.clone()), record).is_some() {
                 return Err(format!("{}: {} {key} appears twice", kind.table, kind.name));
