@@ -17,7 +17,7 @@ use parfocal_trial::correction::{Field, Subject};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
 use parfocal_trial::grace::Outstanding;
-use parfocal_trial::instruments::{Measure, in_words, measures, sus};
+use parfocal_trial::instruments::{Measure, in_words, measures, sus_score};
 use parfocal_trial::participant::ParticipantCode;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::question::{AnswerValue, QuestionKind};
@@ -263,10 +263,7 @@ impl Conductor {
                 at: answer.stamp.wall,
                 setting: answer.segment.map(|segment| course.setting(segment)),
                 text: question.map(|question| question.text.clone()).unwrap_or_default(),
-                sus_score: match (kind, &standing.value) {
-                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
-                    _ => None,
-                },
+                sus_score: sus_score(kind, &standing.value),
                 kind: kind.map(QuestionKind::name),
                 key: answer.key,
                 words: in_words(kind, &standing.value),

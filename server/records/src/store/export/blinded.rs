@@ -26,10 +26,10 @@ use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::grace::Grace;
-use parfocal_trial::instruments::sus;
+use parfocal_trial::instruments::sus_score;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
-use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::question::QuestionKind;
 use parfocal_trial::remark::WaitClock;
 use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::standing::Standing;
@@ -299,11 +299,6 @@ impl Blinded {
         let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), usize)| {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
-            let sus_score = match (kind, &standing.value) {
-                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
-                _ => None,
-            };
-
             AnswerRow {
                 number,
                 key: answer.key,
@@ -317,7 +312,7 @@ impl Blinded {
                 counts: standing.counts,
                 value: serde_json::to_string(&standing.value).ok(),
                 given_value: serde_json::to_string(&answer.value).ok(),
-                sus_score,
+                sus_score: sus_score(kind, &standing.value),
                 wall: answer.stamp.wall,
                 run: *run,
                 monotonic_ns: nanoseconds(answer.stamp.at),
