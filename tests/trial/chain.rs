@@ -212,22 +212,6 @@ async fn steps_put_at_the_end_of_an_old_session_are_found() {
     assert!(wrong.contains("telemetry: 1 steps of segment") && wrong.contains("inserted"), "{wrong}");
 }
 
-/// The records of every kind in `chain.sql` and the chain that `tests/vectors/chain.py` computes for them, from
-/// docs/evidence.md alone. If this fails, the bytes that are hashed have changed.
-#[tokio::test]
-async fn the_chain_has_the_bytes_of_its_description() {
-    let folder = tempfile::tempdir().unwrap();
-    let pool = crate::storage::raw(folder.path()).await;
-    MIGRATOR.run(&pool).await.unwrap();
-    sqlx::raw_sql(include_str!("../vectors/chain.sql")).execute(&pool).await.unwrap();
-    pool.close().await;
-
-    let head = "35:6bb1752996ce009da0cbe600be9c6bcd3d2fd2fa1c8d6d1c03acb77ccec12891";
-    let checks = verify_database(folder.path(), Some(head.parse().unwrap())).await.unwrap();
-    let expected = "35 rows, 35 of them whole; head 35:6bb1752996ce009da0cbe600be9c6bcd; 1 have erased words";
-    assert_eq!(said(&checks, "chain").as_deref(), Ok(expected));
-}
-
 /// The verification's result for the export in `out` with `file` changed by `change`. Restores the file.
 fn with_changed(out: &Path, file: &str, change: impl FnOnce(&str) -> String) -> Result<String, String> {
     let path = out.join(file);
