@@ -4,12 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use parfocal_base::ids::{DeviceId, SessionId};
-use parfocal_records::store::MIGRATOR;
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
-use parfocal_trial::phase::Phase;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::{Holding, NewAnswer, Origin, WaitClock};
 use parfocal_trial::role::Role;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::export::{ExportError, export};
-use parfocal_records::store::{Reader, StoreError};
 use parfocal_session::conductor::{ConductError, Studies, StudySite};
 use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
