@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::PackageError;
+use parfocal_base::files::is_systems_own;
 use parfocal_records::store::export::verify::{Verdict, is_export, verify_files};
 use parfocal_records::store::export::{ExportFiles, FORMAT};
 
@@ -18,6 +19,10 @@ pub const SESSIONS: &str = "sessions";
 pub struct LeftOut {
     /// The session.
     pub session: String,
+    /// Name of the session's site.
+    pub site: String,
+    /// Name of the session's protocol.
+    pub protocol: String,
     /// Why it is not in the package.
     pub reason: String,
 }
@@ -123,7 +128,10 @@ pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
 
     let mut folders = Vec::new();
     for entry in std::fs::read_dir(&sessions).map_err(PackageError::unreadable(&sessions))? {
-        folders.push(entry.map_err(PackageError::unreadable(&sessions))?.path());
+        let entry = entry.map_err(PackageError::unreadable(&sessions))?;
+        if !is_systems_own(&entry.file_name()) {
+            folders.push(entry.path());
+        }
     }
     folders.sort();
     Ok(folders)

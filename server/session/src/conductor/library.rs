@@ -7,6 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use parfocal_base::PolicyName;
+use parfocal_base::files::is_systems_own;
 use parfocal_trial::protocol::{Protocol, ProtocolError};
 
 /// Protocols that ship, by file name.
@@ -126,7 +127,8 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable(folder))? {
         let path = entry.map_err(unreadable(folder))?.path();
-        if path.extension().is_some_and(|extension| extension == "toml") {
+        let is_protocol = path.extension().is_some_and(|extension| extension == "toml");
+        if is_protocol && !path.file_name().is_some_and(is_systems_own) {
             files.push(path);
         }
     }

@@ -10,6 +10,7 @@ use image::ImageReader;
 use super::clip::Clip;
 use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
+use parfocal_base::files::is_systems_own;
 use parfocal_imaging::{RgbImage, decode_any, is_mosaic};
 
 /// Time for which a still is shown.
@@ -121,7 +122,22 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();
     let mut files = paths.map_err(unreadable)?;
 
-    files.retain(|file| is_picture(file));
+    files.retain(|file| is_picture(file) && !file.file_name().is_some_and(is_systems_own));
     files.sort();
     if files.is_empty() { Err(FootageError::Empty(folder.to_owned())) } else { Ok(files) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_computers_own_files_are_no_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.png", "a.jpg", "._a.jpg", ".DS_Store", "Thumbs.db"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = pictures_in(folder.path()).unwrap();
+        assert_eq!(found, ["a.jpg", "b.png"].map(|name| folder.path().join(name)));
+    }
 }

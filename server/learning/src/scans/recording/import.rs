@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::import_error::ImportError;
 use super::{PosePictures, shot};
 use parfocal_base::FocalPower;
+use parfocal_base::files::is_systems_own;
 use parfocal_devices::camera::footage::picture_reader;
 use parfocal_devices::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
@@ -218,6 +219,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
         files.extend(entries(&folder)?);
     }
 
+    // An operating system's own file may have the name of a picture: `._pose0001_f0.350.png`.
+    files.retain(|file| !file.file_name().is_some_and(is_systems_own));
     files.sort();
     Ok(files)
 }

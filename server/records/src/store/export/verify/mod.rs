@@ -3,6 +3,7 @@
 mod allocation;
 mod chain;
 mod files;
+mod motions;
 mod study;
 mod verdict;
 mod voice;
@@ -29,6 +30,7 @@ use crate::store::export::table::{Row, Table};
 use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
+use parfocal_base::files::{is_systems_own, systems_own_below};
 use study::study;
 use verdict::Outcome;
 use voice::voice;
@@ -98,18 +100,35 @@ fn checksums(export: &ExportFiles) -> Outcome {
         }
     }
 
-    Ok(Verdict::Passed(format!("{} files are as they were exported", listed.len() - 1)))
+    let beside = not_part(export.folder())?;
+    Ok(Verdict::Passed(format!("{} files are as they were exported{beside}", listed.len() - 1)))
+}
+
+/// Names the files in `folder` that operating systems left there, in words to add to a verdict; empty if there are none.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn not_part(folder: &Path) -> Result<String, String> {
+    let found = systems_own_below(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    if found.is_empty() {
+        return Ok(String::new());
+    }
+    let names: Vec<String> = found.iter().map(|name| name.display().to_string()).collect();
+    Ok(format!("; not part of it, and not checked: {}", names.join(", ")))
 }
 
 /// The files of an export, including those in its folder of voice recordings.
 fn file_names(folder: &Path) -> Result<Vec<String>, String> {
     let names = |folder: &Path, before: &str| -> Result<Vec<String>, String> {
         let entries = std::fs::read_dir(folder).map_err(|error| error.to_string())?;
-        let name = |entry: std::io::Result<std::fs::DirEntry>| {
-            let entry = entry.map_err(|error| error.to_string())?;
-            Ok(format!("{before}{}", entry.file_name().to_string_lossy()))
-        };
-        entries.map(name).collect()
+        let mut found = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(|error| error.to_string())?.file_name();
+            if !is_systems_own(&name) {
+                found.push(format!("{before}{}", name.to_string_lossy()));
+            }
+        }
+        Ok(found)
     };
 
     let mut found = names(folder, "")?;
