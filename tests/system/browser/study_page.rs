@@ -3,6 +3,7 @@
 use std::io::Cursor;
 
 use serde_json::json;
+use sha2::{Digest, Sha256};
 
 use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
@@ -155,10 +156,17 @@ async fn a_study_is_led_from_the_pages() {
     page.click("#plan-go").await;
     page.sees("#plan-trouble", "key 'spares': must be from 0 to 500 places, not 1000").await;
     shoot(&page, "study-1-malformed").await;
-    page.paste("#definition", &definition()).await;
+    // A file from Windows: its hash is that of its bytes, as every other site computes it.
+    let text = format!("\u{feff}{}", definition().replace('\n', "\r\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, &text).unwrap();
+    page.type_into("#file", file.to_str().unwrap()).await;
+    until("the file to be shown", || async { page.value("#definition").await.contains("spares = 1\n") }).await;
     page.click("#plan-go").await;
 
     page.sees("#stage", "planned").await;
+    page.sees("main", &hex::encode(Sha256::digest(&text))).await;
     page.sees("main", "Leeds General Infirmary").await;
     page.click("#open").await;
     shoot(&page, "study-2-opening").await;
