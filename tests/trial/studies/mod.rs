@@ -1,5 +1,6 @@
 //! Studies: their definition, their places, their course, and their export and verification.
 
+mod analysis;
 mod blinding;
 mod course;
 mod definition;
