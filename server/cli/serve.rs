@@ -38,7 +38,7 @@ use parfocal_pipeline::control::{self, Command, ControlLoop, Drive, Rig, Setting
 use parfocal_pipeline::live;
 use parfocal_recording as recording;
 use parfocal_records::accounts::{Accounts, Cost};
-use parfocal_records::store::{self, Store, telemetry};
+use parfocal_records::store::{self, Backups, Store, telemetry};
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::{Conductor, Parts};
 use parfocal_session::playback::Player;
@@ -223,6 +223,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         accounts: Accounts::of_server(&store, Arc::clone(&clock), Cost::default()),
         clock,
         study_exports: StudyExports::new(&arguments.data_dir),
+        backups: Backups::new(&arguments.data_dir),
         live,
         store: store.clone(),
         health,

@@ -1,6 +1,7 @@
 //! Trials from outside: conductor, store and export together, on a real database file.
 
 mod accounts;
+mod backups;
 mod balance;
 mod chain;
 mod consent;

@@ -306,6 +306,44 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/backup": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The state of the latest backup that the lead who is signed in asked for. It is kept for 15 minutes, unless words are
+         *     erased.
+         */
+        get: operations["accounts_backup_state"];
+        put?: never;
+        /** Begins to make a backup in the background, and records that. If one is being made already, no other begins. */
+        post: operations["accounts_start_backup"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/backup.db": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The backup as a file for `parfocal restore`. */
+        get: operations["accounts_backup_file"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions": {
         parameters: {
             query?: never;
@@ -1319,6 +1357,8 @@ export interface components {
         Analysis: {
             /** @description SHA-256 of the study's definition. */
             definition_sha256: string;
+            /** @description Names of the definition's sites of which no session is here. */
+            missing_sites: string[];
             /** @description Notes that apply to all figures. */
             notes: string[];
             /** @description The planned analysis, as in the definition. */
@@ -1327,7 +1367,7 @@ export interface components {
             protocols: components["schemas"]["ProtocolAnalysis"][];
             /** @description Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`. */
             seed: string;
-            /** @description Names of the study's sites that this database runs. */
+            /** @description Names of the study's sites that this database, or the databases of this package, run. */
             sites: string[];
             /** @description Name of the study. */
             study: string;
@@ -1375,6 +1415,26 @@ export interface components {
         };
         /** @description The value of an answer. */
         AnswerValue: number | number[] | string;
+        /** @description The state of the latest backup. */
+        BackupState: {
+            /** @enum {string} */
+            state: "none";
+        } | {
+            /** @enum {string} */
+            state: "running";
+        } | {
+            /** @description Size in bytes. */
+            bytes: number;
+            /** @description Head of the backup's chain: number and the beginning of the hash. */
+            head: string;
+            /** @enum {string} */
+            state: "ready";
+        } | {
+            /** @description Reason for the failure, for people. */
+            reason: string;
+            /** @enum {string} */
+            state: "failed";
+        };
         /** @description What can be changed, and whether the last change failed. */
         CameraOffer: {
             /** @description Every setting that the camera offers now. */
@@ -1729,6 +1789,11 @@ export interface components {
             /** @description Description of the event. */
             text: string;
         };
+        /** @description A wish for a backup. */
+        MakeBackup: {
+            /** @description The lead's own passphrase, entered again. */
+            passphrase: string;
+        };
         /** @description An item or a score of an answer as a number. */
         Measure: {
             /** @description Name of the measure for people. */
@@ -2002,9 +2067,11 @@ export interface components {
         };
         /** @description The analysis of a protocol's sessions. */
         ProtocolAnalysis: {
+            /** @description The same for each site alone; empty if all sessions that count are of one site. */
+            by_site: components["schemas"]["SiteAnalysis"][];
             /** @description Notes that apply to this protocol's figures. */
             notes: string[];
-            /** @description The outcomes, compared between the policies. */
+            /** @description The outcomes, compared between the policies, over all sites. */
             outcomes: components["schemas"]["Comparison"][];
             /** @description Names of the policies. */
             policies: string[];
@@ -2395,6 +2462,19 @@ export interface components {
             surgeons: number;
             /** @description Title of the site. */
             title: string;
+        };
+        /** @description The figures of one site's sessions. */
+        SiteAnalysis: {
+            /** @description The outcomes, compared between the policies. */
+            outcomes: components["schemas"]["Comparison"][];
+            /** @description Number of its sessions that count. */
+            sessions: number;
+            /** @description Name of the site. */
+            site: string;
+            /** @description Number of its surgeons whose sessions count. */
+            surgeons: number;
+            /** @description Answers about sessions as a whole. */
+            whole_sessions: components["schemas"]["WholeSessions"][];
         };
         /** @description A site of a study. */
         SiteDetail: components["schemas"]["Site"] & {
@@ -5002,6 +5082,322 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_backup_state: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BackupState"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_start_backup: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MakeBackup"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BackupState"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in, or the lead's passphrase is wrong */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The passphrase is missing */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Too many attempts failed */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_backup_file: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/vnd.sqlite3": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The lead has no backup that is ready */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
                 };
             };
             /** @description The server failed; its log says more */

@@ -37,6 +37,7 @@ declare global {
     type StudyAction = Schemas["StudyAction"];
     type StudyExportProgress = Schemas["StudyExportProgress"];
     type StudyExportState = Schemas["StudyExportState"];
+    type BackupState = Schemas["BackupState"];
     type SurgeonView = Schemas["SurgeonView"];
     type Timeline = Schemas["Timeline"];
     type TimelineComment = Schemas["TimelineComment"];

@@ -26,6 +26,7 @@ macro_rules! assets {
 
 /// All files of `web/static/`, by folder and name. A test compares this table with the folder.
 static ASSETS: &[Asset] = &assets![
+    "accounts/backup.js",
     "accounts/people.js",
     "accounts/sign_in.js",
     "operator/camera_card.js",
@@ -52,6 +53,7 @@ static ASSETS: &[Asset] = &assets![
     "researcher/correction_words.js",
     "researcher/corrections.js",
     "researcher/deeds.js",
+    "researcher/definition.js",
     "researcher/metric_drawing.js",
     "researcher/page.css",
     "researcher/pictures.js",

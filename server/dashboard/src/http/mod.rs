@@ -3,6 +3,7 @@
 mod accounts;
 mod analysis;
 pub mod assets;
+mod backup;
 mod camera;
 mod checks;
 mod connections;
@@ -93,6 +94,7 @@ pub fn router(app: AppState) -> Router {
         .merge(analysis::routes())
         .merge(export::routes())
         .merge(study_export::routes())
+        .merge(backup::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())
         .merge(health::routes())

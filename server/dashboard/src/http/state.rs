@@ -17,7 +17,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::ControlObserver;
 use parfocal_pipeline::live::LiveHandle;
 use parfocal_records::accounts::Accounts;
-use parfocal_records::store::Store;
+use parfocal_records::store::{Backups, Store};
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::Conductor;
 use parfocal_session::playback::Player;
@@ -52,6 +52,8 @@ pub struct App {
     pub registry: Registry,
     /// The exports of whole studies.
     pub study_exports: StudyExports,
+    /// The backups that leads download.
+    pub backups: Backups,
     /// Personal accounts.
     pub accounts: Accounts,
     /// Keys of the three roles.

@@ -164,6 +164,14 @@ async fn note_unfinished(connection: &mut SqliteConnection, number: i64) -> Resu
 }
 
 impl Reader {
+    /// The number of erasures in the database.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub(super) async fn count_erasures(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar("SELECT count(*) FROM erasures").fetch_one(self.pool()).await?)
+    }
+
     /// The erasures in `session`, in the order in which they were made.
     ///
     /// # Errors

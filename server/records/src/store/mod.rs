@@ -8,6 +8,7 @@ mod accesses;
 mod accounts;
 mod actors;
 pub mod backup;
+mod backups;
 mod chain;
 mod consents;
 mod corrections;
@@ -43,6 +44,7 @@ pub use accesses::{Access, Recorder};
 pub use accounts::{
     AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, StoredAccount, StoredSignIn,
 };
+pub use backups::{BackupState, Backups, FinishedBackup};
 pub use chain::Head;
 pub use consents::StoredConsent;
 pub use corrections::{Correction, Latest, StoredCorrection};

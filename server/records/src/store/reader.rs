@@ -94,6 +94,10 @@ impl Reader {
 
     pub(super) async fn check_version(&self) -> Result<(), StoreError> {
         let mut connection = self.pool.acquire().await?;
+        let tables: i64 = sqlx::query_scalar("SELECT count(*) FROM sqlite_master").fetch_one(&mut *connection).await?;
+        if tables == 0 {
+            return Err(StoreError::WithoutLog);
+        }
         let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
         if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
             return Err(StoreError::Newer { version: newer.version });
@@ -105,6 +109,13 @@ impl Reader {
 
     pub(super) const fn pool(&self) -> &SqlitePool {
         &self.pool
+    }
+
+    /// Size of the database in bytes, without its log.
+    pub(super) async fn bytes(&self) -> Result<u64, StoreError> {
+        let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&self.pool).await?;
+        let size: i64 = sqlx::query_scalar("PRAGMA page_size").fetch_one(&self.pool).await?;
+        Ok(u64::try_from(pages.saturating_mul(size)).unwrap_or(0))
     }
 
     /// Copies the database as it is now into `file`, which must be empty or must not exist.
