@@ -28,7 +28,7 @@ use parfocal_base::{BlurRate, PolicyName};
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
 use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach};
+use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
 use parfocal_dashboard::tls::Certificates;
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
@@ -237,6 +237,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         reach: reach.clone(),
         equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
         tablets: OpenTablets::default(),
+        tablet_trials: TabletTrials::default(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.observer(),

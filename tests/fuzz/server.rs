@@ -12,7 +12,7 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
+use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach, TabletTrials};
 use parfocal_dashboard::tls::Certificates;
 use parfocal_imaging::{Calibration, Developer, Size};
 use parfocal_pipeline::live;
@@ -455,6 +455,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
         reach,
         equipment: Equipment::new(None, calibration, None),
         tablets: OpenTablets::default(),
+        tablet_trials: TabletTrials::default(),
         metrics: Metrics::default(),
         shutdown,
         control: control.observer(),

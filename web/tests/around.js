@@ -19,6 +19,7 @@ export const VIEW = {
   questions: [],
   answers: {},
   comments: 3,
+  said: [],
 };
 
 /**

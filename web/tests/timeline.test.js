@@ -24,6 +24,7 @@ const COMMENT = {
   text: "Said",
   at: "2026-01-01T00:00:00Z",
   late: false,
+  withdrawn: false,
   seconds: 0,
 };
 

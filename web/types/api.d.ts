@@ -1200,6 +1200,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/surgeon/tablet-trials": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends. */
+        post: operations["surgeon_tried"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -1518,6 +1535,11 @@ export interface components {
             /** @enum {string} */
             kind: "voice";
             text?: never;
+        } | {
+            /** @enum {string} */
+            kind: "withdrawal";
+            /** @description The surgeon takes back the comment with this key, which stays in the record. */
+            text: components["schemas"]["IdempotencyKey"];
         };
         /** @description A comment, as it is shown. */
         CommentLine: components["schemas"]["CommentContent"] & {
@@ -2680,7 +2702,7 @@ export interface components {
             answers: {
                 [key: string]: components["schemas"]["AnswerValue"];
             };
-            /** @description Number of comments saved so far in this session. */
+            /** @description Number of comments saved so far in this session, without those that were taken back. */
             comments: number;
             /**
              * @description Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
@@ -2704,6 +2726,8 @@ export interface components {
              * @description Seconds of inspection left in the segment when the view was sent; none outside inspection.
              */
             remaining_seconds?: number | null;
+            /** @description The surgeon's own words about each setting, in the order they were said; empty outside the closing questions. */
+            said: string[][];
             segment?: components["schemas"]["SegmentId"] | null;
             /** @description Random id of the session. */
             session: components["schemas"]["SessionId"];
@@ -2763,6 +2787,8 @@ export interface components {
             /** @description Setting, from 1; none outside settings. */
             setting?: number | null;
             voice?: components["schemas"]["TimelineVoice"] | null;
+            /** @description Whether the surgeon took it back at once. */
+            withdrawn: boolean;
         };
         /** @description A point of the focal path. */
         TimelinePoint: {
@@ -2898,6 +2924,25 @@ export interface components {
             question?: string | null;
             /** @description The words; empty if they were erased. */
             text: string;
+        };
+        /**
+         * @description Something that a trial needs of a tablet.
+         * @enum {string}
+         */
+        TabletPart: "encrypted" | "storage" | "disk" | "stream" | "picture" | "microphone" | "screen-on";
+        /** @description One thing that was tried on a tablet. */
+        TriedPart: {
+            /** @description What was tried. */
+            part: components["schemas"]["TabletPart"];
+            /** @description Whether it works. */
+            works: boolean;
+        };
+        /** @description What a tablet found out about itself. */
+        TabletTrial: {
+            /** @description The tablet. */
+            device: components["schemas"]["DeviceId"];
+            /** @description What was tried. */
+            tried: components["schemas"]["TriedPart"][];
         };
     };
     responses: never;
@@ -10794,6 +10839,120 @@ export interface operations {
             };
             /** @description The server listens on a loopback address and was asked for by another name */
             421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    surgeon_tried: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TabletTrial"];
+            };
+        };
+        responses: {
+            /** @description Noted */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": boolean;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is JSON, but not as described */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };

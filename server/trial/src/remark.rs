@@ -98,6 +98,22 @@ pub enum CommentContent {
     Mark,
     /// A spoken comment. Its recording follows in pieces.
     Voice,
+    /// The surgeon takes back the comment with this key, which stays in the record.
+    Withdrawal(IdempotencyKey),
+}
+
+impl CommentContent {
+    /// Whether this says something by itself; a withdrawal is only about another comment.
+    #[must_use]
+    pub const fn says_something(&self) -> bool {
+        !matches!(self, Self::Withdrawal(_))
+    }
+
+    /// Whether the words are in the comment itself. A mark and a withdrawal have none, a voice comment's are a sound.
+    #[must_use]
+    pub const fn has_words(&self) -> bool {
+        matches!(self, Self::Text(_) | Self::Quick(_))
+    }
 }
 
 /// An answer as a surgeon's browser sends it. If there are several answers to a question, the one given last counts, in

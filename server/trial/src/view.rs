@@ -50,8 +50,10 @@ pub struct SurgeonView {
     pub questions: Vec<Question>,
     /// Saved answers to those questions, by question id.
     pub answers: BTreeMap<String, AnswerValue>,
-    /// Number of comments saved so far in this session.
+    /// Number of comments saved so far in this session, without those that were taken back.
     pub comments: usize,
+    /// The surgeon's own words about each setting, in the order they were said; empty outside the closing questions.
+    pub said: Vec<Vec<String>>,
 }
 
 /// The current session as the operator sees it. It has no policy either, because the operator stands beside the

@@ -76,8 +76,8 @@ async fn practice(theatre: &Theatre) {
     theatre.finish_setting(5).await;
 
     surgeon.sees("#panel h2", "Final questions").await;
-    surgeon.click(".questions .done button").await;
-    surgeon.sees("#panel h2", "Thank you").await;
+    surgeon.tap_in_panel(".questions .done button").await;
+    surgeon.sees("#panel h2", "Practice is over").await;
 
     operator.sees("#session-actions", "Close and prepare the next").await;
     operator.click("#session-actions .primary").await;

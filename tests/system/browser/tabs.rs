@@ -61,7 +61,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     surgeon.cut("/answers").await;
     theatre.choose("sharpness", 3).await;
     surgeon.sees("[data-question=sharpness] > .state", "Saved here").await;
-    other.click("input[name=sharpness][value='5']").await;
+    other.tap_in_panel("input[name=sharpness][value='5']").await;
     other.sees("[data-question=sharpness] > .state", "Saved").await;
 
     surgeon.release().await;

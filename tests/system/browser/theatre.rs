@@ -59,6 +59,17 @@ pub fn start_again(server: &mut Server) {
     *server = start(Arc::clone(&server.data), &server.address.to_string());
 }
 
+impl Browser {
+    /// Taps `css` in the panel over the picture, once the panel takes taps: right after it has appeared it takes none.
+    pub async fn tap_in_panel(&self, css: &str) {
+        until("the panel to take taps", || async {
+            self.count(css).await > 0 && self.count("#panel[data-fresh]").await == 0
+        })
+        .await;
+        self.click(css).await;
+    }
+}
+
 impl Theatre {
     /// Starts a server and both browsers, which enter by their links.
     pub async fn open(driver: &Driver) -> Self {

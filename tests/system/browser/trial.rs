@@ -93,7 +93,7 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
     // Not every question is answered at the first try.
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees("#missing", "One question is still open").await;
     surgeon.sees("[data-question=sharpness] > .state", "Not answered yet").await;
 
@@ -103,7 +103,7 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
     surgeon.type_into("[data-question=remarks] textarea", "Good at rest").await;
 
     shoot(surgeon, "surgeon-5-questions").await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
 }
 
 async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre) {
@@ -207,7 +207,7 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     theatre.surgeon.sees("#panel", "Everything you said is saved.").await;
     shoot(&theatre.surgeon, "surgeon-7-restarted").await;
 
-    theatre.surgeon.click("#panel button").await;
+    theatre.surgeon.tap_in_panel("#panel button").await;
     theatre.surgeon.sees_no("#panel").await;
     theatre.surgeon.sees("#setting", "Setting 5 of 6").await;
     theatre.finish_setting(7).await;
@@ -247,10 +247,21 @@ async fn closing_questions(theatre: &Theatre) {
     shoot(surgeon, "surgeon-9-closing").await;
 
     // A ranking counts when it is confirmed; until then it is kept on the device, also over a reload.
-    surgeon.click("[aria-label='Move setting 5 up']").await;
+    // It begins in an order drawn by lot. Each setting put first turns it into one that is known.
+    for setting in [6, 4, 5, 3, 2, 1] {
+        let top = format!("[aria-label='Put setting {setting} first']");
+        until("the setting to be first", || async {
+            surgeon.try_click(&top).await;
+            surgeon.text(".ranking li:first-child").await.contains(&format!("Setting {setting}"))
+        })
+        .await;
+    }
+    surgeon.click("[aria-label='Move setting 4 up']").await;
+    surgeon.click("[aria-label='Move setting 4 down']").await;
     surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;
     surgeon.reload().await;
     surgeon.sees(".ranking li:nth-child(4)", "Setting 5").await;
+    surgeon.sees(".ranking li:first-child .said", "“").await;
     surgeon.click("[data-question=preference] .confirm").await;
     surgeon.sees("[data-question=preference] > .state", "Saved").await;
 
@@ -258,7 +269,7 @@ async fn closing_questions(theatre: &Theatre) {
 
     surgeon.click("[data-question=closing-remarks] textarea").await;
     surgeon.type_into("[data-question=closing-remarks] textarea", "That it stays still").await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
 
     surgeon.sees("#panel h2", "Thank you").await;
     shoot(surgeon, "surgeon-10-completed").await;
@@ -283,7 +294,7 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
     surgeon.sees(state, "4 of 10 answered · Saved").await;
 
     // The page scrolls to the first item without an answer.
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees("#missing", "2 questions are still open").await;
     surgeon.sees(".sus fieldset:nth-child(5) .gap", "Not answered yet").await;
     assert_eq!(surgeon.text(".sus fieldset:nth-child(4) .gap").await, "");

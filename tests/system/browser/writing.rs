@@ -25,7 +25,7 @@ impl Theatre {
     async fn answer_elsewhere(&self, driver: &Driver) {
         let other = driver.browser().await;
         other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
-        other.click("input[name=sharpness][value='3']").await;
+        other.tap_in_panel("input[name=sharpness][value='3']").await;
         other.sees("[data-question=sharpness] > .state", "Saved").await;
         other.click(".questions .done button").await;
     }

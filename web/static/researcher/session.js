@@ -114,8 +114,10 @@ function listComments(comments) {
   lines = comments.map((comment, index) => {
     const words = commentWords(comment);
     const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);
-    const said = isSaid ? words : make("em", {}, words);
+    const kept = comment.withdrawn ? make("del", {}, words) : words;
+    const said = isSaid ? kept : make("em", {}, kept);
     const late = comment.late && make("span", { className: "badge warn" }, "late");
+    const back = comment.withdrawn && make("span", { className: "badge" }, "taken back at once");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make(
       "button",
@@ -126,7 +128,7 @@ function listComments(comments) {
       },
       make("span", { className: "when" }, clockText(comment.seconds)),
       make("span", { className: "muted" }, where),
-      make("span", { className: "said" }, said, late && " ", late),
+      make("span", { className: "said" }, said, late && " ", late, back && " ", back),
     );
   });
   const items = lines.map((line, index) => {

@@ -7,6 +7,9 @@ import { isKeyboardUp } from "./room.js";
 /** A second tap on the same button within this time is ignored. */
 const SAME_TAP_MS = 1000;
 
+/** For this long a comment can be taken back. */
+const UNDO_MS = 5000;
+
 /** A text longer than this gets a taller box. */
 const TALL_LETTERS = 90;
 
@@ -23,6 +26,9 @@ export function commentBox(comments, outbox, voice) {
   const send = byId("send", HTMLButtonElement);
   const elsewhere = byId("elsewhere");
   const quick = byId("quick");
+  const undo = byId("undo", HTMLButtonElement);
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let undoTimer;
   /** Buttons tapped a moment ago. @type {Set<HTMLElement>} */
   const tapped = new Set();
   let quickDrawn = "[]";
@@ -32,6 +38,7 @@ export function commentBox(comments, outbox, voice) {
     comments.follow(state);
     box.disabled = comments.disabled;
     byId("compose").hidden = comments.disabled && state !== null;
+    if (!state) endUndo();
     const looking = state?.phase === "inspecting";
     const invitation = looking ? "Write what you see" : "Write a comment";
     box.placeholder = state ? invitation : "Comments are kept once a trial begins";
@@ -87,6 +94,7 @@ export function commentBox(comments, outbox, voice) {
   function tap(button, what) {
     const entry = tapped.has(button) ? null : comments.say(what);
     if (!entry) return;
+    offerUndo(entry);
     tapped.add(button);
     button.classList.add("taken");
     setTimeout(() => {
@@ -98,10 +106,30 @@ export function commentBox(comments, outbox, voice) {
   function submit() {
     const entry = comments.submit();
     if (!entry) return;
+    offerUndo(entry);
     draw();
     // A box that takes the focus by itself would keep a tablet's keyboard up, over the picture.
     if (isKeyboardUp()) box.blur();
     else box.focus();
+  }
+
+  /** @param {import("./outbox.js").Entry} entry */
+  function offerUndo(entry) {
+    clearTimeout(undoTimer);
+    undo.hidden = false;
+    undo.setAttribute("aria-label", `Undo: ${entry.body.text ?? "the mark"}`);
+    undo.onclick = () => {
+      endUndo();
+      comments.withdraw(entry);
+    };
+    undoTimer = setTimeout(endUndo, UNDO_MS);
+  }
+
+  function endUndo() {
+    clearTimeout(undoTimer);
+    // The focus goes back to where one writes on, unless that would open a keyboard.
+    if (document.activeElement === undo) undo.blur();
+    undo.hidden = true;
   }
 
   /** @param {string | null} [taken] */

@@ -51,7 +51,7 @@ export class QuestionPanel {
 
     return answerTo(question, answered, {
       settings: state.settings,
-      said: [],
+      said: state.said ?? [],
       lot: state.session,
       later,
       draft: () => drafts.open(`answer.${slot}`),

@@ -1,5 +1,6 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
+mod about;
 mod accounts;
 mod analysis;
 pub mod assets;
@@ -40,6 +41,7 @@ mod state;
 mod studies;
 mod study_export;
 mod surgeon;
+mod tablet_trial;
 mod tablets;
 mod trust;
 mod voice;
@@ -48,6 +50,7 @@ pub use equipment::Equipment;
 pub use live::OpenTablets;
 pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
+pub use tablet_trial::TabletTrials;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -81,6 +84,7 @@ pub fn router(app: AppState) -> Router {
         .merge(sign_in::routes())
         .merge(accounts::routes())
         .merge(surgeon::routes())
+        .merge(tablet_trial::routes())
         .merge(offline::routes())
         .merge(voice::routes())
         .merge(operator::routes())

@@ -10,6 +10,7 @@ use super::equipment::Equipment;
 use super::keys::Keys;
 use super::live::OpenTablets;
 use super::reach::Reach;
+use super::tablet_trial::TabletTrials;
 use crate::health::HealthWatch;
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
@@ -64,6 +65,8 @@ pub struct App {
     pub equipment: Equipment,
     /// The surgeon's pages that are open.
     pub tablets: OpenTablets,
+    /// What works on the tablets that were tried.
+    pub tablet_trials: TabletTrials,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server must shut down; streams then close by themselves.

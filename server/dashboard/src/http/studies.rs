@@ -20,7 +20,7 @@ use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::role::Role;
 use parfocal_trial::study::definition::{Repetition, Replacement};
-use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::stage::Stage;
 use parfocal_trial::study::state::Change;
 
@@ -137,6 +137,11 @@ pub(super) const fn repetition(rule: Repetition) -> &'static str {
         Repetition::Refuse => "refused",
         Repetition::NextSpare => "takes the next place; a spare place opens",
     }
+}
+
+/// Where a change of a study was made. Whoever made it is named beside, and may be a lead, an operator or a researcher.
+pub(super) fn channel(by: &str) -> &'static str {
+    if by == Channel::CommandLine.name() { "by a command" } else { "on a page" }
 }
 
 /// The state of a session, in words.

@@ -54,7 +54,7 @@ pub use erasures::{Erased, Erasure, StoredErasure};
 pub use error::StoreError;
 pub use motion::Motion;
 pub use reader::Reader;
-pub use remarks::KeepOutcome;
+pub use remarks::{KeepOutcome, withdrawn};
 pub use rows::*;
 pub use schema::MIGRATOR;
 pub use sessions::{NewSession, StoredSession};

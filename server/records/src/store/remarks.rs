@@ -1,5 +1,9 @@
 //! Comments and answers. Each is kept once, however often it is sent, and never changed.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
@@ -87,7 +91,7 @@ async fn insert_comment(
         .set("frame", comment.frame.map(u64::cast_signed))
         .set("frame_run", comment.frame_run)
         .set("kind", kind)
-        .set("text", text)
+        .set("text", text.as_deref())
         .execute_once(&mut transaction)
         .await?;
 
@@ -226,6 +230,17 @@ impl Reader {
     }
 }
 
+/// The comments that the surgeon took back, each with when that was kept. A withdrawal that came too late to count is
+/// none.
+#[must_use]
+pub fn withdrawn(comments: &[(i64, Comment)]) -> BTreeMap<IdempotencyKey, Timestamp> {
+    let withdrawn = |(_, comment): &(i64, Comment)| match comment.said {
+        CommentContent::Withdrawal(key) if !comment.late => Some((key, comment.stamp.wall)),
+        _ => None,
+    };
+    comments.iter().filter_map(withdrawn).collect()
+}
+
 fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
     let frame: Option<i64> = row.try_get("frame")?;
     Ok(Comment {
@@ -284,16 +299,18 @@ fn said(row: &SqliteRow) -> Result<CommentContent, StoreError> {
         // An erasure leaves an empty text.
         ("voice", None) => Ok(CommentContent::Voice),
         ("voice", Some(text)) if text.is_empty() => Ok(CommentContent::Voice),
+        ("withdrawal", Some(_)) => Ok(CommentContent::Withdrawal(parsed(row, "text")?)),
         _ => Err(StoreError::Damaged(format!("comment of kind '{kind}'"))),
     }
 }
 
 /// A comment's kind and text, as in the database and in exports.
-pub(super) fn said_columns(said: &CommentContent) -> (&'static str, Option<&str>) {
+pub(super) fn said_columns(said: &CommentContent) -> (&'static str, Option<Cow<'_, str>>) {
     match said {
-        CommentContent::Text(text) => ("text", Some(text)),
-        CommentContent::Quick(text) => ("quick", Some(text)),
+        CommentContent::Text(text) => ("text", Some(text.into())),
+        CommentContent::Quick(text) => ("quick", Some(text.into())),
         CommentContent::Mark => ("mark", None),
         CommentContent::Voice => ("voice", None),
+        CommentContent::Withdrawal(key) => ("withdrawal", Some(key.to_string().into())),
     }
 }

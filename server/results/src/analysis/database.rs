@@ -1,6 +1,5 @@
 //! Reads from a database what is analysed of a study.
 
-use std::collections::BTreeSet;
 
 use futures_util::{StreamExt, TryStreamExt, stream};
 
@@ -9,7 +8,9 @@ use super::records::{
     AnswerRecord, CommentRecord, ProtocolRecords, SessionRecords, StudyRecords, comment_words, line, withdrawn,
 };
 use super::report::AnalysedSession;
-use parfocal_records::store::{Latest, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings};
+use parfocal_records::store::{
+    Erased, Latest, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings, withdrawn,
+};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
@@ -99,9 +100,7 @@ async fn read_session(
     }
 
     let corrections = Latest::of(&reader.corrections(session.session).await?);
-    let erasures = reader.erasures(session.session).await?.into_iter();
-    let erased: BTreeSet<(Erasable, String)> =
-        erasures.map(|stored| (stored.erasure.subject, stored.erasure.record)).collect();
+    let erased = Erased::by(&reader.erasures(session.session).await?);
     let settings = stored.made.segments.iter().map(|(segment, policy)| (*segment, policy.as_str().to_owned()));
 
     let records = SessionRecords {
@@ -126,14 +125,18 @@ async fn comments(
     reader: &Reader,
     session: &Enrolled,
     corrections: &Latest,
-    erased: &BTreeSet<(Erasable, String)>,
+    erased: &Erased,
 ) -> Result<Vec<CommentRecord>, StoreError> {
+    let kept = reader.comments(session.session).await?;
+    let withdrawn = withdrawn(&kept);
+
     let mut comments = Vec::new();
-    for (_, comment) in reader.comments(session.session).await? {
+    // A comment that the surgeon took back at once was a slip of the finger.
+    for (_, comment) in kept.into_iter().filter(|(_, comment)| !withdrawn.contains_key(&comment.key)) {
         let typed = corrections.note(Subject::Comment, &comment.key);
-        let erased = erased.contains(&(Erasable::Comment, comment.key.to_string()));
+        let erased = erased.at(Erasable::Comment, &comment.key).is_some();
         let words = comment_words(comment.said, typed, comment.late, erased);
-        comments.push(CommentRecord { segment: comment.segment, words });
+        comments.extend(words.map(|words| CommentRecord { segment: comment.segment, words }));
     }
     Ok(comments)
 }
@@ -143,7 +146,7 @@ async fn answers(
     clocks: &RunClocks,
     session: &Enrolled,
     corrections: &Latest,
-    erased: &BTreeSet<(Erasable, String)>,
+    erased: &Erased,
 ) -> Result<Vec<AnswerRecord>, StoreError> {
     let answers = reader.answers(session.session).await?;
     let standings = standings(&answers, clocks);
@@ -152,7 +155,7 @@ async fn answers(
     for ((_, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {
         records.push(AnswerRecord {
             value: corrections.value(&answer.key).unwrap_or(standing.value),
-            erased: erased.contains(&(Erasable::Answer, answer.key.to_string())),
+            erased: erased.at(Erasable::Answer, &answer.key).is_some(),
             question: answer.question,
             segment: answer.segment,
         });

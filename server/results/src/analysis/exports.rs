@@ -71,6 +71,7 @@ struct CommentCells {
     text: Option<String>,
     late: bool,
     erased: Option<Timestamp>,
+    withdrawn: Option<Timestamp>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -289,6 +290,9 @@ impl ExportedSession {
     }
 
     fn comment(&self, comment: &CommentCells) -> Option<CommentRecord> {
+        if comment.withdrawn.is_some() {
+            return None;
+        }
         let text = comment.text.clone().unwrap_or_default();
         let said = match comment.kind.as_str() {
             "text" => CommentContent::Text(text),
@@ -298,7 +302,7 @@ impl ExportedSession {
             _ => return None,
         };
         let typed = self.corrected("comment", &comment.key, "note").filter(|note| !note.is_empty());
-        let words = comment_words(said, typed, comment.late, comment.erased.is_some());
+        let words = comment_words(said, typed, comment.late, comment.erased.is_some())?;
         Some(CommentRecord { segment: comment.segment, words })
     }
 

@@ -106,14 +106,15 @@ pub fn withdrawn(session: SessionId, site: &str) -> AnalysedSession {
 
 /// The words of a comment. `typed` is what a researcher typed out of a voice comment; `erased` is whether the comment
 /// itself was erased.
-pub fn comment_words(said: CommentContent, typed: Option<&str>, late: bool, erased: bool) -> Words {
+pub fn comment_words(said: CommentContent, typed: Option<&str>, late: bool, erased: bool) -> Option<Words> {
     let is_typed = said == CommentContent::Voice && typed.is_some();
     let text = match said {
         CommentContent::Text(text) | CommentContent::Quick(text) => text,
         CommentContent::Mark => "Marked a moment".to_owned(),
         // A voice comment can be read once it is transcribed.
         CommentContent::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
+        CommentContent::Withdrawal(_) => return None,
     };
     // The sound may be erased while its transcript is kept.
-    Words { question: None, text, late, erased: erased && !is_typed }
+    Some(Words { question: None, text, late, erased: erased && !is_typed })
 }

@@ -1,16 +1,17 @@
 //! A session in memory: how it was made, its state, the comments on it, which events are not on disk yet, and what it
 //! requires of the control loop.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::ConductError;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
-use parfocal_base::ids::{SegmentId, SessionId};
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_pipeline::control::{Command, Drive};
 use parfocal_records::store::{Comment, NewSession, Reader, RunClocks};
 use parfocal_trial::account::Actor;
@@ -21,6 +22,7 @@ use parfocal_trial::grace::Grace;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::refusal::Refusal;
+use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::{Plan, SessionState, decide, decide_time};
 use parfocal_trial::unblinding::Circumstances;
@@ -48,10 +50,10 @@ pub(super) struct Course {
     clock: RunClock,
     /// The participant's consent, if recorded.
     pub consent: Option<Consent>,
-    /// Number of all comments.
-    pub comments: usize,
-    /// The latest comments, newest last.
-    pub latest_comments: Vec<CommentLine>,
+    /// The comments, in the order they were kept. Withdrawals are not among them.
+    comments: Vec<(IdempotencyKey, CommentLine)>,
+    /// The comments that the surgeon took back.
+    withdrawn: BTreeSet<IdempotencyKey>,
     /// Whether the operator has closed it.
     pub dismissed: bool,
     /// Number of events that are on disk.
@@ -116,8 +118,8 @@ impl Course {
             times: Vec::new(),
             clock,
             consent: None,
-            comments: 0,
-            latest_comments: Vec::new(),
+            comments: Vec::new(),
+            withdrawn: BTreeSet::new(),
             dismissed: false,
             recorded: 0,
             stops: Vec::new(),
@@ -299,8 +301,7 @@ impl Course {
 
     /// Replaces all comments by `comments`, after some were erased.
     pub fn hear_again(&mut self, comments: impl IntoIterator<Item = Comment>) {
-        self.comments = 0;
-        self.latest_comments.clear();
+        self.comments.clear();
         comments.into_iter().for_each(|comment| self.heard(comment));
     }
 
@@ -316,12 +317,26 @@ impl Course {
 
     /// Adds a comment that was stored.
     pub fn heard(&mut self, comment: Comment) {
-        self.comments += 1;
-        if self.latest_comments.len() == LATEST {
-            self.latest_comments.remove(0);
+        if let CommentContent::Withdrawal(key) = comment.said {
+            if !comment.late {
+                self.withdrawn.insert(key);
+            }
+            return;
         }
+
+        let waited = comment.origin.waited_millis.unwrap_or(0).max(0);
+        let kept = comment.stamp.wall;
+        let at = kept.saturating_sub(SignedDuration::from_millis(waited)).unwrap_or(kept);
         let setting = comment.segment.map(|segment| self.setting(segment));
-        self.latest_comments.push(CommentLine { at: comment.stamp.wall, setting, said: comment.said });
+        self.comments.push((comment.key, CommentLine { at, setting, said: comment.said }));
+    }
+
+    /// The comments that the surgeon did not take back, in the order they were said.
+    pub fn standing_comments(&self) -> Vec<&CommentLine> {
+        let standing = self.comments.iter().filter(|(key, _)| !self.withdrawn.contains(key));
+        let mut standing: Vec<&CommentLine> = standing.map(|(_, line)| line).collect();
+        standing.sort_by_key(|line| line.at);
+        standing
     }
 
     /// The command to the control loop that says what drives the lens now. `None` before the session's start and after

@@ -61,7 +61,8 @@ impl Shared {
     pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let comments = reader.comments(session).await?.into_iter();
-        let comments = comments.filter(|(_, comment)| comment.said != CommentContent::Mark);
+        let wordless = |said: &CommentContent| !said.has_words() && *said != CommentContent::Voice;
+        let comments = comments.filter(|(_, comment)| !wordless(&comment.said));
         let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
         let answers = reader.answers(session).await?.into_iter();
         let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
@@ -191,8 +192,12 @@ fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind
 }
 
 fn is_comment(comments: &[(i64, Comment)], record: &str) -> Result<(), ConductError> {
-    let found = comments.iter().any(|(_, comment)| comment.key.to_string() == record);
-    if found { Ok(()) } else { Err(no_such_record()) }
+    let found = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
+    let (_, comment) = found.ok_or_else(no_such_record)?;
+    if comment.said.has_words() || comment.said == CommentContent::Voice {
+        return Ok(());
+    }
+    Err(Refusal::conflict("only words can be erased; this comment has none").into())
 }
 
 fn is_text(answers: &[(i64, Answer)], record: &str) -> Result<(), ConductError> {

@@ -11,7 +11,9 @@ use super::course::Course;
 use super::{ConductError, Conductor};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings};
+use parfocal_records::store::{
+    Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn,
+};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
@@ -99,6 +101,8 @@ pub struct TimelineComment {
     /// The content of the comment; empty if it was erased.
     #[serde(flatten)]
     pub said: CommentContent,
+    /// Whether the surgeon took it back at once.
+    pub withdrawn: bool,
     /// A researcher's note on the comment; for a voice comment, its transcript.
     pub note: Option<String>,
     /// The recording of a voice comment; none for other comments.
@@ -172,8 +176,11 @@ impl Conductor {
         let erased = Erased::by(&reader.erasures(session).await?);
         let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
-        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+        let withdrawn = withdrawn(&comments);
+        let said = comments.into_iter().filter(|(_, comment)| comment.said.says_something());
+        let comments = said.map(|(run, comment)| TimelineComment {
             key: comment.key,
+            withdrawn: withdrawn.contains_key(&comment.key),
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
             erased: erased.at(Erasable::Comment, &comment.key),
             voice: (comment.said == CommentContent::Voice)
@@ -186,6 +193,10 @@ impl Conductor {
             said: comment.said,
         });
 
+        // What was said without a network arrived late. It stands where it was said.
+        let mut comments: Vec<TimelineComment> = comments.collect();
+        comments.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
+
         let answers = reader.answers(session).await?;
         let events: Vec<(f64, &EventKind)> =
             events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
@@ -194,7 +205,7 @@ impl Conductor {
             settings: settings(&course, &events),
             pauses: pauses(&events, &points),
             points,
-            comments: comments.collect(),
+            comments,
             set_aside: set_aside(&course, &answers, runs, start),
         })
     }

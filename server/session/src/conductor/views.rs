@@ -7,6 +7,7 @@ use parfocal_base::clock::Moment;
 use parfocal_trial::event::Event;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::CommentContent;
 use parfocal_trial::session::PauseCause;
 use parfocal_trial::view::{LogLine, OperatorView, SurgeonView};
 
@@ -15,7 +16,8 @@ use parfocal_trial::view::{LogLine, OperatorView, SurgeonView};
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
     let withdrawn = course.state.withdrawn();
-    let readable = course.latest_comments.iter().rev().filter(|_| !withdrawn);
+    let comments = course.standing_comments();
+    let readable = comments.iter().rev().filter(|_| !withdrawn).take(LATEST);
     let operator = OperatorView {
         surgeon: surgeon.clone(),
         study: course.study.clone(),
@@ -25,7 +27,7 @@ pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (Surg
         consent: course.consent.clone(),
         withdrawn,
         unrecorded_because: because.filter(|_| course.is_unrecorded()).map(str::to_owned),
-        latest_comments: readable.cloned().collect(),
+        latest_comments: readable.copied().cloned().collect(),
         log: log(course),
     };
 
@@ -53,8 +55,22 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         voice: course.protocol.voice,
         questions: state.questions().to_vec(),
         answers: answers(course),
-        comments: course.comments,
+        comments: course.standing_comments().len(),
+        said: if state.phase() == Phase::Closing { said(course) } else { Vec::new() },
     }
+}
+
+/// What the surgeon said in words of each setting, so that the closing questions can recall it.
+fn said(course: &Course) -> Vec<Vec<String>> {
+    let mut said = vec![Vec::new(); course.state.plan().segments.len()];
+    for comment in course.standing_comments() {
+        let (CommentContent::Text(text) | CommentContent::Quick(text)) = &comment.said else { continue };
+        let place = comment.setting.and_then(|setting| said.get_mut(setting.checked_sub(1)?));
+        if let Some(words) = place.filter(|_| !text.is_empty()) {
+            words.push(text.clone());
+        }
+    }
+    said
 }
 
 /// Number of the current setting, from 1; at the end, of the last one. 0 before the start.

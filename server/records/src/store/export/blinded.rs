@@ -1,6 +1,7 @@
 //! The blinded part of an export. Its types have no field for a policy, the order, the seed, or a reason that may name
 //! them.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
@@ -14,7 +15,7 @@ use super::folder::Folder;
 use super::scores::Scored;
 use super::study::ExportedStudy;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
-use crate::store::remarks::said_columns;
+use crate::store::remarks::{said_columns, withdrawn};
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
@@ -264,6 +265,7 @@ impl Blinded {
     }
 
     fn comment_rows(&self) -> Vec<CommentRow> {
+        let withdrawn = withdrawn(&self.comments);
         let row = |((run, comment), number): (&(i64, Comment), usize)| {
             let (kind, text) = said_columns(&comment.said);
 
@@ -274,7 +276,7 @@ impl Blinded {
                 setting: self.setting(comment.segment),
                 segment: comment.segment,
                 kind,
-                text: text.map(str::to_owned),
+                text: text.map(Cow::into_owned),
                 frame: comment.frame,
                 frame_run: comment.frame_run,
                 wall: comment.stamp.wall,
@@ -287,6 +289,7 @@ impl Blinded {
                 sequence: comment.origin.sequence,
                 late: comment.late,
                 erased: self.erased.at(Erasable::Comment, &comment.key),
+                withdrawn: withdrawn.get(&comment.key).copied(),
             }
         };
 

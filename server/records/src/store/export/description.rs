@@ -129,9 +129,12 @@ table! {
         setting: Option<usize> = SETTING,
         segment: Option<SegmentId> = SEGMENT.open(),
         kind: &'static str = means(
-            "text (typed), quick (one tap), mark (\"mark this moment\") or voice (said aloud; see voice)",
+            "text (typed), quick (one tap), mark (\"mark this moment\"), voice (said aloud; see voice) or withdrawal \
+                (takes another comment back)",
         ).open(),
-        text: Option<String> = means("What was said, as it was said; empty for a mark and for voice").sealed(),
+        text: Option<String> = means(
+            "What was said, as it was said; empty for a mark and for voice; of a withdrawal the key of the other comment",
+        ).sealed(),
         frame: Option<u64> = means("Number of the frame on the surgeon's screen").open(),
         frame_run: Option<i64> = means("Start of the server that counted that frame; see runs").open(),
         wall: Timestamp = WALL.open(),
@@ -144,6 +147,8 @@ table! {
         sequence: Option<i64> = SEQUENCE.open(),
         late: bool = LATE.open(),
         erased: Option<Timestamp> = ERASED,
+        withdrawn: Option<Timestamp> =
+            means("When the surgeon took it back, by the server's wall clock; empty if not").in_unit("UTC"),
     }
 }
 
