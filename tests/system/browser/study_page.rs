@@ -169,6 +169,8 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("main", &hex::encode(Sha256::digest(&text))).await;
     page.sees("main", "Leeds General Infirmary").await;
     page.click("#open").await;
+    page.sees("#concerns", "Nobody here could unblind the study").await;
+    page.click("#reason-confirmed").await;
     shoot(&page, "study-2-opening").await;
     sign(&page, "The first surgeon comes").await;
     page.sees("#stage", "open").await;

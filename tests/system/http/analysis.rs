@@ -90,6 +90,9 @@ impl Study {
     /// Changes the study.
     pub async fn change(&self, change: &str) {
         let mut body = json!({"change": change, "reason": "as planned"});
+        if change == "open" {
+            body["despite_concerns"] = true.into();
+        }
         if change == "lock" {
             body["despite_outstanding"] = true.into();
         }

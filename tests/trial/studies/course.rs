@@ -36,7 +36,7 @@ async fn a_study_goes_from_plan_to_unblinding_and_each_step_is_an_event_with_a_r
 
     let first = whole(&mut trial, PARTICIPANT, "leeds").await;
     change(&trial, Change::Close).await.unwrap();
-    change(&trial, Change::Open).await.unwrap();
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
     assert_eq!(detail(&trial).await.commitment_line.unwrap(), commitment, "the orders are drawn once");
     let second = whole(&mut trial, "S-02", "london").await;
     to_the_end(&trial).await;
@@ -71,7 +71,8 @@ async fn changes_that_the_studys_stage_does_not_allow_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let trial = a_trial(folder.path()).await;
     assert!(
-        refusal(change(&trial, Change::Open).await).contains("there is no study 'scope-2026'; there are: none yet")
+        refusal(change(&trial, Change::Open { despite_concerns: true }).await)
+            .contains("there is no study 'scope-2026'; there are: none yet")
     );
 
     plan(&trial, definition()).await.unwrap();
@@ -83,15 +84,17 @@ async fn changes_that_the_studys_stage_does_not_allow_are_refused() {
     let early = refusal(prepare(&trial, PARTICIPANT, "leeds").await);
     assert!(early.contains("the study is planned; sessions can be made only while it is open"), "{early}");
 
-    change(&trial, Change::Open).await.unwrap();
-    assert!(refusal(change(&trial, Change::Open).await).contains("the study is open already"));
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
+    assert!(
+        refusal(change(&trial, Change::Open { despite_concerns: true }).await).contains("the study is open already")
+    );
     assert!(refusal(change(&trial, LOCK).await).contains("the study is open; close it first"));
     change(&trial, Change::Close).await.unwrap();
     assert!(refusal(change(&trial, Change::Close).await).contains("the study is closed already"));
     assert!(refusal(prepare(&trial, PARTICIPANT, "leeds").await).contains("the study is closed"));
 
     change(&trial, LOCK).await.unwrap();
-    for change in [Change::Open, Change::Close, LOCK] {
+    for change in [Change::Open { despite_concerns: true }, Change::Close, LOCK] {
         assert!(refusal(super::change(&trial, change).await).contains("the study is locked"), "{change:?}");
     }
     assert_eq!(detail(&trial).await.log.len(), 4, "planned, opened, closed, locked");
@@ -188,7 +191,12 @@ async fn missing_parts_of_a_study_are_named() {
     let text = definition().replace(STUDY, "one-site");
     let sites = vec!["london".to_owned()];
     trial.conductor.plan_study(Role::Researcher, text, sites, signed("for London alone")).await.unwrap();
-    let open = trial.conductor.change_study(Role::Researcher, "one-site".to_owned(), Change::Open, signed("go"));
+    let open = trial.conductor.change_study(
+        Role::Researcher,
+        "one-site".to_owned(),
+        Change::Open { despite_concerns: true },
+        signed("go"),
+    );
     open.await.unwrap();
     assert!(ask("one-site", "leeds", "pair").await.contains("no site 'leeds' here; there are: london"));
 

@@ -16,6 +16,7 @@ import { drawFocus } from "./focus_card.js";
 import { nowWords } from "./now.js";
 import { followRecording, forgetNotice } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
+import { isUnderWay } from "./session_words.js";
 import { followLink, offerLink } from "./surgeon_link.js";
 import { Traces } from "./traces.js";
 
@@ -29,6 +30,8 @@ let session = null;
 /** @type {Stream.OperatorStatus | null} */
 let status = null;
 let framesWithoutBelief = BELIEF_FRAMES;
+/** Runs the checks again soon, once they are there. */
+let checkAgain = () => {};
 
 /** Whether the checks found something to put right before a trial. */
 let wrong = false;
@@ -54,6 +57,7 @@ function followSession(next) {
   sessionCard.follow(session);
   followLink(session);
   redrawFocus();
+  drawTheWarnings();
   drawNow();
 }
 
@@ -66,28 +70,44 @@ function drawNow() {
     refused: contact.isCertificateOver,
     working: status === null || (status.camera.working && status.lens.working),
     wrong,
+    away: status?.tablet.presence === "silent" || status?.tablet.presence === "hidden",
   };
   setText(byId("now"), nowWords(facts));
 }
 
 /** @param {Stream.OperatorStatus} next */
 function followStatus(next) {
+  const changed = status !== null && checked(status) !== checked(next);
   status = next;
+  if (changed) checkAgain();
   contact.certifiedUntil(status.certificate_until);
   drawLamps(byId("devices"), status);
   drawDeviceWords(byId("device-words"), status);
-  drawWarnings(byId("warnings"), status);
+  drawTheWarnings();
   drawCamera(status.camera_offer);
   redrawFocus();
 }
 
+/**
+ * What the checks look at and can change at any time.
+ *
+ * @param {Stream.OperatorStatus} status
+ */
+function checked({ camera, lens, tablet }) {
+  return JSON.stringify([camera.working, lens.working, tablet.presence, tablet.slow]);
+}
+
+function drawTheWarnings() {
+  if (status) drawWarnings(byId("warnings"), status, session !== null && isUnderWay(session));
+}
+
 function redrawFocus() {
-  if (status) drawFocus(status, session !== null);
+  if (status) drawFocus(status, session);
 }
 
 /** @param {Stream.Frame} frame */
 function followFrame({ header, receivedAt }) {
-  traces.add(header, receivedAt - header.age);
+  traces.add(header, receivedAt - header.age - header.travel);
   framesWithoutBelief = header.belief ? 0 : framesWithoutBelief + 1;
   byId("belief-choice").hidden = framesWithoutBelief >= BELIEF_FRAMES;
 }
@@ -117,7 +137,7 @@ followOverlayBoxes((name, on) => {
 
 offerLink();
 document.addEventListener("signed-in", () => followLink(session));
-followChecks((found) => {
+checkAgain = followChecks((found) => {
   wrong = found;
   drawNow();
 });

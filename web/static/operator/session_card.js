@@ -11,6 +11,7 @@ import {
   deeds,
   lacksConsent,
   phaseWords,
+  reasonWords,
   steps,
   timeLeft,
   unrecordedWords,
@@ -25,10 +26,16 @@ export class SessionCard {
   #session = null;
   /** When the setting's time ends, by the page's clock. @type {number | null} */
   #endsAt = null;
+  /** The pause whose reason is being written. @type {number | undefined} */
+  #reasonFor;
 
   /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */
   constructor(followAnswer) {
     this.#followAnswer = followAnswer;
+    byId("reason-wanted", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.#giveReason();
+    };
   }
 
   /** @param {View | null} session */
@@ -57,6 +64,7 @@ export class SessionCard {
     byId("consent").hidden = consentWords(session) === "";
     byId("steps").replaceChildren(...steps(session).map((className) => make("li", { className })));
     this.#drawDeeds(session);
+    this.#drawReasonWanted(session);
     drawFeed(session);
     this.drawTime();
   }
@@ -89,6 +97,25 @@ export class SessionCard {
     redraw(byId("session-actions"), buttons);
   }
 
+  /**
+   * A reason that is being written stays in the box while the session moves on.
+   *
+   * @param {View} session
+   */
+  #drawReasonWanted({ reason_wanted: wanted }) {
+    byId("reason-wanted").hidden = !wanted;
+    if (wanted) setText(byId("pause-reason-label"), reasonWords(clockOf(wanted.at), wanted));
+    this.#reasonFor = byId("pause-reason", HTMLInputElement).value === "" ? wanted?.event : this.#reasonFor;
+  }
+
+  async #giveReason() {
+    const box = byId("pause-reason", HTMLInputElement);
+    const event = this.#reasonFor ?? this.#session?.reason_wanted?.event;
+    const reason = box.value.trim();
+    if (event === undefined || reason === "") return;
+    if (await this.#act({ action: "give-reason", event, reason })) box.value = "";
+  }
+
   /** @param {Deed} deed */
   #do(deed) {
     if (!this.#session) return;
@@ -100,7 +127,7 @@ export class SessionCard {
       case "end-setting":
         return this.#askEndSetting(this.#session);
       case "pause":
-        return this.#askPause(this.#session);
+        return this.#act({ action: "pause", reason: "" });
       case "abort":
         return this.#askAbort(this.#session);
       case "consent":
@@ -122,17 +149,6 @@ export class SessionCard {
         "This cannot be undone. All comments are kept.",
       go: `End setting ${setting}`,
       done: () => this.#send(session, { action: "finish-segment", segment }),
-    });
-  }
-
-  /** @param {View} view */
-  #askPause({ session }) {
-    askReason({
-      heading: "Pause the session",
-      consequence:
-        "The clock stops and the lens holds still. The surgeon sees that the session is paused and can still comment.",
-      go: "Pause",
-      done: (reason) => this.#send(session, { action: "pause", reason }),
     });
   }
 
@@ -188,14 +204,20 @@ export class SessionCard {
     await this.#followAnswer(post("/api/operator/actions", { session, ...action }));
   }
 
-  /** @param {Api.Action} action */
+  /**
+   * Returns whether it was done.
+   *
+   * @param {Api.Action} action
+   */
   async #act(action) {
-    if (!this.#session) return;
+    if (!this.#session) return false;
     try {
       await this.#send(this.#session.session, action);
       tell(byId("session-trouble"), "");
+      return true;
     } catch (error) {
       tellTrouble(byId("session-trouble"), error);
+      return false;
     }
   }
 }
@@ -239,7 +261,12 @@ function drawFeed(session) {
 }
 
 /** @param {string} at */
+function clockOf(at) {
+  return new Date(at).toLocaleTimeString([], { hour12: false });
+}
+
+/** @param {string} at */
 function timeOf(at) {
-  const text = new Date(at).toLocaleTimeString([], { hour12: false });
+  const text = clockOf(at);
   return make("time", { dateTime: at, title: at }, text);
 }

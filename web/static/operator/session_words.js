@@ -10,6 +10,11 @@ export function isOver({ phase }) {
   return phase === "completed" || phase === "aborted";
 }
 
+/** @param {View} view whether the session has started and not ended */
+export function isUnderWay(view) {
+  return view.phase !== "ready" && !isOver(view);
+}
+
 /** @param {View} view */
 export function phaseWords(view) {
   const { phase, setting, settings } = view;
@@ -98,19 +103,32 @@ export function deeds(view) {
     }
     if (!missing) all.push({ deed: "start", label: "Start", className: "primary" });
   }
+  // The pause comes first and asks nothing: in an emergency one tap has to do.
+  if (!paused && phase !== "ready" && !isOver(view)) {
+    all.push({ deed: "pause", label: "Pause", className: "danger filled" });
+  }
   if (paused) all.push({ deed: "resume", label: "Resume", className: "primary" });
   else if (phase === "inspecting") {
     all.push({ deed: "end-setting", label: `End setting ${setting} now…`, className: "" });
   }
 
-  if (!paused && phase !== "ready" && !isOver(view)) {
-    all.push({ deed: "pause", label: "Pause…", className: "" });
-  }
   if (isOver(view)) {
     all.push({ deed: "dismiss", label: "Close and prepare the next", className: "primary" });
     if (!withdrawn) all.push({ deed: "withdraw", label: "Participant withdraws…", className: "danger" });
   } else all.push({ deed: "abort", label: "Abort…", className: "danger" });
   return all;
+}
+
+/**
+ * Asks for the reason of a pause that has none yet.
+ *
+ * @param {string} clock when the session was paused, such as `14:03:20`
+ * @param {View["reason_wanted"]} wanted
+ */
+export function reasonWords(clock, wanted) {
+  if (!wanted) return "";
+  const who = wanted.by === "surgeon" ? "the surgeon" : "you";
+  return `Why ${who} paused at ${clock}, if it should be in the record`;
 }
 
 /**

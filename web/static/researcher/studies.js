@@ -31,6 +31,12 @@ byId("file", HTMLInputElement).addEventListener("change", async (event) => {
   }
 });
 
+document.getElementById("template")?.addEventListener("click", (event) => {
+  const button = /** @type {HTMLButtonElement} */ (event.currentTarget);
+  definition.value = button.dataset.template ?? "";
+  definition.focus();
+});
+
 byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {
   event.preventDefault();
   go.disabled = true;

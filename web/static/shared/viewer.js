@@ -89,9 +89,11 @@ export class Viewer {
     return this.#last?.header.run ?? null;
   }
 
-  /** Milliseconds since the picture on screen was exposed; null before the first. */
+  /** Milliseconds since the picture on screen was exposed, its way to this page included; null before the first. */
   get age() {
-    return this.#last && this.#last.header.age + performance.now() - this.#last.receivedAt;
+    if (!this.#last) return null;
+    const { header, receivedAt } = this.#last;
+    return header.age + header.travel + performance.now() - receivedAt;
   }
 
   /**

@@ -19,6 +19,8 @@ const OFFERED_LETTERS = 16;
  * @property {number} setting
  * @property {number | null} frame
  * @property {number | null} run
+ * @property {number | null} [picture_width] width of the picture, in pixels
+ * @property {number | null} [pictures_per_second]
  */
 
 /** @typedef {Omit<Place, "session">} Begun where a comment was begun */
@@ -30,8 +32,10 @@ const OFFERED_LETTERS = 16;
  * @param {Said} what
  * @param {Partial<Place>} place
  */
-function comment(what, { session, segment = null, frame = null, run = null }) {
-  return { session, segment, frame, run, ...what };
+function comment(what, place) {
+  const { session, segment = null, frame = null, run = null } = place;
+  const { picture_width = null, pictures_per_second = null } = place;
+  return { session, segment, frame, run, picture_width, pictures_per_second, ...what };
 }
 
 /** @param {import("./drafts.js").Found} draft */
@@ -243,7 +247,7 @@ export class Comments {
     if (body.kind === "text") {
       this.#outbox.forget(entry);
       const setting = this.#numbers.get(body.segment) ?? 0;
-      this.#begun ??= { segment: body.segment, setting, frame: body.frame, run: body.run };
+      this.#begun ??= begunAt({ ...body, setting });
       this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
     }
     this.trouble = `${refusedWords(body)}: ${reason}`;
@@ -278,11 +282,11 @@ export class Comments {
 }
 
 /**
- * @param {Place} place
+ * @param {Begun} place
  * @returns {Begun}
  */
-function begunAt({ segment, setting, frame, run }) {
-  return { segment, setting, frame, run };
+function begunAt({ segment, setting, frame, run, picture_width = null, pictures_per_second = null }) {
+  return { segment, setting, frame, run, picture_width, pictures_per_second };
 }
 
 /** @param {Record<string, any>} body */

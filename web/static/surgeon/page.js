@@ -5,6 +5,7 @@ import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
+import { Sight } from "../shared/sight.js";
 import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { PATH as ANSWERS, placeOf, sendLeftAnswers, slotOf } from "./answers.js";
@@ -41,6 +42,7 @@ import {
   endsSoon,
   headline,
   isEnded,
+  pausedWords,
   readyWords,
   savedWords,
   simulatedWords,
@@ -68,6 +70,7 @@ let overBecause = "";
 const outbox = openOutbox();
 const contact = new Contact(clock, lastView.read());
 const viewer = new Viewer(byId("view"), "surgeon", byId("colour"));
+const sight = new Sight();
 const voice = openVoiceOutbox();
 const comments = new Comments(outbox, drafts, here, voice);
 const box = commentBox(comments, outbox, voice);
@@ -107,7 +110,8 @@ const forgetFirstPress = askForSecondPress(byId("finish"), byId("finish-heard"),
 function here() {
   if (!state) return null;
   const { session, segment = null, setting } = state;
-  return { session, segment, setting, frame: viewer.frame, run: viewer.run };
+  const seen = sight.at(performance.now());
+  return { session, segment, setting, frame: viewer.frame, run: viewer.run, ...seen };
 }
 
 /* State in */
@@ -243,6 +247,7 @@ function drawBar() {
   finish.hidden = !inspecting;
   finish.disabled = !looking;
   if (finish.disabled) forgetFirstPress();
+  byId("pause").hidden = !state?.may_pause;
 
   const unrecorded =
     "This step is not recorded yet because the server cannot write to its disk. Tell the operator.";
@@ -333,7 +338,7 @@ function panelContent() {
         ? card("centred", "Practice is over", `That was practice; it does not count. ${kept()}`)
         : card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
-      return card("centred", "The session was ended", `There is nothing more to do. ${kept()}`);
+      return card("aside sign", "The session was ended", `There is nothing more to do. ${kept()}`);
     default:
       return null;
   }
@@ -353,19 +358,17 @@ function saved() {
   return savedWords(refused, outbox.waiting.length + voice.waiting);
 }
 
-/** @param {View} view */
-function pausedCard({ may_resume: mayResume }) {
-  const text = "The operator has paused the session. You can still comment.";
-  if (!mayResume) return card("centred clear", "Paused", text);
+/**
+ * A small sign, because the picture may be needed while the session is paused.
+ *
+ * @param {View} view
+ */
+function pausedCard(view) {
+  if (!view.may_resume) return card("aside sign", "Paused", pausedWords(view, saved()));
 
   const resume = make("button", { type: "button", className: "primary" }, "Continue");
   resume.onclick = () => act({ action: "resume" });
-  return card(
-    "centred clear",
-    "Paused",
-    `The server was restarted. ${saved()} Continue where you were.`,
-    resume,
-  );
+  return card("aside sign", "Paused", pausedWords(view, saved()), resume);
 }
 
 /**
@@ -420,6 +423,8 @@ async function leave() {
 
 /* Wiring */
 
+byId("pause").onclick = () => act({ action: "pause", reason: "" });
+
 byId("comment").addEventListener("input", () => {
   if (!isEnded(state)) return;
   drawPanel();
@@ -428,6 +433,7 @@ byId("comment").addEventListener("input", () => {
 
 viewer.live.listen({
   heard: () => contact.heard(),
+  frame: ({ header }) => sight.see(header, performance.now()),
   session: followServer,
   status: followStatus,
   over: leave,
@@ -455,6 +461,7 @@ document.addEventListener("pointerdown", (event) => {
 
 function tick() {
   drawTime();
+  byId("reduced").hidden = !sight.isReduced(performance.now());
   if (contact.isMissed) followLastView();
   drawNow();
 }

@@ -141,12 +141,13 @@ export class VoiceOutbox {
   /**
    * Begins a recording. Returns its comment's key.
    *
-   * @param {{ session: string, segment: string | null, frame: number | null, run: number | null }} place
+   * @param {import("./comments.js").Place} place
    * @param {Stamp} given when the surgeon began to speak
    */
-  begin({ session, segment, frame, run }, given) {
+  begin({ session, segment, frame, run, picture_width = null, pictures_per_second = null }, given) {
     const comment = this.#around.newId();
-    const body = { key: comment, session, segment, frame, run, kind: "voice" };
+    const seen = { picture_width, pictures_per_second };
+    const body = { key: comment, session, segment, frame, run, ...seen, kind: "voice" };
     this.#add({ kind: "begin", id: this.#nextId(), comment, session, body, given });
     return comment;
   }

@@ -53,6 +53,27 @@ export function timeLeft(state, seconds) {
   return state.paused ? "Paused" : `${clockText(seconds, Math.ceil)} left`;
 }
 
+/**
+ * Says what paused the session, and what the surgeon can do.
+ *
+ * @param {View} state
+ * @param {string} saved says what is saved
+ */
+export function pausedWords({ paused_by: by }, saved) {
+  switch (by) {
+    case "surgeon":
+      return "You have paused the session. You can still comment.";
+    case "restart":
+      return `The server was restarted. ${saved} Continue where you were.`;
+    case "tablet-away":
+      return `This tablet was away, so the session was paused. ${saved} Continue where you were.`;
+    case "small-picture":
+      return "The picture was too small for this trial, so it was paused. Continue once it is better.";
+    default:
+      return "The operator has paused the session. You can still comment.";
+  }
+}
+
 /** @param {Stream.SurgeonStatus} status */
 export function simulatedWords({ camera_simulated: camera, lens_simulated: lens }) {
   const simulated = [camera && "camera", lens && "lens"].filter(Boolean).join(" and ");

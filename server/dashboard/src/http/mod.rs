@@ -133,9 +133,11 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
 /// this call: each holds a clone of `app.shutdown` until its requests under way are answered.
 pub async fn run(listener: TcpListener, app: AppState, tls: Option<Arc<ServerConfig>>) {
     let shutdown = app.shutdown.clone();
+    let reporting = tokio::spawn(live::report_tablets(Arc::clone(&app)));
     let door = match tls {
         Some(tls) => Door::Encrypted { tls: tls.into(), pages: router(Arc::clone(&app)), plain: plain::router(app) },
         None => Door::Plain { pages: router(app) },
     };
     connections::serve(listener, door, shutdown).await;
+    reporting.abort();
 }

@@ -32,6 +32,8 @@ struct ListPage {
     person: Option<Account>,
     has_accounts: bool,
     studies: Vec<StudyLine>,
+    /// A definition to start from; none without a protocol for studies.
+    template: Option<String>,
 }
 
 impl ListPage {
@@ -57,7 +59,9 @@ async fn studies_page(
     let studies = app.conductor.studies().lines().await?;
     let person = person.map(|person| person.account);
     let has_accounts = !app.accounts.all().await?.is_empty();
-    ListPage { nonce, person, has_accounts, studies }.render().map(Html).map_err(|_| Error::Internal)
+    let lead = person.as_ref().map_or("Dr Lead", |account| account.display.as_str());
+    let template = app.conductor.study_template(lead);
+    ListPage { nonce, person, has_accounts, studies, template }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 #[derive(Template)]
@@ -256,7 +260,7 @@ async fn change_study(
 ) -> Result<Json<StudyDetail>, Error> {
     let account = match wanted.change {
         Change::Lock { .. } | Change::Unblind => confirmed_lead(&app, &by, wanted.passphrase.as_deref(), peer).await?,
-        Change::Open | Change::Close | Change::Withdraw { .. } => by.personally()?,
+        Change::Open { .. } | Change::Close | Change::Withdraw { .. } => by.personally()?,
     };
     let signature = signed(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;

@@ -9,7 +9,8 @@ use super::records::{
 };
 use super::report::AnalysedSession;
 use parfocal_records::store::{
-    Erased, Latest, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings, withdrawn,
+    Erased, Latest, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings,
+    withdrawn as withdrawn_comments,
 };
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
@@ -128,7 +129,7 @@ async fn comments(
     erased: &Erased,
 ) -> Result<Vec<CommentRecord>, StoreError> {
     let kept = reader.comments(session.session).await?;
-    let withdrawn = withdrawn(&kept);
+    let withdrawn = withdrawn_comments(&kept);
 
     let mut comments = Vec::new();
     // A comment that the surgeon took back at once was a slip of the finger.

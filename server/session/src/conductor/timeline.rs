@@ -16,7 +16,7 @@ use parfocal_records::store::{
 };
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
-use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::event::{Event, EventKind, per_second};
 use parfocal_trial::permission;
 use parfocal_trial::protocol::Record;
 use parfocal_trial::question::AnswerValue;
@@ -24,6 +24,7 @@ use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::standing::Standing;
+use parfocal_trial::tablet::PictureSize;
 use parfocal_trial::voice::Ending;
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
@@ -33,6 +34,10 @@ pub struct Timeline {
     pub settings: Vec<SettingSpan>,
     /// When the session was paused and the lens held where it was.
     pub pauses: Vec<PauseSpan>,
+    /// When no tablet showed the surgeon's page.
+    pub absences: Vec<PauseSpan>,
+    /// What size of picture the surgeon saw, and how many.
+    pub sights: Vec<SightSpan>,
     /// The focal path.
     pub points: Vec<TimelinePoint>,
     /// The comments.
@@ -61,6 +66,20 @@ pub struct PauseSpan {
     pub to: Option<f64>,
     /// Reason in words.
     pub reason: String,
+}
+
+/// What the surgeon saw for a while.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SightSpan {
+    /// Start, in seconds.
+    pub from: f64,
+    /// End, in seconds.
+    pub to: f64,
+    /// Size of the pictures.
+    #[serde(flatten)]
+    pub size: PictureSize,
+    /// Pictures a second.
+    pub per_second: f64,
 }
 
 /// A point of the focal path.
@@ -204,6 +223,8 @@ impl Conductor {
         Ok(Timeline {
             settings: settings(&course, &events),
             pauses: pauses(&events, &points),
+            absences: absences(&events),
+            sights: sights(&events),
             points,
             comments,
             set_aside: set_aside(&course, &answers, runs, start),
@@ -343,6 +364,40 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     }
 
     spans
+}
+
+/// When no tablet showed the surgeon's page.
+fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
+    let mut spans: Vec<PauseSpan> = Vec::new();
+    for &(at, kind) in events {
+        match kind {
+            EventKind::TabletAway { .. } => {
+                spans.push(PauseSpan { from: at, to: None, reason: kind.in_words(|_| 0) });
+            }
+            EventKind::TabletBack | EventKind::Completed | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    spans
+}
+
+/// What the surgeon saw. Each of these events tells of the time before it.
+fn sights(events: &[(f64, &EventKind)]) -> Vec<SightSpan> {
+    let span = |&(to, kind): &(f64, &EventKind)| match kind {
+        EventKind::PicturesSeen { size, pictures, over_ms, .. } => Some(SightSpan {
+            from: to - milliseconds(*over_ms),
+            to,
+            size: *size,
+            per_second: per_second(*pictures, *over_ms),
+        }),
+        _ => None,
+    };
+    events.iter().filter_map(span).collect()
 }
 
 /// Converts milliseconds to seconds.

@@ -16,6 +16,7 @@ pub(crate) use file::{between, identifier};
 
 use super::allocation::Order;
 use super::question::Question;
+use super::tablet::WhenAway;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 
@@ -54,6 +55,10 @@ pub struct Protocol {
     pub grace: Duration,
     /// What is recorded during a session.
     pub record: Record,
+    /// What happens to a segment's clock while no tablet shows the surgeon's page.
+    pub when_tablet_away: WhenAway,
+    /// Width in pixels that the surgeon's picture must have; a session with a smaller one is paused.
+    pub least_picture_width: Option<u32>,
     /// Version of the consent text that a participant must have consented to before a session starts; none if no
     /// consent is required.
     pub consent: Option<String>,

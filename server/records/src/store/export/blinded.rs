@@ -412,6 +412,7 @@ impl Blinded {
         let row = |(run, event): &(i64, Event)| {
             let (reason, emergency) = match &event.kind {
                 EventKind::Paused { reason, .. }
+                | EventKind::ReasonGiven { reason, .. }
                 | EventKind::Aborted { reason, .. }
                 | EventKind::Withdrawn { reason } => (Some(reason), None),
                 EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),

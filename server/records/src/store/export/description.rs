@@ -340,8 +340,9 @@ table! {
         monotonic_ns: i64 = MONOTONIC.open(),
         role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)").open(),
         kind: &'static str = means(
-            "created, started, segment-started, segment-finished, questions-finished, paused, resumed, \
-             server-restarted, completed, aborted, withdrawn or unblinded",
+            "created, started, segment-started, segment-finished, questions-finished, paused, reason-given, \
+             focused-by-hand, tablet-away, tablet-back, pictures-seen, resumed, server-restarted, completed, aborted, \
+             withdrawn or unblinded",
         ).open(),
         setting: Option<usize> = SETTING,
         segment: Option<SegmentId> = SEGMENT.open(),
