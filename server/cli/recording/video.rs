@@ -25,10 +25,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE|DIR")]
     out: PathBuf,
     /// Begin so many seconds after the first frame.
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value = "0", value_parser = parse_seconds)]
     from: f64,
     /// End so many seconds after the first frame; at the last frame if left out.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
     to: Option<f64>,
     /// Size of the pictures: one pixel per mosaic cell, two by two per cell, or one per sample.
     #[arg(long, value_enum, default_value_t = Size::Cell)]
@@ -64,6 +64,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         save_pictures(arguments, &recording, &frames, &mut studio)?;
     }
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| seconds.is_finite() && *seconds >= 0.0);
+    seconds.ok_or_else(|| "must be a number of seconds, 0 or more".to_owned())
 }
 
 /// Numbers of the frames within the requested span.
