@@ -74,6 +74,28 @@ pub(super) struct Inner {
     _lock: FolderLock,
 }
 
+/// A data folder that no other process can change, but whose database is not open yet.
+#[derive(Debug)]
+pub struct LockedFolder {
+    folder: PathBuf,
+    lock: FolderLock,
+}
+
+impl LockedFolder {
+    /// Locks the data folder `folder`. Creates it if it does not exist.
+    ///
+    /// # Errors
+    /// If another server uses the folder, or it cannot be made or written.
+    pub fn of(folder: &Path) -> Result<Self, StoreError> {
+        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
+        made.map_err(|error| StoreError::folder(folder, &error))?;
+
+        let lock = FolderLock::of(folder)?;
+        keep_private(folder);
+        Ok(Self { folder: folder.to_owned(), lock })
+    }
+}
+
 impl Store {
     /// Opens the data folder `folder` and records the start of `run`. Creates the folder and the database if they do
     /// not exist, and brings an older database up to date.
@@ -81,12 +103,15 @@ impl Store {
     /// # Errors
     /// If another server uses the folder, the database is from a newer version, or the disk cannot be written.
     pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
-        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
-        made.map_err(|error| StoreError::folder(folder, &error))?;
+        Self::open_locked(LockedFolder::of(folder)?, run).await
+    }
 
-        let lock = FolderLock::of(folder)?;
-        keep_private(folder);
-
+    /// The same, for a data folder that this process has locked before.
+    ///
+    /// # Errors
+    /// If the database is from a newer version, or the disk cannot be written.
+    pub async fn open_locked(locked: LockedFolder, run: &Run) -> Result<Self, StoreError> {
+        let LockedFolder { folder, lock } = locked;
         let file = folder.join(DATABASE);
         let options = SqliteConnectOptions::new()
             .filename(&file)
@@ -116,7 +141,7 @@ impl Store {
         }
 
         let inner = Inner {
-            folder: folder.to_owned(),
+            folder,
             trial,
             telemetry,
             checkpoints,

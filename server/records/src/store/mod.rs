@@ -49,7 +49,7 @@ pub use chain::Head;
 pub use consents::StoredConsent;
 pub use corrections::{Correction, Latest, StoredCorrection};
 pub use counts::Counts;
-pub use database::{Run, Store};
+pub use database::{LockedFolder, Run, Store};
 pub use erasures::{Erased, Erasure, StoredErasure};
 pub use error::StoreError;
 pub use motion::Motion;
