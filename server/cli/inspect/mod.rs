@@ -30,7 +30,8 @@ pub struct Arguments {
     /// Print one JSON object per line instead of a table
     #[arg(long)]
     json: bool,
-    /// Save each picture into this folder as PNG, with content area, patch and metrics drawn in
+    /// Save each picture into this folder as NAME.overlay.png, with content area, patch and metrics drawn in, and of each
+    /// mosaic also NAME.SIZE.png, developed, with nothing drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Treat 16-bit gray pictures of any size as mosaics
@@ -87,7 +88,7 @@ struct Inspector<'a> {
     calibration: Calibration,
     /// The calibration's title, if `--calibration` was given.
     titled: Option<String>,
-    /// Names already given to overlays.
+    /// Names already given to files.
     taken: HashSet<OsString>,
 }
 
@@ -140,14 +141,11 @@ impl<'a> Inspector<'a> {
         };
 
         if let Some(out) = self.out {
-            let target = out.join(self.overlay_name(path));
-            let failed =
-                |error: &dyn std::fmt::Display| named(&format_args!("cannot write {}: {error}", target.display()));
-
-            let mut picture = Cursor::new(Vec::new());
-            let drawn = overlay::draw(seen.rgb, &report).write_to(&mut picture, image::ImageFormat::Png);
-            drawn.map_err(|error| failed(&error))?;
-            replace(&target, picture.get_ref()).map_err(|error| failed(&error))?;
+            // A mosaic's picture is for whatever comes next, so nothing is drawn in; what is drawn in lies beside it.
+            if matches!(report.kind, Kind::Mosaic) {
+                save(path, &out.join(self.name(path, self.size.name())), &overlay::plain(&seen.rgb))?;
+            }
+            save(path, &out.join(self.name(path, "overlay")), &overlay::draw(seen.rgb, &report))?;
         }
 
         Ok(report)
@@ -196,18 +194,28 @@ impl<'a> Inspector<'a> {
         })
     }
 
-    /// A file name for the overlay of `path` that no other overlay of this run has.
-    fn overlay_name(&mut self, path: &Path) -> OsString {
+    /// A file name for the picture `what` of `path` that no other file of this run has.
+    fn name(&mut self, path: &Path, what: &str) -> OsString {
         let stem = path.file_name().unwrap_or(path.as_os_str());
         let numbered = |number: u32| {
             let mut name = stem.to_owned();
-            name.push(if number == 1 { ".overlay.png".to_owned() } else { format!(".overlay-{number}.png") });
+            name.push(if number == 1 { format!(".{what}.png") } else { format!(".{what}-{number}.png") });
             name
         };
 
         let mut names = (1..).map(numbered);
         names.find(|name| self.taken.insert(name.clone())).unwrap_or_default()
     }
+}
+
+/// Writes `picture`, which was made from `path`, to `target`, as PNG.
+fn save(path: &Path, target: &Path, picture: &image::RgbImage) -> Result<(), Failure> {
+    let failed =
+        |error: &dyn std::fmt::Display| format!("{}: cannot write {}: {error}", path.display(), target.display());
+
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|error| failed(&error))?;
+    Ok(replace(target, bytes.get_ref()).map_err(|error| failed(&error))?)
 }
 
 /// The patch of `gray` at `area`, which lies inside it.
