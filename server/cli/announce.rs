@@ -34,10 +34,9 @@ pub fn announcement(
         let _ = writeln!(text, "\n*** {warning} ***");
     }
 
-    for (device, working, message) in [
-        ("camera", status.camera.working, &status.camera.message),
-        ("lens", status.lens.working, &status.lens.message),
-    ] {
+    for (device, working, message) in
+        [("camera", status.camera.working, &status.camera.message), ("lens", status.lens.working, &status.lens.message)]
+    {
         if !working {
             let _ = writeln!(text, "\n*** THE {} IS NOT THERE YET: {message} ***", device.to_uppercase());
         }
