@@ -1,5 +1,7 @@
 //! `parfocal inspect` as people and scripts use it.
 
+mod formats;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -47,6 +47,31 @@ pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put_in_place(&beside, path, written)
 }
 
+/// Has `make` write a new file, which becomes `path` once it is whole: `make` gets another name in the same folder.
+/// What is there already stays.
+///
+/// # Errors
+/// If there is a file at `path`, or it cannot be written. No part of it is left then.
+pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
+    let free = || -> io::Result<()> {
+        if fs::symlink_metadata(path).is_ok() { Err(io::ErrorKind::AlreadyExists.into()) } else { Ok(()) }
+    };
+    free()?;
+
+    let beside = partial(path);
+    let made = make(&beside).and_then(|()| {
+        // Looked at again: making it may have taken minutes.
+        let moved = free().and_then(|()| File::open(&beside)?.sync_data()).and_then(|()| fs::rename(&beside, path));
+        moved.map_err(E::from)
+    });
+
+    match &made {
+        Ok(()) => sync_folder_of(path),
+        Err(_) => drop(fs::remove_file(&beside)),
+    }
+    made
+}
+
 /// The path at which a file is written before it is moved to `path`.
 fn partial(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

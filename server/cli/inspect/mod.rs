@@ -14,9 +14,9 @@ use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
+use parfocal_devices::camera::footage::read_picture;
 use parfocal_imaging::{
-    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode,
-    decode_raw,
+    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode_raw,
 };
 use report::{Kind, Report};
 
@@ -157,7 +157,8 @@ impl<'a> Inspector<'a> {
 
         let raw =
             path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
-        let picture = if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { decode(&bytes, self.mosaic) };
+        let picture =
+            if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { read_picture(path, &bytes, self.mosaic) };
 
         let picture = picture.map_err(|error| named(&error))?;
         if self.size != Size::Cell && !matches!(picture, Picture::Mosaic(_)) {

@@ -1,21 +1,21 @@
 //! Reading pictures and mosaics from the bytes of a file: PNG, JPEG, TIFF and raw mosaics.
 
-use std::io::Cursor;
-
-use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits};
+use image::DynamicImage;
+use image::metadata::Orientation;
 
 use super::frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
 use super::luma::luma;
+use super::picture_file::PictureFile;
 use super::reconstruct::Reconstructor;
 
 /// Width and height of the full sensor (IMEC CMV2K) in samples. Raw mosaics have this size.
 pub const SENSOR_SIZE: (usize, usize) = (2048, 1088);
 
 /// Longest side of a picture that is read, in pixels.
-const LARGEST_SIDE: u32 = 16_384;
+pub(super) const LARGEST_SIDE: u32 = 16_384;
 
 /// Most memory that decoding one picture may take, in bytes.
-const LARGEST_MEMORY: u64 = 512 << 20;
+pub(super) const LARGEST_MEMORY: u64 = 512 << 20;
 
 /// A decoded picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +58,15 @@ pub enum DecodeError {
     /// The format is right, but the contents are damaged.
     #[error("damaged or cut short: {0}")]
     Damaged(String),
+    /// The decoder gave up in a way that it should not.
+    #[error("damaged or not supported: its decoder failed")]
+    Panicked,
+    /// The file holds several pictures, and one is needed.
+    #[error("holds {0} pictures, and a file of one is needed; save each as a file of its own")]
+    Pages(usize),
+    /// A mosaic with an EXIF orientation.
+    #[error("a mosaic cannot be turned, but its EXIF orientation says so; save it without")]
+    TurnedMosaic,
     /// An unsupported kind of pixel.
     #[error("cannot read pixels of this kind ({0}); convert it to 8 or 16 bit gray or RGB")]
     OtherPixels(String),
@@ -84,48 +93,98 @@ pub enum DecodeError {
     },
 }
 
-/// Reads a PNG, JPEG or TIFF picture of 8 or 16 bit, gray or RGB; alpha is left out.
-///
-/// A 16-bit gray picture of the sensor's full size is a mosaic. With `mosaic`, every 16-bit gray picture is read as
-/// one, and its sides must be multiples of 4.
+/// Reads a PNG, JPEG or TIFF file of one picture, as [`PictureFile::read`] does.
 ///
 /// # Errors
-/// If the bytes are not such a picture, or are cut short.
+/// If the bytes are not such a picture or are damaged, or if they hold several pictures.
 pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
-    let picture = decode_any(bytes)?;
-    let width = picture.width() as usize;
-    let height = picture.height() as usize;
-    let mosaic_by_size = is_mosaic(&picture);
+    PictureFile::open(bytes)?.single()?.read(0, mosaic)
+}
 
-    match picture {
-        DynamicImage::ImageLuma16(samples) if mosaic || mosaic_by_size => {
-            Ok(Picture::Mosaic(MosaicFrame::new(width, height, samples.into_raw())?))
+/// Width and height that may be decoded.
+pub(super) fn check_size(width: usize, height: usize) -> Result<(usize, usize), DecodeError> {
+    let side = LARGEST_SIDE as usize;
+    // No format takes more than four samples of two bytes for a pixel.
+    let fits = width <= side && height <= side && (8 * width * height) as u64 <= 2 * LARGEST_MEMORY;
+    if fits { Ok((width, height)) } else { Err(DecodeError::TooLarge) }
+}
+
+/// A picture as its file holds it.
+pub(super) struct Samples {
+    pub(super) picture: DynamicImage,
+    /// Bits of the samples of a 16-bit gray picture. White is the greatest number of so many bits.
+    pub(super) bits: u32,
+}
+
+impl Samples {
+    /// The picture turned and on our scales.
+    pub(super) fn into_picture(self, mosaic: bool, turn: Orientation) -> Result<Picture, DecodeError> {
+        let mosaic_by_size = is_mosaic(&self.picture);
+        let white = self.white();
+        let mut picture = self.picture;
+
+        if let DynamicImage::ImageLuma16(samples) = picture {
+            if mosaic || mosaic_by_size {
+                if turn != Orientation::NoTransforms {
+                    return Err(DecodeError::TurnedMosaic);
+                }
+                let (width, height) = (samples.width() as usize, samples.height() as usize);
+                return Ok(Picture::Mosaic(MosaicFrame::new(width, height, samples.into_raw())?));
+            }
+            picture = DynamicImage::ImageLuma16(samples);
         }
-        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) if mosaic => {
-            Err(DecodeError::NotAMosaic("an 8-bit one"))
+
+        if mosaic {
+            return Err(DecodeError::NotAMosaic(match picture {
+                DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => "an 8-bit one",
+                DynamicImage::ImageLumaA16(_) => "one with transparency",
+                _ => "a colour one",
+            }));
         }
-        DynamicImage::ImageLumaA16(_) if mosaic => Err(DecodeError::NotAMosaic("one with transparency")),
-        _ if mosaic => Err(DecodeError::NotAMosaic("a colour one")),
-        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
-            let data = picture.into_luma8().into_raw().into_iter().map(f32::from).collect();
-            Ok(Picture::Gray(GrayImage { width, height, data }))
+
+        picture.apply_orientation(turn);
+        let width = picture.width() as usize;
+        let height = picture.height() as usize;
+        match picture {
+            DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+                let data = picture.into_luma8().into_raw().into_iter().map(f32::from).collect();
+                Ok(Picture::Gray(GrayImage { width, height, data }))
+            }
+            DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
+                let scale = f32::from(white) / 255.0;
+                let data = picture.into_luma16().into_raw().into_iter().map(|value| f32::from(value) / scale).collect();
+                Ok(Picture::Gray(GrayImage { width, height, data }))
+            }
+            DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
+                let data = picture.into_rgb8().into_raw();
+                let gray = data.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(f32::from))).collect();
+                Ok(Picture::Rgb(RgbImage { width, height, data }, GrayImage { width, height, data: gray }))
+            }
+            DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
+                let wide = picture.to_rgb16().into_raw();
+                let gray = wide.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(from_16_bit))).collect();
+                let data = picture.into_rgb8().into_raw();
+                Ok(Picture::Rgb(RgbImage { width, height, data }, GrayImage { width, height, data: gray }))
+            }
+            other => Err(DecodeError::OtherPixels(format!("{:?}", other.color()))),
         }
-        DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
-            let data = picture.into_luma16().into_raw().into_iter().map(from_16_bit).collect();
-            Ok(Picture::Gray(GrayImage { width, height, data }))
+    }
+
+    /// The picture with white at the greatest value that its type has.
+    pub(super) fn scaled(self) -> DynamicImage {
+        let white = u32::from(self.white());
+        match self.picture {
+            DynamicImage::ImageLuma16(mut samples) if white < 0xFFFF => {
+                let scaled = |sample: u16| ((u32::from(sample) * 0xFFFF + white / 2) / white).min(0xFFFF) as u16;
+                samples.iter_mut().for_each(|sample| *sample = scaled(*sample));
+                DynamicImage::ImageLuma16(samples)
+            }
+            picture => picture,
         }
-        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
-            let data = picture.into_rgb8().into_raw();
-            let gray = data.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(f32::from))).collect();
-            Ok(Picture::Rgb(RgbImage { width, height, data }, GrayImage { width, height, data: gray }))
-        }
-        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
-            let wide = picture.to_rgb16().into_raw();
-            let gray = wide.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(from_16_bit))).collect();
-            let data = picture.into_rgb8().into_raw();
-            Ok(Picture::Rgb(RgbImage { width, height, data }, GrayImage { width, height, data: gray }))
-        }
-        other => Err(DecodeError::OtherPixels(format!("{:?}", other.color()))),
+    }
+
+    fn white(&self) -> u16 {
+        u16::MAX >> 16_u32.saturating_sub(self.bits).min(15)
     }
 }
 
@@ -151,53 +210,6 @@ pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     Ok(MosaicFrame::new(width, height, samples)?)
 }
 
-/// Reads a PNG, JPEG or TIFF picture with any pixels except floating-point ones. Nothing says which value of those is
-/// white. The `image` crate assumes 1, so most such pictures would become white.
-///
-/// # Errors
-/// If the bytes are not such a picture or are cut short, or if the picture is too large.
-pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
-    if bytes.is_empty() {
-        return Err(DecodeError::Empty);
-    }
-
-    let format = image::guess_format(bytes).map_err(|_| DecodeError::NotAPicture)?;
-    if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff) {
-        return Err(DecodeError::OtherFormat(format.extensions_str().first().copied().unwrap_or("these")));
-    }
-
-    if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
-        return Err(DecodeError::Damaged("the end of the JPEG data is missing".to_owned()));
-    }
-
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(LARGEST_SIDE);
-    limits.max_image_height = Some(LARGEST_SIDE);
-    limits.max_alloc = Some(LARGEST_MEMORY);
-
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits);
-    let picture = reader.decode().map_err(|error| match error {
-        ImageError::Limits(_) => DecodeError::TooLarge,
-        ImageError::Unsupported(error) => DecodeError::OtherPixels(error.to_string()),
-        error => DecodeError::Damaged(error.to_string()),
-    })?;
-
-    match picture {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            Err(DecodeError::OtherPixels(format!("{:?}", picture.color())))
-        }
-        picture => Ok(picture),
-    }
-}
-
-/// Whether an end marker follows the last scan. Checked here because the decoder silently fills up pictures that are
-/// cut short.
-fn jpeg_ends(bytes: &[u8]) -> bool {
-    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xFF, marker]);
-    last(0xD9) > last(0xDA)
-}
-
 /// Scales 0..=65535 to 0..=255.
 fn from_16_bit(value: u16) -> f32 {
     f32::from(value) / 257.0
@@ -205,6 +217,10 @@ fn from_16_bit(value: u16) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
+    use image::ImageFormat;
+
     use super::*;
 
     fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
@@ -288,9 +304,8 @@ mod tests {
         assert!(message.starts_with("cannot read gif pictures"), "{message}");
 
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::new(4, 4));
-        // Both functions refuse them: an 8-bit picture made of them would be white.
+        // An 8-bit picture made of them would be white.
         let floats = encoded(&floats, ImageFormat::Tiff);
         assert!(matches!(decode(&floats, false), Err(DecodeError::OtherPixels(_))));
-        assert!(matches!(decode_any(&floats), Err(DecodeError::OtherPixels(_))));
     }
 }

@@ -1,17 +1,16 @@
 //! The pictures of a footage camera over time: a video, or stills one after another.
 
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-use image::ImageReader;
 
 use super::clip::Clip;
 use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
 use parfocal_base::files::is_systems_own;
-use parfocal_imaging::{RgbImage, decode_any, is_mosaic};
+use parfocal_base::notices::tell;
+use parfocal_imaging::{DecodeError, Picture, PictureFile, RgbImage, is_mosaic};
 
 /// Time for which a still is shown.
 const STILL: Duration = Duration::from_secs(5);
@@ -56,9 +55,11 @@ pub(super) struct Stills {
 impl Stills {
     fn open(files: Vec<PathBuf>) -> Result<Self, FootageError> {
         for file in &files {
-            let reader = picture_reader(file).map_err(|error| FootageError::unreadable(file, error))?;
-            let (width, height) = reader.into_dimensions().map_err(|error| FootageError::unreadable(file, error))?;
-            large_enough(file, width as usize, height as usize)?;
+            let head = picture_head(file).map_err(|error| FootageError::unreadable(file, error))?;
+            let opened = PictureFile::open(&head).and_then(|opened| Ok((opened.size(0)?, opened.pages())));
+            let ((width, height), pages) = opened.map_err(|error| FootageError::unreadable(file, error))?;
+            large_enough(file, width, height)?;
+            tell_unread(file, pages);
         }
 
         let picture = still(&files[0])?;
@@ -75,18 +76,47 @@ impl Stills {
     }
 }
 
-/// Begins to read the picture in `file`. The contents decide on the format, because the name may be wrong.
+/// Bytes from which a PNG's or JPEG's size and orientation can be read.
+const HEAD: u64 = 1 << 20;
+
+/// The beginning of the picture in `file`, for [`PictureFile::size`]. Of a TIFF, whose pages may be described at its
+/// end, the whole file.
 ///
 /// # Errors
 /// If the file cannot be read.
-pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
-    ImageReader::open(file).and_then(ImageReader::with_guessed_format)
+pub fn picture_head(file: &Path) -> io::Result<Vec<u8>> {
+    let mut file = File::open(file)?;
+    let mut head = Vec::new();
+    (&mut file).take(HEAD).read_to_end(&mut head)?;
+    if head.starts_with(b"II") || head.starts_with(b"MM") {
+        file.read_to_end(&mut head)?;
+    }
+    Ok(head)
+}
+
+/// Reads the first picture of a file; says on standard error how many others are left out.
+///
+/// # Errors
+/// If it is not a picture or is damaged.
+pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
+    let file = PictureFile::open(bytes)?;
+    let picture = file.read(0, mosaic)?;
+    tell_unread(path, file.pages());
+    Ok(picture)
+}
+
+/// Says that only the first of `pages` pictures in a file is used.
+pub fn tell_unread(path: &Path, pages: usize) {
+    if pages > 1 {
+        tell(format_args!("note: {} holds {pages} pictures; only the first is used", path.display()));
+    }
 }
 
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
+    let picture = PictureFile::open(&bytes).and_then(|opened| opened.read_any(0));
+    let picture = picture.map_err(|error| FootageError::unreadable(file, error))?;
 
     if is_mosaic(&picture) {
         // A mosaic's colours would have to be marked as estimated, which footage's are not.

@@ -7,11 +7,11 @@ use super::import_error::ImportError;
 use super::{PosePictures, shot};
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
-use parfocal_devices::camera::footage::picture_reader;
+use parfocal_devices::camera::footage::picture_head;
 use parfocal_devices::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
-use parfocal_imaging::{DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
+use parfocal_imaging::{GrayImage, PatchArea, PictureFile, Reconstructor, content_area, decode};
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
@@ -172,13 +172,11 @@ struct Reader {
 impl Reader {
     /// Compares a picture's size with the first one's. Reads only the beginning of the file.
     fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
-        let damaged = |error: image::ImageError| ImportError::Picture {
-            path: path.to_owned(),
-            error: DecodeError::Damaged(error.to_string()),
-        };
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
-        let (width, height) = picture_reader(path).map_err(unreadable)?.into_dimensions().map_err(damaged)?;
-        self.check(path, (width as usize, height as usize))
+        let head = picture_head(path).map_err(unreadable)?;
+        let size = PictureFile::open(&head).and_then(|file| file.single()?.size(0));
+        let size = size.map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+        self.check(path, size)
     }
 
     fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), ImportError> {
