@@ -122,6 +122,36 @@ impl<'a> PictureFile<'a> {
         Ok(picture)
     }
 
+    /// Whether the samples of the first picture fill 16 bit, so that nothing says how many bits they were taken with.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        let wide = guarded(|| {
+            Ok(match &self.contents {
+                Contents::Png(bytes) => {
+                    let colour = png(bytes)?.color_type();
+                    colour.bytes_per_pixel() == 2 * colour.channel_count()
+                }
+                Contents::Jpeg(_) => false,
+                Contents::Tiff(tiff) => tiff.is_wide(),
+            })
+        });
+        wide.unwrap_or(false)
+    }
+
+    /// The largest sample of a picture, from 0, on the scale on which it is stored.
+    ///
+    /// # Errors
+    /// If there is no such picture, or it is damaged.
+    pub fn largest_sample(&self, page: usize) -> Result<u16, DecodeError> {
+        let picture = self.samples(page)?.picture;
+        Ok(match picture {
+            DynamicImage::ImageLuma16(samples) => samples.iter().copied().max(),
+            DynamicImage::ImageRgb16(samples) => samples.iter().copied().max(),
+            other => other.into_rgb16().iter().copied().max(),
+        }
+        .unwrap_or(0))
+    }
+
     fn orientation(&self, page: usize) -> Orientation {
         let orientation = guarded(|| {
             Ok(match &self.contents {

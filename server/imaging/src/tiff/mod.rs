@@ -114,6 +114,11 @@ impl Tiff {
         orientation.unwrap_or(Orientation::NoTransforms)
     }
 
+    /// Whether samples of the first page have 16 bit.
+    pub(super) fn is_wide(&self) -> bool {
+        self.pages.first().is_some_and(|page| page.number(&self.container, tag::BITS) == Some(16))
+    }
+
     /// The samples of a page, before it is turned.
     pub(super) fn samples(&self, page: usize) -> Result<Samples, DecodeError> {
         let (width, height) = self.size(page)?;

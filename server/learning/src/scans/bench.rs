@@ -37,7 +37,7 @@ pub struct BenchScenes {
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// There is no such folder.
-    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or of focal stacks (pictures)")]
+    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or focal stacks (pictures, or a TIFF)")]
     NoFolder(String),
     /// A recorded scan cannot be read.
     #[error(transparent)]
@@ -89,7 +89,7 @@ fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Resul
     }
 
     let source = StackSource::parse(folder);
-    if !source.folder.is_dir() {
+    if !source.folder.exists() {
         return Err(BenchError::NoFolder(folder.to_owned()));
     }
 
