@@ -14,17 +14,18 @@ use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
-use parfocal_devices::camera::footage::read_picture;
+use parfocal_devices::camera::footage::{is_raw, read_picture};
 use parfocal_imaging::{
-    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode_raw,
+    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, PixelFormat, RgbImage, Size,
+    content_area, decode_raw,
 };
 use report::{Kind, Report};
 
 /// Arguments of `parfocal inspect`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Pictures (PNG, JPEG or TIFF of 8 or 16 bit) or mosaics (16-bit gray pictures of 2048x1088, or .raw or .bin files
-    /// with 2048x1088 little-endian 16-bit samples)
+    /// Pictures (PNG, JPEG or TIFF of 8 or 16 bit) or mosaics (gray pictures of 2048x1088, or .raw or .bin files with
+    /// 2048x1088 samples of 8, 10, 12 or 16 bit)
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Print one JSON object per line instead of a table
@@ -34,9 +35,13 @@ pub struct Arguments {
     /// mosaic also NAME.SIZE.png, developed, with nothing drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Treat 16-bit gray pictures of any size as mosaics
+    /// Treat gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
+    /// Format of .raw and .bin files: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
+    /// length
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
     /// Size of the pictures that --out saves of mosaics: one pixel per mosaic cell, two by two per cell, or one per
     /// sample. Values and lengths are those of the cells at every size
     #[arg(long, value_enum, default_value_t, requires = "out")]
@@ -82,6 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// State kept from file to file.
 struct Inspector<'a> {
     mosaic: bool,
+    raw: Option<PixelFormat>,
     out: Option<&'a Path>,
     size: Size,
     developer: Developer,
@@ -109,6 +115,7 @@ impl<'a> Inspector<'a> {
 
         Ok(Self {
             mosaic: arguments.mosaic,
+            raw: arguments.raw,
             out: arguments.out.as_deref(),
             size: arguments.size,
             developer: Developer::new(&calibration),
@@ -155,11 +162,10 @@ impl<'a> Inspector<'a> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
         let bytes = fs::read(path).map_err(|error| named(&format_args!("cannot be read: {error}")))?;
 
-        let raw =
-            path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
-        let picture =
-            if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { read_picture(path, &bytes, self.mosaic) };
-
+        let picture = match self.raw {
+            Some(format) if is_raw(path) => decode_raw(&bytes, Some(format)).map(|(frame, _)| Picture::Mosaic(frame)),
+            _ => read_picture(path, &bytes, self.mosaic),
+        };
         let picture = picture.map_err(|error| named(&error))?;
         if self.size != Size::Cell && !matches!(picture, Picture::Mosaic(_)) {
             return Err(named(&"--size is for mosaics, and this is a developed picture; leave it out").into());

@@ -6,6 +6,7 @@ use image::metadata::Orientation;
 use super::frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
 use super::luma::luma;
 use super::picture_file::PictureFile;
+use super::pixels::PixelFormat;
 use super::reconstruct::Reconstructor;
 
 /// Width and height of the full sensor (IMEC CMV2K) in samples. Raw mosaics have this size.
@@ -73,21 +74,21 @@ pub enum DecodeError {
     /// The picture exceeds the limits on pixels or memory.
     #[error("too large: the limit is {LARGEST_SIDE} pixels per side and {} MiB", LARGEST_MEMORY >> 20)]
     TooLarge,
-    /// A mosaic was asked for, but the picture is colour or 8 bit.
-    #[error("a mosaic is a 16-bit gray picture, not {0}")]
+    /// A mosaic was asked for, but the picture is colour or has transparency.
+    #[error("a mosaic is a gray picture, not {0}")]
     NotAMosaic(&'static str),
     /// A mosaic whose sides are not multiples of 4.
     #[error(transparent)]
     MosaicSize(#[from] FrameError),
     /// A raw mosaic of another length than the sensor's.
     #[error(
-        "a raw mosaic is {}x{} samples of 2 bytes, {expected} bytes, but this file has {found}",
+        "a raw mosaic is {}x{} samples, in {expected}, but this file has {found} bytes",
         SENSOR_SIZE.0,
         SENSOR_SIZE.1
     )]
     RawLength {
-        /// Bytes of a full mosaic.
-        expected: usize,
+        /// Formats and their bytes, for people.
+        expected: String,
         /// Bytes given.
         found: usize,
     },
@@ -119,27 +120,31 @@ pub(super) struct Samples {
 impl Samples {
     /// The picture turned and on our scales.
     pub(super) fn into_picture(self, mosaic: bool, turn: Orientation) -> Result<Picture, DecodeError> {
-        let mosaic_by_size = is_mosaic(&self.picture);
+        let size = (self.picture.width() as usize, self.picture.height() as usize);
+        let gray = matches!(self.picture, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLuma16(_));
+        let mosaic_by_size = gray && size == SENSOR_SIZE;
         let white = self.white();
         let mut picture = self.picture;
 
-        if let DynamicImage::ImageLuma16(samples) = picture {
-            if mosaic || mosaic_by_size {
-                if turn != Orientation::NoTransforms {
-                    return Err(DecodeError::TurnedMosaic);
+        if mosaic || mosaic_by_size {
+            let counts = match picture {
+                DynamicImage::ImageLuma16(samples) => {
+                    samples.into_raw().into_iter().map(|count| ten_bit(count, self.bits)).collect()
                 }
-                let (width, height) = (samples.width() as usize, samples.height() as usize);
-                return Ok(Picture::Mosaic(MosaicFrame::new(width, height, samples.into_raw())?));
+                DynamicImage::ImageLuma8(samples) => {
+                    let mut counts = vec![0; samples.len()];
+                    PixelFormat::Mono8.unpack(samples.as_raw(), &mut counts);
+                    counts
+                }
+                DynamicImage::ImageLumaA8(_) | DynamicImage::ImageLumaA16(_) => {
+                    return Err(DecodeError::NotAMosaic("one with transparency"));
+                }
+                _ => return Err(DecodeError::NotAMosaic("a colour one")),
+            };
+            if turn != Orientation::NoTransforms {
+                return Err(DecodeError::TurnedMosaic);
             }
-            picture = DynamicImage::ImageLuma16(samples);
-        }
-
-        if mosaic {
-            return Err(DecodeError::NotAMosaic(match picture {
-                DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => "an 8-bit one",
-                DynamicImage::ImageLumaA16(_) => "one with transparency",
-                _ => "a colour one",
-            }));
+            return Ok(Picture::Mosaic(MosaicFrame::new(size.0, size.1, counts)?));
         }
 
         picture.apply_orientation(turn);
@@ -195,19 +200,43 @@ pub fn is_mosaic(picture: &DynamicImage) -> bool {
         && (picture.width() as usize, picture.height() as usize) == SENSOR_SIZE
 }
 
-/// Reads a raw mosaic: 2048x1088 samples, row by row, each two bytes with the low one first.
+/// Formats of raw mosaics whose files differ in length. Two bytes a sample are counts as they are.
+const BY_LENGTH: [PixelFormat; 4] =
+    [PixelFormat::Mono10, PixelFormat::Mono8, PixelFormat::Mono10p, PixelFormat::Mono12p];
+
+/// Reads a raw mosaic: 2048x1088 samples, row by row, in `format`; if it is `None`, in the one of this length. Returns
+/// the format, too. Counts come onto the scale of 10 bit, except that two bytes a sample are taken as they are where
+/// no other format is given.
 ///
 /// # Errors
 /// If `bytes` has another length.
-pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
+pub fn decode_raw(bytes: &[u8], format: Option<PixelFormat>) -> Result<(MosaicFrame, PixelFormat), DecodeError> {
     let (width, height) = SENSOR_SIZE;
-    let expected = 2 * width * height;
-    if bytes.len() != expected {
+    let count = width * height;
+    let known = format.map_or_else(|| BY_LENGTH.to_vec(), |format| vec![format]);
+    let Some(format) = known.iter().copied().find(|format| format.bytes(count) == bytes.len()) else {
+        let sized = |format: &PixelFormat| format!("{format} {} bytes", format.bytes(count));
+        let expected = known.iter().map(sized).collect::<Vec<_>>().join(", ");
         return Err(DecodeError::RawLength { expected, found: bytes.len() });
-    }
+    };
 
-    let samples = bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair)).collect();
-    Ok(MosaicFrame::new(width, height, samples)?)
+    let mut samples = vec![0; count];
+    if format == PixelFormat::Mono10 {
+        let words = bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair));
+        samples.iter_mut().zip(words).for_each(|(sample, word)| *sample = word);
+    } else {
+        format.unpack(bytes, &mut samples);
+    }
+    Ok((MosaicFrame::new(width, height, samples)?, format))
+}
+
+/// A count on the scale of 10 bit, if its file says how many bits it has. What fills 16 bit is taken as it is.
+fn ten_bit(count: u16, bits: u32) -> u16 {
+    match bits {
+        9 => count << 1 | count >> 8,
+        11..=15 => count >> (bits - 10),
+        _ => count,
+    }
 }
 
 /// Scales 0..=65535 to 0..=255.
@@ -274,11 +303,50 @@ mod tests {
     fn raw_mosaics_have_one_length() {
         let mut bytes = vec![0; 2 * 2048 * 1088];
         bytes[2..4].copy_from_slice(&[0xFF, 0x03]);
-        assert_eq!(decode_raw(&bytes).unwrap().samples()[1], 1023);
+        let (frame, format) = decode_raw(&bytes, None).unwrap();
+        assert_eq!((frame.samples()[1], format), (1023, PixelFormat::Mono10));
 
         bytes.pop();
-        let message = decode_raw(&bytes).unwrap_err().to_string();
-        assert!(message.contains("4456448 bytes") && message.ends_with("has 4456447"), "{message}");
+        let message = decode_raw(&bytes, None).unwrap_err().to_string();
+        assert!(message.contains("4456448 bytes") && message.ends_with("has 4456447 bytes"), "{message}");
+        assert!(decode_raw(&bytes, Some(PixelFormat::Mono8)).is_err());
+    }
+
+    #[test]
+    fn packed_raw_mosaics_are_told_by_their_length() {
+        // Counts 0, 1, 2 .. of so many bits, lowest bits first, without gaps.
+        let packed = |bits: usize| {
+            let mut bytes = vec![0_u8; 2048 * 1088 * bits / 8];
+            for index in 0..2048 * 1088 {
+                for bit in 0..bits {
+                    let place = index * bits + bit;
+                    bytes[place / 8] |= ((index >> bit & 1) as u8) << (place % 8);
+                }
+            }
+            bytes
+        };
+
+        for (bits, expected) in [(8, PixelFormat::Mono8), (10, PixelFormat::Mono10p), (12, PixelFormat::Mono12p)] {
+            let (frame, format) = decode_raw(&packed(bits), None).unwrap();
+            assert_eq!(format, expected);
+            for index in [0, 1, 255, 256, 1023, 5000, 2048 * 1088 - 1] {
+                let count = index & ((1 << bits) - 1);
+                let ten = if bits == 8 { count << 2 | count >> 6 } else { count >> (bits - 10) };
+                assert_eq!(usize::from(frame.samples()[index]), ten, "{bits} bit, sample {index}");
+            }
+        }
+    }
+
+    #[test]
+    fn gray_pictures_of_eight_bit_may_be_mosaics() {
+        let picture = |width, height| {
+            let gray = image::ImageBuffer::from_pixel(width, height, image::Luma([255_u8]));
+            encoded(&DynamicImage::ImageLuma8(gray), ImageFormat::Png)
+        };
+        let Picture::Mosaic(frame) = decode(&picture(2048, 1088), false).unwrap() else { panic!("a mosaic expected") };
+        assert_eq!(frame.samples()[7], 1023);
+        assert!(matches!(decode(&picture(64, 48), true), Ok(Picture::Mosaic(_))));
+        assert!(matches!(decode(&picture(64, 48), false), Ok(Picture::Gray(_))));
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod video;
 
 pub use coverage::{CutOff, cut_off};
 pub use pnm::{PnmError, next_pnm};
-pub use reel::{is_picture, picture_head, pictures_in, read_picture, tell_unread};
+pub use reel::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
 pub use video::{FootageError, SQUARE_PIXELS, Video, ffmpeg};
 
 use std::time::Duration;

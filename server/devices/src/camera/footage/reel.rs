@@ -10,7 +10,7 @@ use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
-use parfocal_imaging::{DecodeError, Picture, PictureFile, RgbImage, is_mosaic};
+use parfocal_imaging::{DecodeError, Picture, PictureFile, PixelFormat, RgbImage, decode_raw, is_mosaic};
 
 /// Time for which a still is shown.
 const STILL: Duration = Duration::from_secs(5);
@@ -94,11 +94,20 @@ pub fn picture_head(file: &Path) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// Reads the first picture of a file; says on standard error how many others are left out.
+/// Reads the first picture of a file, or a raw mosaic; says on standard error how many others are left out, and in
+/// which format a raw mosaic was read if that is not 16 bit a sample.
 ///
 /// # Errors
 /// If it is not a picture or is damaged.
 pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
+    if is_raw(path) {
+        let (frame, format) = decode_raw(bytes, None)?;
+        if format != PixelFormat::Mono10 {
+            tell(format_args!("note: {} is read as {format}, by its length", path.display()));
+        }
+        return Ok(Picture::Mosaic(frame));
+    }
+
     let file = PictureFile::open(bytes)?;
     let picture = file.read(0, mosaic)?;
     tell_unread(path, file.pages());
@@ -133,6 +142,12 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let height = rgb.height() as usize;
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
+}
+
+/// Whether `path` has the file extension of a raw mosaic.
+#[must_use]
+pub fn is_raw(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"))
 }
 
 /// Whether `path` has the file extension of a picture.

@@ -9,10 +9,9 @@ use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, GvDevice, Stream, gl
 
 use gio::prelude::*;
 
-use super::pixels::PixelFormat;
 use crate::camera::{Adjustable, CameraError, Setting};
 use parfocal_base::options::{BadOptions, Options};
-use parfocal_imaging::CELL;
+use parfocal_imaging::{CELL, PixelFormat};
 
 /// Size of the sensor this program is made for.
 const SENSOR: (i32, i32) = (2048, 1088);

@@ -5,7 +5,6 @@
 
 mod device;
 mod numbers;
-mod pixels;
 mod session;
 mod shared;
 mod timestamps;

@@ -9,7 +9,7 @@ pub mod source;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use parfocal_devices::camera::footage::{self, pictures_in};
+use parfocal_devices::camera::footage::{self, is_raw, pictures_in, read_picture};
 use parfocal_imaging::{DecodeError, GrayImage, Reconstructor, decode, in_blocks};
 
 /// Least number of pictures in which a peak and an order can be recognised.
@@ -160,7 +160,7 @@ impl FocalStack {
             return Self::new(pages::planes(folder, list, scale)?);
         }
 
-        let files = pictures_in(folder)?;
+        let files = pictures_or_mosaics_in(folder)?;
         let placed = match list {
             Some(list) => listed(list)?.into_iter().map(|(name, at)| (folder.join(name), at)).collect(),
             None => named(files),
@@ -169,7 +169,8 @@ impl FocalStack {
         let mut reconstructor = Reconstructor::default();
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
-            let picture = decode(&bytes, false).map_err(|source| StackError::Picture { path: path.clone(), source })?;
+            let picture = if is_raw(&path) { read_picture(&path, &bytes, false) } else { decode(&bytes, false) };
+            let picture = picture.map_err(|source| StackError::Picture { path: path.clone(), source })?;
             let gray = picture.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
@@ -279,6 +280,16 @@ fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
         position: low.position + part * (high.position - low.position),
         picture: GrayImage { data, ..low.picture },
     }
+}
+
+/// The pictures in a folder, or if it has none, its raw mosaics.
+fn pictures_or_mosaics_in(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
+    pictures_in(folder).or_else(|error| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| is_raw(path)).collect();
+        files.sort();
+        if files.is_empty() { Err(error.into()) } else { Ok(files) }
+    })
 }
 
 fn file_name(path: &Path) -> String {
