@@ -37,5 +37,5 @@ pub use reconstruct::Reconstructor;
 pub use reduce::{fill_block_means, in_blocks, reduced};
 pub use references::{Average, BadReference};
 pub use size::Size;
-pub use view::{Scale, Square, View, WIDER, block_means};
+pub use view::{Scale, Square, Surroundings, View, WIDER, block_means};
 pub use ycc::YccImage;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::planes::PlaneStack;
-use super::recorded::RecordedScan;
+use super::recorded::{Kept, RecordedScan};
 use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
 use super::stack::source::{ScaledStack, StackSource, UnfitStack};
@@ -80,7 +80,7 @@ impl BenchScenes {
 /// The scenes of one folder.
 fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Result<Vec<Scene>, BenchError> {
     if Path::new(folder).join(HEADER).exists() {
-        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, &|| ())?;
+        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Patches, &|| ())?;
         if scan.poses().len() < 2 {
             return Err(BenchError::OnePose(folder.to_owned()));
         }
