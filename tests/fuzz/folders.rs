@@ -176,7 +176,7 @@ pub fn calibration_table(bytes: &[u8]) {
     ALONE.with(|folder| {
         let file = folder.path().join("table.csv");
         fs::write(&file, bytes).unwrap();
-        let _ = tables::bands(&file);
+        let _ = tables::bands(&file, &(460.0..=600.0));
         let _ = tables::correction(&file);
     });
 }

@@ -3,10 +3,12 @@
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::process::Command;
+use std::sync::Arc;
 
 use parfocal_base::FocalPower;
-use parfocal_devices::lens::LensError;
+use parfocal_base::clock::SystemClock;
 use parfocal_devices::lens::emulator::{Fault, Model};
+use parfocal_devices::lens::{self, LensError};
 
 use super::{emulator, last_command, open, power, quick, refused, until};
 

@@ -88,7 +88,7 @@ impl Site {
         let sites = vec![site.to_owned()];
         let planned = trial.conductor.plan_study(Role::Researcher, definition_of_three_sites(), sites, signed("plan"));
         planned.await.unwrap();
-        change(&trial, Change::Open).await.unwrap();
+        change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
         Self { trial, site }
     }
 

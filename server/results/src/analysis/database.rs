@@ -1,6 +1,5 @@
 //! Reads from a database what is analysed of a study.
 
-
 use futures_util::{StreamExt, TryStreamExt, stream};
 
 use super::error::AnalysisError;

@@ -11,9 +11,7 @@ use super::course::Course;
 use super::{ConductError, Conductor};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{
-    Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn,
-};
+use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind, per_second};
