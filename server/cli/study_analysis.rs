@@ -39,12 +39,11 @@ pub struct Arguments {
 /// If there is no such study or package, it is not unblinded, the package does not verify, or the folder cannot be
 /// written.
 pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let analysis = match package_of(arguments).await? {
-        Some(folder) => verified(folder)?,
-        None => {
-            let reader = Reader::open(folder_of(arguments)).await?;
-            analyse(&reader, &arguments.study).await?
-        }
+    let analysis = if let Some(folder) = package_of(arguments).await? {
+        verified(folder)?
+    } else {
+        let reader = Reader::open(folder_of(arguments)).await?;
+        analyse(&reader, &arguments.study).await?
     };
     let written = match &arguments.out {
         Some(out) => Some((out, analysis.into_folder(out).await?)),

@@ -39,7 +39,10 @@ fn every_kind_of_tiff_gives_the_values_of_its_png() {
     for entry in fs::read_dir(vectors()).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        let Some((scene, _)) = name.split_once('.').filter(|_| name.ends_with(".tif")) else { continue };
+        let Some((scene, _)) = name.split_once('.').filter(|_| path.extension().is_some_and(|ending| ending == "tif"))
+        else {
+            continue;
+        };
         let reference = vectors().join(format!("{scene}.png"));
         if reference.exists() {
             count += 1;

@@ -39,7 +39,8 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
 
     let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
-    assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
+    // In the order in which they were said: nobody knows how long the other waited.
+    assert!((timeline.comments[1].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments);
 
     let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(
@@ -125,7 +126,7 @@ async fn what_was_said_without_a_network_stands_where_it_was_said() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.begin("paper").await;
-    trial.wait(Duration::from_secs(60)).await;
+    trial.wait(Duration::from_mins(1)).await;
     trial.say("said at a minute").await;
 
     let mut waited = trial.comment("said at half a minute");

@@ -59,17 +59,17 @@ pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> 
     free()?;
 
     let beside = partial(path);
-    let made = make(&beside).and_then(|()| {
+    let outcome = make(&beside).and_then(|()| {
         // Looked at again: making it may have taken minutes.
         let moved = free().and_then(|()| File::open(&beside)?.sync_data()).and_then(|()| fs::rename(&beside, path));
         moved.map_err(E::from)
     });
 
-    match &made {
+    match &outcome {
         Ok(()) => sync_folder_of(path),
         Err(_) => drop(fs::remove_file(&beside)),
     }
-    made
+    outcome
 }
 
 /// The path at which a file is written before it is moved to `path`.

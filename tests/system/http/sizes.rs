@@ -4,7 +4,7 @@
 #[path = "../../../benches/stream/link.rs"]
 mod link;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::json;
 use tokio_tungstenite::tungstenite::Message;
@@ -123,7 +123,7 @@ async fn a_distant_page_gets_what_its_link_carries_and_is_told_how_long_the_way_
     let mut page = Page::through(address, &server, "surgeon").await;
     page.watch(25).await;
 
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     let mut bytes = 0;
     let mut travels = Vec::new();
     for _ in 0..25 {

@@ -356,8 +356,8 @@ async fn a_package_that_is_changed_blinded_or_none_is_not_analysed() {
     let session = site.session("S-02", 1).await;
 
     // Unblinded alone, before the study: its export has policies, and the study is still blinded.
-    let emergency = Action::Unblind { reason: "an emergency".to_owned(), despite_outstanding: true };
-    site.trial.conductor.act(Role::Researcher, session, emergency).await.unwrap();
+    let signature = Signature::new("Dr Ward", "an emergency").unwrap();
+    site.trial.conductor.unblind_in_emergency(Role::Researcher, session, signature, true).await.unwrap();
     let before = folder.path().join("before");
     exported(&data, &before);
     let said = refused(&["study", "analyse", text(&before)]);

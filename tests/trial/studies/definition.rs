@@ -40,7 +40,7 @@ async fn a_file_from_windows_keeps_its_bytes_and_has_the_same_hash_everywhere() 
     let elsewhere = folder.path().join("elsewhere");
     std::fs::create_dir(&elsewhere).unwrap();
     a_trial(&elsewhere).await.store.close().await;
-    let file = folder.path().join("study.toml");
+    let file = elsewhere.join("study.toml");
     std::fs::write(&file, &text).unwrap();
     let run = |arguments: &[&str]| {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_parfocal"));

@@ -169,7 +169,10 @@ async fn the_script_loads_the_tables_into_r() {
     let mut lines = printed.lines();
     assert_eq!(lines.next().unwrap().trim(), "3 6 3");
     assert_eq!(lines.next().unwrap().trim(), "POSIXct POSIXt character logical");
-    assert_eq!(lines.next().unwrap().trim(), "What was said, as it was said; empty for a mark and for voice");
+    assert_eq!(
+        lines.next().unwrap().trim(),
+        "What was said, as it was said; empty for a mark and for voice; of a withdrawal the key of the other comment"
+    );
     for said in said() {
         assert!(printed.contains(said.trim_end()), "{printed}");
     }

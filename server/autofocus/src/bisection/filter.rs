@@ -105,7 +105,9 @@ impl Filter {
         let usual = usual_speeds();
         for (row, usual) in self.belief.iter_mut().zip(usual) {
             let anew = JUMP as f32 * usual / PLACES as f32;
-            row.iter_mut().for_each(|share| *share = (1.0 - JUMP as f32) * *share + anew);
+            for share in row.iter_mut() {
+                *share = (1.0 - JUMP as f32) * *share + anew;
+            }
         }
     }
 

@@ -42,6 +42,7 @@ mod studies;
 mod study_export;
 mod surgeon;
 mod tablet_trial;
+mod tablet_trials;
 mod tablets;
 mod trust;
 mod voice;
@@ -50,7 +51,7 @@ pub use equipment::Equipment;
 pub use live::OpenTablets;
 pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
-pub use tablet_trial::TabletTrials;
+pub use tablet_trials::TabletTrials;
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -10,7 +10,7 @@ use super::equipment::Equipment;
 use super::keys::Keys;
 use super::live::OpenTablets;
 use super::reach::Reach;
-use super::tablet_trial::TabletTrials;
+use super::tablet_trials::TabletTrials;
 use crate::health::HealthWatch;
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;

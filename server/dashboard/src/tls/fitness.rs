@@ -43,8 +43,8 @@ pub(super) fn is_for_servers(der: &[u8]) -> bool {
 pub(super) fn out_of_order(chain: &[CertificateDer]) -> Option<usize> {
     let signed_by = |pair: &[CertificateDer]| {
         let (_, signed) = X509Certificate::from_der(&pair[0]).ok()?;
-        let (_, signer) = X509Certificate::from_der(&pair[1]).ok()?;
-        Some(signed.issuer().as_raw() == signer.subject().as_raw())
+        let (_, issuer) = X509Certificate::from_der(&pair[1]).ok()?;
+        Some(signed.issuer().as_raw() == issuer.subject().as_raw())
     };
     chain.windows(2).position(|pair| signed_by(pair) != Some(true)).map(|place| place + 2)
 }

@@ -108,11 +108,11 @@ fn lzw(stored: &[u8], length: usize) -> Result<Vec<u8>, DecodeError> {
     let mut filled = 0;
     let mut rest = stored;
     while filled < length {
-        let decoded = decoder.decode_bytes(rest, &mut bytes[filled..]);
-        filled += decoded.consumed_out;
-        rest = &rest[decoded.consumed_in..];
-        let stands = decoded.consumed_in == 0 && decoded.consumed_out == 0;
-        if decoded.status.is_err() || stands {
+        let step = decoder.decode_bytes(rest, &mut bytes[filled..]);
+        filled += step.consumed_out;
+        rest = &rest[step.consumed_in..];
+        let stands = step.consumed_in == 0 && step.consumed_out == 0;
+        if step.status.is_err() || stands {
             break;
         }
     }
@@ -175,8 +175,9 @@ mod tests {
         // The example of the specification, section 9.
         let stored = [0xFE, 0xAA, 0x02, 0x80, 0x00, 0x2A, 0xFD, 0xAA, 0x03, 0x80, 0x00, 0x2A, 0x22, 0xF7, 0xAA];
         let expected = "aaaaaa80002aaaaaaaaa80002a22aaaaaaaaaaaaaaaaaaaa";
-        let found: String = pack_bits(&stored, 24).iter().map(|byte| format!("{byte:02x}")).collect();
-        assert_eq!(found, expected);
+        let expected: Vec<u8> =
+            (0..24).map(|at| u8::from_str_radix(&expected[2 * at..2 * at + 2], 16).unwrap()).collect();
+        assert_eq!(pack_bits(&stored, 24), expected);
     }
 
     #[test]

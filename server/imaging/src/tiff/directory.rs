@@ -1,6 +1,6 @@
 //! The directories of a TIFF or `BigTIFF`: one for each page, with the fields that describe it.
 //!
-//! Source: *TIFF Revision 6.0*, Adobe, 1992; for 64-bit offsets *The BigTIFF File Format* of libtiff.
+//! Source: *TIFF Revision 6.0*, Adobe, 1992; for 64-bit offsets "The `BigTIFF` File Format" of libtiff.
 
 use std::collections::HashSet;
 

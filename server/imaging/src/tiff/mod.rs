@@ -102,8 +102,8 @@ impl Tiff {
     pub(super) fn size(&self, page: usize) -> Result<(usize, usize), DecodeError> {
         let page = self.page(page)?;
         let side = |tag| page.number(&self.container, tag).and_then(|side| usize::try_from(side).ok());
-        let size = side(tag::WIDTH).zip(side(tag::HEIGHT)).filter(|&(width, height)| width > 0 && height > 0);
-        let (width, height) = size.ok_or_else(|| DecodeError::Damaged("a page has no size".to_owned()))?;
+        let sides = side(tag::WIDTH).zip(side(tag::HEIGHT)).filter(|&(width, height)| width > 0 && height > 0);
+        let (width, height) = sides.ok_or_else(|| DecodeError::Damaged("a page has no size".to_owned()))?;
         check_size(width, height)
     }
 

@@ -1,6 +1,7 @@
 //! Reads from a study's package what is analysed of it: from the exports of its sessions, which prove themselves, and
 //! not from the joined tables.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -154,9 +155,8 @@ pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
     let mut protocols: BTreeMap<String, Protocol> = BTreeMap::new();
     for export in &folders {
         let session = ExportedSession::read(export)?;
-        let name = session.place().protocol.clone();
-        if !protocols.contains_key(&name) {
-            protocols.insert(name, protocol_of(export)?);
+        if let Entry::Vacant(place) = protocols.entry(session.place().protocol.clone()) {
+            place.insert(protocol_of(export)?);
         }
         sessions.push(session);
     }

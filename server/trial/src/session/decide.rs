@@ -78,9 +78,8 @@ pub fn decide_tablet(state: &SessionState, presence: Presence, now: Moment) -> V
     }
 
     let hidden = match presence {
-        Presence::NeverSeen => return Vec::new(),
         Presence::Present if state.tablet_away => return vec![EventKind::TabletBack],
-        Presence::Present => return Vec::new(),
+        Presence::NeverSeen | Presence::Present => return Vec::new(),
         Presence::Hidden => true,
         Presence::Silent => false,
     };

@@ -268,7 +268,10 @@ impl SessionState {
     /// Applies an event.
     pub fn apply(&mut self, event: &Event) {
         match &event.kind {
-            EventKind::Created | EventKind::QuestionsFinished { segment: None } => {}
+            EventKind::Created
+            | EventKind::QuestionsFinished { segment: None }
+            | EventKind::FocusedByHand { .. }
+            | EventKind::PicturesSeen { .. } => {}
             EventKind::Started => self.phase = Phase::Notice,
             EventKind::SegmentStarted { .. } => {
                 self.phase = Phase::Inspecting;
@@ -294,7 +297,6 @@ impl SessionState {
                 }
             }
             EventKind::ReasonGiven { about, .. } => self.unreasoned.retain(|number| number != about),
-            EventKind::FocusedByHand { .. } | EventKind::PicturesSeen { .. } => {}
             EventKind::TabletAway { .. } => self.tablet_away = true,
             EventKind::TabletBack => self.tablet_away = false,
             EventKind::Resumed => {

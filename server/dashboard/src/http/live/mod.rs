@@ -13,10 +13,11 @@ mod message;
 mod operator;
 mod pace;
 mod surgeon;
+mod tablet_reports;
 mod tablets;
 
+pub(super) use tablet_reports::report_tablets;
 pub use tablets::OpenTablets;
-pub(super) use tablets::report_tablets;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -464,7 +465,7 @@ impl<A: Audience> Desk<A> {
             return Err(PageGone);
         }
 
-        let beats = self.pings % PINGS_A_BEAT == 0;
+        let beats = self.pings.is_multiple_of(PINGS_A_BEAT);
         self.pings += 1;
         self.pinged_at = self.app.clock.now();
         let ping = Message::Ping(Bytes::copy_from_slice(&self.pings.to_be_bytes()));

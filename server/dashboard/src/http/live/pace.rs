@@ -180,12 +180,12 @@ mod tests {
 
     use super::*;
 
-    /// A link on which a message takes `way` ms in each direction, and a picture `service` ms at its narrowest place
+    /// A link on which a message takes `delay` ms in each direction, and a picture `service` ms at its narrowest place
     /// besides. Time goes in steps of a millisecond; there is a new picture every `every` ms.
     struct Way {
         pace: Pace,
         now: u64,
-        way: u64,
+        delay: u64,
         service: u64,
         every: u64,
     }
@@ -205,7 +205,7 @@ mod tests {
 
     impl Way {
         fn new(way: u64, service: u64) -> Self {
-            Self { pace: Pace::new(at(0)), now: 0, way, service, every: 20 }
+            Self { pace: Pace::new(at(0)), now: 0, delay: way, service, every: 20 }
         }
 
         fn watch(&mut self, seconds: u64) -> Watched {
@@ -229,19 +229,19 @@ mod tests {
                     self.pace.drawn(at(self.now), took, Duration::ZERO, full);
                 }
                 // A ping waits behind the pictures before it.
-                if (self.now - begin) % 1000 == 0 {
-                    pongs.push_back((free_at.max(self.now) + 2 * self.way, self.now));
+                if (self.now - begin).is_multiple_of(1000) {
+                    pongs.push_back((free_at.max(self.now) + 2 * self.delay, self.now));
                 }
                 let gap = u64::try_from(self.pace.gap().as_millis()).unwrap();
                 let rested = sent_at.is_none_or(|sent| self.now - sent >= gap);
-                if self.now % self.every == 0 && rested && acknowledged.len() < self.pace.window() {
+                if self.now.is_multiple_of(self.every) && rested && acknowledged.len() < self.pace.window() {
                     sent_at = Some(self.now);
                     let starts = free_at.max(self.now);
                     free_at = starts + self.service;
-                    acknowledged.push_back((free_at + 2 * self.way, self.now));
+                    acknowledged.push_back((free_at + 2 * self.delay, self.now));
                     if self.now >= half {
                         watched.queued = watched.queued.max(starts - self.now);
-                        let travel = free_at + self.way - self.now;
+                        let travel = free_at + self.delay - self.now;
                         let reckoned = u64::try_from(self.pace.travel().as_millis()).unwrap();
                         watched.error = watched.error.max(travel.abs_diff(reckoned));
                     }

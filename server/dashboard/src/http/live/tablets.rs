@@ -6,19 +6,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::Serialize;
-use tokio::time::{MissedTickBehavior, interval};
 use utoipa::ToSchema;
 
 use crate::doctor::Tablet;
-use crate::http::AppState;
 use parfocal_base::clock::Moment;
 use parfocal_trial::tablet::{PictureSize, Presence, Report};
 
 /// A tablet that has not been heard for this long is away. Browsers answer a ping every second.
 const AWAY: Duration = Duration::from_secs(3);
-
-/// Interval of the reports to the session.
-const REPORT: Duration = Duration::from_millis(250);
 
 /// The surgeon's pages that are open. Clone freely.
 #[derive(Debug, Clone, Default)]
@@ -96,7 +91,7 @@ impl OpenTablets {
     }
 
     /// What the tablets report at `now`, since the last report.
-    fn report(&self, now: Moment) -> Report {
+    pub(super) fn report(&self, now: Moment) -> Report {
         let mut pages = self.pages();
         let drawn = pages.drawn.take();
         Report {
@@ -178,17 +173,6 @@ impl Drop for OpenTablet {
     }
 }
 
-/// Reports to the session what the tablets do, a few times a second. Never returns; drop it to stop.
-pub(in crate::http) async fn report_tablets(app: AppState) {
-    let mut due = interval(REPORT);
-    due.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    loop {
-        due.tick().await;
-        let report = app.tablets.report(app.clock.now());
-        app.conductor.follow_tablets(report).await;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -245,7 +229,9 @@ mod tests {
     fn a_report_has_the_smallest_picture_and_the_number_of_all_since_the_last_report() {
         let tablets = OpenTablets::default();
         let page = tablets.enter("a browser", at(1000));
-        [LARGE, SMALL, LARGE].into_iter().for_each(|size| page.drawn(size));
+        for size in [LARGE, SMALL, LARGE] {
+            page.drawn(size);
+        }
         let report = tablets.report(at(1100));
         assert_eq!((report.size, report.pictures), (Some(SMALL), 3));
         assert_eq!(tablets.report(at(1200)).size, None);

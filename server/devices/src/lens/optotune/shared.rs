@@ -34,6 +34,7 @@ pub struct Shared {
 }
 
 /// Everything known about the device.
+#[allow(clippy::struct_excessive_bools, reason = "each is told of the device by itself; no two make a state")]
 pub struct State {
     /// The slot: the latest command not yet sent, and the time since which the slot has been full.
     wanted: Option<(FocalPower, Moment)>,

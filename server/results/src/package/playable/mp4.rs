@@ -26,9 +26,9 @@ pub fn with_duration(file: &[u8]) -> Option<Vec<u8>> {
     let track = parts(file, one(&in_movie, *b"trak")?.content);
     let media = parts(file, one(&track, *b"mdia")?.content);
 
-    let of_movie = header(file, one(&in_movie, *b"mvhd")?, true)?;
-    let of_media = header(file, one(&media, *b"mdhd")?, true)?;
-    let of_track = header(file, one(&track, *b"tkhd")?, false)?;
+    let of_movie = header(file, &one(&in_movie, *b"mvhd")?, true)?;
+    let of_media = header(file, &one(&media, *b"mdhd")?, true)?;
+    let of_track = header(file, &one(&track, *b"tkhd")?, false)?;
     let states_one = |header: &Header| file[header.duration.clone()].iter().any(|byte| !matches!(byte, 0 | 0xff));
     if states_one(&of_movie) || states_one(&of_media) || of_media.scale == 0 {
         return None;
@@ -86,7 +86,7 @@ fn number(file: &[u8], place: Range<usize>) -> Option<u64> {
 }
 
 /// The header in `part`: one with a time scale (`mvhd`, `mdhd`), or the track's (`tkhd`), which has an id instead.
-fn header(file: &[u8], part: Part, scaled: bool) -> Option<Header> {
+fn header(file: &[u8], part: &Part, scaled: bool) -> Option<Header> {
     let start = part.content.start;
     let wide = *file.get(start)? == 1;
     // Version and flags, two times, the scale or the track's id and a reserved field, the duration.

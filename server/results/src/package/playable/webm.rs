@@ -1,4 +1,4 @@
-//! WebM (RFC 8794, RFC 9559): writes the duration into the segment's information.
+//! `WebM` (RFC 8794, RFC 9559): writes the duration into the segment's information.
 
 use super::opus;
 
