@@ -177,7 +177,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session is under way. */
+        /**
+         * Puts a policy in charge of the focus, or sets the focal power by hand. While a session is under way only the latter,
+         *     and only while it is paused or after an abort; that is recorded in the session.
+         */
         post: operations["operator_focus"];
         delete?: never;
         options?: never;
@@ -820,6 +823,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/surgeon/tablet-trials": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends. */
+        post: operations["surgeon_tried"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/surgeon/voice/{comment}/{piece}": {
         parameters: {
             query?: never;
@@ -1132,6 +1152,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/tablet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The page that tries a tablet. */
+        get: operations["surgeon_tablet_page"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/trust": {
         parameters: {
             query?: never;
@@ -1194,23 +1231,6 @@ export interface paths {
         get: operations["trust_check"];
         put?: never;
         post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/surgeon/tablet-trials": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends. */
-        post: operations["surgeon_tried"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1296,6 +1316,16 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "pause";
+            /** @description Reason for the pause, if it is known already. It can be given later, see [`Action::GiveReason`]. */
+            reason?: string;
+        } | {
+            /** @enum {string} */
+            action: "give-reason";
+            /**
+             * Format: int32
+             * @description Number of the pause among the session's events.
+             */
+            event: number;
             /** @description Reason for the pause. */
             reason: string;
         } | {
@@ -1440,7 +1470,10 @@ export interface components {
             /** @enum {string} */
             state: "running";
         } | {
-            /** @description Size in bytes. */
+            /**
+             * Format: int64
+             * @description Size in bytes.
+             */
             bytes: number;
             /** @description Head of the backup's chain: number and the beginning of the hash. */
             head: string;
@@ -1934,6 +1967,12 @@ export interface components {
          *     surgeon.
          */
         OperatorView: components["schemas"]["SurgeonView"] & {
+            /**
+             * Format: double
+             * @description Focal power to which the operator last moved the lens by hand in this pause or after the abort; none if nobody
+             *     did. It is the operator's own, and says nothing of a policy.
+             */
+            by_hand?: number | null;
             consent?: components["schemas"]["Consent"] | null;
             /** @description Version of the consent text that the session requires before its start; none if no consent is required. */
             consent_required?: string | null;
@@ -1941,10 +1980,13 @@ export interface components {
             latest_comments: components["schemas"]["CommentLine"][];
             /** @description The latest events in words, newest first. */
             log: components["schemas"]["LogLine"][];
+            /** @description Whether the operator may focus by hand: while the session is paused, and after an abort. */
+            may_focus_by_hand: boolean;
             /** @description Code of the participant. */
             participant: string;
             /** @description Name of the protocol. */
             protocol: string;
+            reason_wanted?: components["schemas"]["ReasonWanted"] | null;
             /** @description Name of the session's study; none outside studies. */
             study?: string | null;
             /** @description Why the disk has not taken the `unrecorded` event; none if that is not known. */
@@ -2018,6 +2060,11 @@ export interface components {
              */
             second: number;
         };
+        /**
+         * @description What paused a session. The surgeon can resume it too, unless it was the operator.
+         * @enum {string}
+         */
+        PauseCause: "operator" | "surgeon" | "restart" | "tablet-away" | "small-picture";
         /** @description When the session was paused, by a person or by a restart of the server. */
         PauseSpan: {
             /**
@@ -2043,6 +2090,19 @@ export interface components {
          * @enum {string}
          */
         Phase: "ready" | "notice" | "inspecting" | "questions" | "closing" | "completed" | "aborted";
+        /** @description The size of a picture, in pixels. */
+        PictureSize: {
+            /**
+             * Format: int32
+             * @description Height.
+             */
+            height: number;
+            /**
+             * Format: int32
+             * @description Width.
+             */
+            width: number;
+        };
         /** @description Rules for the places of aborted and withdrawn sessions, and for repeated sessions. */
         PlaceRules: {
             /** @description What happens to the place of an aborted session. */
@@ -2189,6 +2249,18 @@ export interface components {
         } | {
             /** @enum {string} */
             kind: "recognition";
+        };
+        /** @description A pause whose reason can still be given. */
+        ReasonWanted: {
+            /** @description Time of the pause, by the server's wall clock. */
+            at: string;
+            /** @description Role that paused the session. */
+            by: components["schemas"]["Role"];
+            /**
+             * Format: int32
+             * @description Number of the pause among the session's events.
+             */
+            event: number;
         };
         /**
          * @description What is recorded during a session, from its start to its end.
@@ -2456,6 +2528,24 @@ export interface components {
             /** @description The words, in order. */
             words: components["schemas"]["Words"][];
         };
+        /** @description What the surgeon saw for a while. */
+        SightSpan: components["schemas"]["PictureSize"] & {
+            /**
+             * Format: double
+             * @description Start, in seconds.
+             */
+            from: number;
+            /**
+             * Format: double
+             * @description Pictures a second.
+             */
+            per_second: number;
+            /**
+             * Format: double
+             * @description End, in seconds.
+             */
+            to: number;
+        };
         /** @description A request to sign in. */
         SignIn: {
             /** @description Whether the answer contains the token, for a program, instead of setting a cookie. */
@@ -2514,6 +2604,8 @@ export interface components {
         StudyAction: {
             /** @enum {string} */
             change: "open";
+            /** @description Whether to open it the first time even though its plan cannot work as it is meant. */
+            despite_concerns?: boolean;
         } | {
             /** @enum {string} */
             change: "close";
@@ -2537,6 +2629,8 @@ export interface components {
             analysis: string;
             /** @description The line to print, publish or mail before the first session; none until the orders are drawn. */
             commitment_line?: string | null;
+            /** @description What in the plan cannot work as it is meant, in sentences; empty once the study is open. */
+            concerns: string[];
             /** @description The definition, byte for byte. */
             definition: string;
             /** @description SHA-256 of the definition: the same at every site. */
@@ -2704,13 +2798,13 @@ export interface components {
             };
             /** @description Number of comments saved so far in this session, without those that were taken back. */
             comments: number;
-            /**
-             * @description Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
-             *     operator.
-             */
+            /** @description Whether the surgeon may pause the session. */
+            may_pause: boolean;
+            /** @description Whether the surgeon may resume the session: not after a pause by the operator. */
             may_resume: boolean;
             /** @description Whether the session is paused in that phase (by the operator, or by a restart of the server). */
             paused: boolean;
+            paused_by?: components["schemas"]["PauseCause"] | null;
             /** @description Phase of the session. */
             phase: components["schemas"]["Phase"];
             /** @description Whether this is a practice session. */
@@ -2749,8 +2843,22 @@ export interface components {
             /** @description The surgeon's code. */
             surgeon: string;
         };
+        /**
+         * @description Something that a trial needs of a tablet.
+         * @enum {string}
+         */
+        TabletPart: "encrypted" | "storage" | "disk" | "stream" | "picture" | "microphone" | "screen-on";
+        /** @description What a tablet found out about itself. */
+        TabletTrial: {
+            /** @description The tablet. */
+            device: components["schemas"]["DeviceId"];
+            /** @description What was tried. */
+            tried: components["schemas"]["TriedPart"][];
+        };
         /** @description A session over time. Seconds count from its start by the server's clocks, pauses included. */
         Timeline: {
+            /** @description When no tablet showed the surgeon's page. */
+            absences: components["schemas"]["PauseSpan"][];
             /** @description The comments. */
             comments: components["schemas"]["TimelineComment"][];
             /** @description When the session was paused and the lens held where it was. */
@@ -2761,6 +2869,8 @@ export interface components {
             set_aside: components["schemas"]["SetAside"][];
             /** @description When each setting was inspected. */
             settings: components["schemas"]["SettingSpan"][];
+            /** @description What size of picture the surgeon saw, and how many. */
+            sights: components["schemas"]["SightSpan"][];
         };
         /** @description A comment on the timeline. */
         TimelineComment: components["schemas"]["CommentContent"] & {
@@ -2861,6 +2971,13 @@ export interface components {
              */
             p: number;
         };
+        /** @description One thing that was tried on a tablet. */
+        TriedPart: {
+            /** @description What was tried. */
+            part: components["schemas"]["TabletPart"];
+            /** @description Whether it works. */
+            works: boolean;
+        };
         /** @description A request to unblind a session. */
         Unblind: {
             /** @description Whether to unblind even though something may be outstanding, which would then no longer count. */
@@ -2924,25 +3041,6 @@ export interface components {
             question?: string | null;
             /** @description The words; empty if they were erased. */
             text: string;
-        };
-        /**
-         * @description Something that a trial needs of a tablet.
-         * @enum {string}
-         */
-        TabletPart: "encrypted" | "storage" | "disk" | "stream" | "picture" | "microphone" | "screen-on";
-        /** @description One thing that was tried on a tablet. */
-        TriedPart: {
-            /** @description What was tried. */
-            part: components["schemas"]["TabletPart"];
-            /** @description Whether it works. */
-            works: boolean;
-        };
-        /** @description What a tablet found out about itself. */
-        TabletTrial: {
-            /** @description The tablet. */
-            device: components["schemas"]["DeviceId"];
-            /** @description What was tried. */
-            tried: components["schemas"]["TriedPart"][];
         };
     };
     responses: never;
@@ -8942,6 +9040,129 @@ export interface operations {
             };
         };
     };
+    surgeon_tried: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TabletTrial"];
+            };
+        };
+        responses: {
+            /** @description Noted */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": boolean;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Not what the page sends */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     surgeon_keep_piece: {
         parameters: {
             query: {
@@ -10564,6 +10785,86 @@ export interface operations {
             };
         };
     };
+    surgeon_tablet_page: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     trust_page: {
         parameters: {
             query?: never;
@@ -10839,120 +11140,6 @@ export interface operations {
             };
             /** @description The server listens on a loopback address and was asked for by another name */
             421: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server failed; its log says more */
-            500: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Too many pages are open at once */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-        };
-    };
-    surgeon_tried: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["TabletTrial"];
-            };
-        };
-        responses: {
-            /** @description Noted */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": boolean;
-                };
-            };
-            /** @description The request cannot be read */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The role is not held, or another site made the request */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description It took too long */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is too long */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is not said to be application/json */
-            415: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server listens on a loopback address and was asked for by another name */
-            421: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is JSON, but not as described */
-            422: {
                 headers: {
                     [name: string]: unknown;
                 };

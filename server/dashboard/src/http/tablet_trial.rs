@@ -27,7 +27,7 @@ struct Page {
 /// The page that tries a tablet.
 #[utoipa::path(get, path = "/tablet", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(_: SurgeonsTablet, Nonce(nonce): Nonce) -> Result<Response, Error> {
+async fn tablet_page(_: SurgeonsTablet, Nonce(nonce): Nonce) -> Result<Response, Error> {
     let html = Page { nonce }.render().map_err(|_| Error::Internal)?;
     let mut response = Html(html).into_response();
     response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);
@@ -70,5 +70,5 @@ async fn tried(
 
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(page)).routes(routes!(tried))
+    OpenApiRouter::new().routes(routes!(tablet_page)).routes(routes!(tried))
 }
