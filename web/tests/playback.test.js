@@ -286,6 +286,7 @@ test("playback that leaves frames out begins anew after a gap, and ends with the
 
 /** @type {Api.Timeline} */
 const TIMELINE = {
+  absences: [],
   comments: [],
   pauses: [],
   set_aside: [],
@@ -299,6 +300,7 @@ const TIMELINE = {
     { setting: 2, seconds: 12, frame: 3, asked: 0.5, metric: 0.5 },
     { setting: 2, seconds: 20, frame: 4, asked: 0.7, metric: 0.25 },
   ],
+  sights: [],
 };
 
 test("the metric's line reaches the top in every setting", () => {

@@ -69,15 +69,27 @@ test("the operator sees whether the surgeon’s tablet is there, and is warned d
   assert.equal(lamp({ presence: "hidden", away_seconds: 4 })?.level, "bad");
 
   const away = status({ presence: "silent", away_seconds: 4 });
-  assert.match(warnings(away, true)[0].text, /tablet has not answered for 4 s/);
+  assert.match(warnings(away, true)[0]?.text ?? "", /tablet has not answered for 4 s/);
   assert.deepEqual(warnings(away, false), [], "before a session the tablet may be anywhere");
-  assert.match(warnings(status({ presence: "hidden", away_seconds: 9 }), true)[0].text, /not on screen/);
+  assert.match(
+    warnings(status({ presence: "hidden", away_seconds: 9 }), true)[0]?.text ?? "",
+    /not on screen/,
+  );
   assert.deepEqual(warnings(status({}), true), []);
 });
 
 test("while the tablet is away, the line does not say that the surgeon is looking", () => {
   const facts = { known: true, missed: false, heardAt: null, refused: false, working: true, wrong: false };
-  const view = /** @type {Api.OperatorView} */ ({ ...VIEW, participant: "S-01", protocol: "p", log: [] });
+  /** @type {Api.OperatorView} */
+  const view = {
+    ...VIEW,
+    participant: "S-01",
+    protocol: "p",
+    log: [],
+    latest_comments: [],
+    may_focus_by_hand: false,
+    withdrawn: false,
+  };
   assert.match(nowWords({ ...facts, view, away: false }), /surgeon is looking/);
   assert.match(nowWords({ ...facts, view, away: true }), /tablet is away/);
 });

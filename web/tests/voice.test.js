@@ -7,7 +7,7 @@ import { VoiceOutbox } from "../static/surgeon/voice_outbox.js";
 import { heldWords, NO_CONNECTION } from "../static/surgeon/words.js";
 import { countedIds, FakeDisk, FakeTime, fakeStore, settle } from "./around.js";
 
-const PLACE = { session: "s", segment: "g", frame: 7, run: 1 };
+const PLACE = { session: "s", segment: "g", setting: 1, frame: 7, run: 1 };
 const noNetwork = () => new TypeError("Failed to fetch");
 
 /** @typedef {import("../static/surgeon/voice_outbox.js").Step} Step */

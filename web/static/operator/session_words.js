@@ -89,7 +89,7 @@ export function consentWords(view) {
  * The buttons, in order.
  *
  * @param {View} view
- * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" }[]}
+ * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" | "danger filled" }[]}
  */
 export function deeds(view) {
   const { phase, paused, setting, withdrawn } = view;

@@ -33,8 +33,8 @@ byId("file", HTMLInputElement).addEventListener("change", async (event) => {
 
 document.getElementById("template")?.addEventListener("click", (event) => {
   const button = /** @type {HTMLButtonElement} */ (event.currentTarget);
-  definition.value = button.dataset.template ?? "";
-  definition.focus();
+  shown.value = button.dataset.template ?? "";
+  shown.focus();
 });
 
 byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {

@@ -49,6 +49,7 @@ export class Sight {
 
   /** @param {number} now */
   #forget(now) {
-    while (this.#shown.length > 0 && now - this.#shown[0] >= RATE_MS) this.#shown.shift();
+    const kept = this.#shown.findIndex((shown) => now - shown < RATE_MS);
+    this.#shown.splice(0, kept < 0 ? this.#shown.length : kept);
   }
 }

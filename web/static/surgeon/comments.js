@@ -246,8 +246,9 @@ export class Comments {
 
     if (body.kind === "text") {
       this.#outbox.forget(entry);
-      const setting = this.#numbers.get(body.segment) ?? 0;
-      this.#begun ??= begunAt({ ...body, setting });
+      const { segment, frame, run, picture_width, pictures_per_second } = body;
+      const setting = this.#numbers.get(segment) ?? 0;
+      this.#begun ??= begunAt({ segment, setting, frame, run, picture_width, pictures_per_second });
       this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
     }
     this.trouble = `${refusedWords(body)}: ${reason}`;
