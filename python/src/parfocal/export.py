@@ -19,7 +19,7 @@ import pandas as pd
 from .errors import BadExport
 from .program import find_program, last_words
 
-NEWEST_FORMAT = 7
+NEWEST_FORMAT = 1
 """The newest format of exports that this version reads."""
 
 # Columns of words that stand for groups, in whatever table they are.

@@ -122,6 +122,9 @@ class Analysis(TypedDict):
     definition_sha256: str
     """SHA-256 of the study's definition."""
 
+    missing_sites: builtins.list[str]
+    """Names of the definition's sites of which no session is here."""
+
     notes: builtins.list[str]
     """Notes that apply to all figures."""
 
@@ -135,7 +138,7 @@ class Analysis(TypedDict):
     """Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`."""
 
     sites: builtins.list[str]
-    """Names of the study's sites that this database runs."""
+    """Names of the study's sites that this database, or the databases of this package, run."""
 
     study: str
     """Name of the study."""
@@ -199,6 +202,9 @@ class AnswerLine(TypedDict):
 
 AnswerValue = int | builtins.list[int] | str
 """The value of an answer."""
+
+BackupState = dict[str, Any]
+"""The state of the latest backup."""
 
 class CameraOffer(TypedDict):
     """What can be changed, and whether the last change failed."""
@@ -543,6 +549,12 @@ class LogLine(TypedDict):
     text: str
     """Description of the event."""
 
+class MakeBackup(TypedDict):
+    """A wish for a backup."""
+
+    passphrase: str
+    """The lead's own passphrase, entered again."""
+
 class Measure(TypedDict):
     """An item or a score of an answer as a number."""
 
@@ -691,14 +703,18 @@ class OperatorView(TypedDict):
     """Saved answers to those questions, by question id."""
 
     comments: int
-    """Number of comments saved so far in this session."""
+    """Number of comments saved so far in this session, without those that were taken back."""
+
+    may_pause: bool
+    """Whether the surgeon may pause the session."""
 
     may_resume: bool
-    """Whether the surgeon may resume the session: after a restart of the server, but not after a pause
-    by the operator."""
+    """Whether the surgeon may resume the session: not after a pause by the operator."""
 
     paused: bool
     """Whether the session is paused in that phase (by the operator, or by a restart of the server)."""
+
+    paused_by: NotRequired[PauseCause | None]
 
     phase: Phase
     """Phase of the session."""
@@ -717,6 +733,10 @@ class OperatorView(TypedDict):
 
     remaining_seconds: NotRequired[float | None]
     """Seconds of inspection left in the segment when the view was sent; none outside inspection."""
+
+    said: builtins.list[builtins.list[str]]
+    """The surgeon's own words about each setting, in the order they were said; empty outside the
+    closing questions."""
 
     segment: NotRequired[SegmentId | None]
 
@@ -739,6 +759,10 @@ class OperatorView(TypedDict):
     voice: bool
     """Whether the surgeon may comment aloud."""
 
+    by_hand: NotRequired[float | None]
+    """Focal power to which the operator last moved the lens by hand in this pause or after the abort;
+    none if nobody did. It is the operator's own, and says nothing of a policy."""
+
     consent: NotRequired[Consent | None]
 
     consent_required: NotRequired[str | None]
@@ -751,11 +775,16 @@ class OperatorView(TypedDict):
     log: builtins.list[LogLine]
     """The latest events in words, newest first."""
 
+    may_focus_by_hand: bool
+    """Whether the operator may focus by hand: while the session is paused, and after an abort."""
+
     participant: str
     """Code of the participant."""
 
     protocol: str
     """Name of the protocol."""
+
+    reason_wanted: NotRequired[ReasonWanted | None]
 
     study: NotRequired[str | None]
     """Name of the session's study; none outside studies."""
@@ -825,6 +854,9 @@ class Pair(TypedDict):
     second: int
     """Scale that is offered second."""
 
+PauseCause = Literal["operator", "surgeon", "restart", "tablet-away", "small-picture"]
+"""What paused a session. The surgeon can resume it too, unless it was the operator."""
+
 PauseSpan = TypedDict("PauseSpan", {"from": "float", "reason": "str", "to": "NotRequired[float | None]"})
 """When the session was paused, by a person or by a restart of the server."""
 
@@ -833,6 +865,15 @@ PermutationMethod = Literal["exact", "monte-carlo"]
 
 Phase = Literal["ready", "notice", "inspecting", "questions", "closing", "completed", "aborted"]
 """The phase of a session."""
+
+class PictureSize(TypedDict):
+    """The size of a picture, in pixels."""
+
+    height: int
+    """Height."""
+
+    width: int
+    """Width."""
 
 class PlaceRules(TypedDict):
     """Rules for the places of aborted and withdrawn sessions, and for repeated sessions."""
@@ -908,11 +949,14 @@ class Problem(TypedDict):
 class ProtocolAnalysis(TypedDict):
     """The analysis of a protocol's sessions."""
 
+    by_site: builtins.list[SiteAnalysis]
+    """The same for each site alone; empty if all sessions that count are of one site."""
+
     notes: builtins.list[str]
     """Notes that apply to this protocol's figures."""
 
     outcomes: builtins.list[Comparison]
-    """The outcomes, compared between the policies."""
+    """The outcomes, compared between the policies, over all sites."""
 
     policies: builtins.list[str]
     """Names of the policies."""
@@ -968,6 +1012,18 @@ Question = dict[str, Any]
 
 QuestionKind = dict[str, Any]
 """The kinds of question, by the answers that they take."""
+
+class ReasonWanted(TypedDict):
+    """A pause whose reason can still be given."""
+
+    at: str
+    """Time of the pause, by the server's wall clock."""
+
+    by: Role
+    """Role that paused the session."""
+
+    event: int
+    """Number of the pause among the session's events."""
 
 Record = Literal["none", "view", "mosaic"]
 """What is recorded during a session, from its start to its end."""
@@ -1268,6 +1324,9 @@ class SettingWords(TypedDict):
     words: builtins.list[Words]
     """The words, in order."""
 
+SightSpan = TypedDict("SightSpan", {"height": "int", "width": "int", "from": "float", "per_second": "float", "to": "float"})
+"""What the surgeon saw for a while."""
+
 class SignIn(TypedDict):
     """A request to sign in."""
 
@@ -1319,6 +1378,24 @@ class Site(TypedDict):
     title: str
     """Title of the site."""
 
+class SiteAnalysis(TypedDict):
+    """The figures of one site's sessions."""
+
+    outcomes: builtins.list[Comparison]
+    """The outcomes, compared between the policies."""
+
+    sessions: int
+    """Number of its sessions that count."""
+
+    site: str
+    """Name of the site."""
+
+    surgeons: int
+    """Number of its surgeons whose sessions count."""
+
+    whole_sessions: builtins.list[WholeSessions]
+    """Answers about sessions as a whole."""
+
 class SiteDetail(TypedDict):
     """A site of a study."""
 
@@ -1369,6 +1446,9 @@ class StudyDetail(TypedDict):
 
     commitment_line: NotRequired[str | None]
     """The line to print, publish or mail before the first session; none until the orders are drawn."""
+
+    concerns: builtins.list[str]
+    """What in the plan cannot work as it is meant, in sentences; empty once the study is open."""
 
     definition: str
     """The definition, byte for byte."""
@@ -1549,14 +1629,18 @@ class SurgeonView(TypedDict):
     """Saved answers to those questions, by question id."""
 
     comments: int
-    """Number of comments saved so far in this session."""
+    """Number of comments saved so far in this session, without those that were taken back."""
+
+    may_pause: bool
+    """Whether the surgeon may pause the session."""
 
     may_resume: bool
-    """Whether the surgeon may resume the session: after a restart of the server, but not after a pause
-    by the operator."""
+    """Whether the surgeon may resume the session: not after a pause by the operator."""
 
     paused: bool
     """Whether the session is paused in that phase (by the operator, or by a restart of the server)."""
+
+    paused_by: NotRequired[PauseCause | None]
 
     phase: Phase
     """Phase of the session."""
@@ -1575,6 +1659,10 @@ class SurgeonView(TypedDict):
 
     remaining_seconds: NotRequired[float | None]
     """Seconds of inspection left in the segment when the view was sent; none outside inspection."""
+
+    said: builtins.list[builtins.list[str]]
+    """The surgeon's own words about each setting, in the order they were said; empty outside the
+    closing questions."""
 
     segment: NotRequired[SegmentId | None]
 
@@ -1606,8 +1694,23 @@ class SurgeonWords(TypedDict):
     surgeon: str
     """The surgeon's code."""
 
+TabletPart = Literal["encrypted", "storage", "disk", "stream", "picture", "microphone", "screen-on"]
+"""Something that a trial needs of a tablet."""
+
+class TabletTrial(TypedDict):
+    """What a tablet found out about itself."""
+
+    device: DeviceId
+    """The tablet."""
+
+    tried: builtins.list[TriedPart]
+    """What was tried."""
+
 class Timeline(TypedDict):
     """A session over time. Seconds count from its start by the server's clocks, pauses included."""
+
+    absences: builtins.list[PauseSpan]
+    """When no tablet showed the surgeon's page."""
 
     comments: builtins.list[TimelineComment]
     """The comments."""
@@ -1623,6 +1726,9 @@ class Timeline(TypedDict):
 
     settings: builtins.list[SettingSpan]
     """When each setting was inspected."""
+
+    sights: builtins.list[SightSpan]
+    """What size of picture the surgeon saw, and how many."""
 
 TimelineComment = dict[str, Any]
 """A comment on the timeline."""
@@ -1679,6 +1785,15 @@ class Trend(TypedDict):
 
     p: float
     """Two-sided p."""
+
+class TriedPart(TypedDict):
+    """One thing that was tried on a tablet."""
+
+    part: TabletPart
+    """What was tried."""
+
+    works: bool
+    """Whether it works."""
 
 class Unblind(TypedDict):
     """A request to unblind a session."""
@@ -1806,6 +1921,20 @@ class AccountsRequests:
         """Changes an account."""
         return self._call("POST", f"/api/researcher/accounts/{account}/changes", body={"passphrase": passphrase, **fields})
 
+    def backup_state(self) -> BackupState:
+        """The state of the latest backup that the lead who is signed in asked for. It is kept for 15
+        minutes, unless words are erased."""
+        return self._call("GET", "/api/researcher/backup")
+
+    def start_backup(self, *, passphrase: str) -> BackupState:
+        """Begins to make a backup in the background, and records that. If one is being made already,
+        no other begins."""
+        return self._call("POST", "/api/researcher/backup", body={"passphrase": passphrase})
+
+    def backup_file(self) -> bytes:
+        """The backup as a file for `parfocal restore`."""
+        return self._call("GET", "/api/researcher/backup.db", answer="bytes")
+
     def sign_in(self, *, name: str, passphrase: str, as_bearer: bool | None = None, new_passphrase: str | None = None) -> SignedInAs:
         """Signs in. The answer takes longer after failed attempts."""
         return self._call("POST", "/api/sign-in", body={"as_bearer": as_bearer, "name": name, "new_passphrase": new_passphrase, "passphrase": passphrase})
@@ -1851,8 +1980,9 @@ class OperatorRequests:
         return self._call("POST", "/api/operator/dismissals", body={"session": session})
 
     def focus(self, **fields: Any) -> None:
-        """Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session
-        is under way."""
+        """Puts a policy in charge of the focus, or sets the focal power by hand. While a session is
+        under way only the latter, and only while it is paused or after an abort; that is recorded
+        in the session."""
         return self._call("POST", "/api/operator/focus", answer="nothing", body={**fields})
 
     def add_participant(self, *, code: str) -> builtins.list[str]:
@@ -2043,6 +2173,11 @@ class SurgeonRequests:
         """The session under way; null if there is none."""
         return self._call("GET", "/api/surgeon/session")
 
+    def tried(self, *, device: DeviceId, tried: builtins.list[TriedPart]) -> bytes:
+        """Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the
+        server ends."""
+        return self._call("POST", "/api/surgeon/tablet-trials", answer="bytes", body={"device": device, "tried": tried})
+
     def keep_piece(self, comment: str | int, piece: str | int, *, session: SessionId, through_ms: int, content: bytes, media_type: Literal["audio/mp4", "audio/ogg;codecs=opus", "audio/webm;codecs=opus"], ended: Literal["released", "limit", "microphone-lost", "left"] | None = None) -> None:
         """Stores a piece of a recording: once this has answered, it is on disk. The comment (of kind
         voice) must come first; its pieces may then come late, repeatedly, and in any order."""
@@ -2086,6 +2221,20 @@ class AsyncAccountsRequests:
     def change(self, account: str | int, *, passphrase: str, **fields: Any) -> Awaitable[builtins.list[AccountLine]]:
         """Changes an account."""
         return self._call("POST", f"/api/researcher/accounts/{account}/changes", body={"passphrase": passphrase, **fields})
+
+    def backup_state(self) -> Awaitable[BackupState]:
+        """The state of the latest backup that the lead who is signed in asked for. It is kept for 15
+        minutes, unless words are erased."""
+        return self._call("GET", "/api/researcher/backup")
+
+    def start_backup(self, *, passphrase: str) -> Awaitable[BackupState]:
+        """Begins to make a backup in the background, and records that. If one is being made already,
+        no other begins."""
+        return self._call("POST", "/api/researcher/backup", body={"passphrase": passphrase})
+
+    def backup_file(self) -> Awaitable[bytes]:
+        """The backup as a file for `parfocal restore`."""
+        return self._call("GET", "/api/researcher/backup.db", answer="bytes")
 
     def sign_in(self, *, name: str, passphrase: str, as_bearer: bool | None = None, new_passphrase: str | None = None) -> Awaitable[SignedInAs]:
         """Signs in. The answer takes longer after failed attempts."""
@@ -2132,8 +2281,9 @@ class AsyncOperatorRequests:
         return self._call("POST", "/api/operator/dismissals", body={"session": session})
 
     def focus(self, **fields: Any) -> Awaitable[None]:
-        """Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session
-        is under way."""
+        """Puts a policy in charge of the focus, or sets the focal power by hand. While a session is
+        under way only the latter, and only while it is paused or after an abort; that is recorded
+        in the session."""
         return self._call("POST", "/api/operator/focus", answer="nothing", body={**fields})
 
     def add_participant(self, *, code: str) -> Awaitable[builtins.list[str]]:
@@ -2323,6 +2473,11 @@ class AsyncSurgeonRequests:
     def session(self) -> Awaitable[SurgeonView | None]:
         """The session under way; null if there is none."""
         return self._call("GET", "/api/surgeon/session")
+
+    def tried(self, *, device: DeviceId, tried: builtins.list[TriedPart]) -> Awaitable[bytes]:
+        """Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the
+        server ends."""
+        return self._call("POST", "/api/surgeon/tablet-trials", answer="bytes", body={"device": device, "tried": tried})
 
     def keep_piece(self, comment: str | int, piece: str | int, *, session: SessionId, through_ms: int, content: bytes, media_type: Literal["audio/mp4", "audio/ogg;codecs=opus", "audio/webm;codecs=opus"], ended: Literal["released", "limit", "microphone-lost", "left"] | None = None) -> Awaitable[None]:
         """Stores a piece of a recording: once this has answered, it is on disk. The comment (of kind
