@@ -99,15 +99,15 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
         _ => None,
     };
 
-    // A start that fails makes no new folder.
-    let is_due = problems.0.is_empty() || arguments.data_dir.exists();
+    // After everything that only reads: a server that cannot start leaves the port alone.
+    let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error));
+    let listener = problems.keep(listener);
+
+    // A start that fails makes no new folder, and nothing in an empty one.
+    let is_due = problems.0.is_empty() || is_used(&arguments.data_dir);
     let folder = if is_due { problems.keep(LockedFolder::of(&arguments.data_dir)) } else { None };
     let keys = folder.as_ref().and_then(|_| problems.keep(Keys::load_or_create(&arguments.data_dir)));
     let certificates = problems.keep(certificates(arguments, folder.is_some(), clock));
-
-    // Last: a server that cannot start leaves the port alone.
-    let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error));
-    let listener = problems.keep(listener);
 
     match (folder, keys, certificates, calibration, library, camera, lens, listener) {
         (
@@ -154,6 +154,11 @@ fn registry(arguments: &Arguments, problems: &mut Problems) -> Registry {
         problems.keep(registry.build(&name));
     }
     registry
+}
+
+/// Whether there is something at `folder` besides an empty folder.
+fn is_used(folder: &Path) -> bool {
+    folder.exists() && folder.read_dir().map_or(true, |mut entries| entries.next().is_some())
 }
 
 /// The certificates; none without TLS. A local authority is kept in the data folder, so that must be `locked`.
