@@ -122,6 +122,18 @@ impl Theatre {
         self.operator.click("#reason-go").await;
     }
 
+    /// The operator aborts the session, because of `reason`.
+    pub async fn abort(&self, reason: &str) {
+        self.operator.click_labelled("#session-actions", "Abort").await;
+        self.give_reason(reason).await;
+    }
+
+    /// The operator writes, after a pause, why it was.
+    pub async fn say_why_paused(&self, reason: &str) {
+        self.operator.type_into("#pause-reason", reason).await;
+        self.operator.click("#reason-wanted [type=submit]").await;
+    }
+
     /// The surgeon taps the notice of setting `number` when it is shown, again and again until the page accepts the
     /// tap.
     pub async fn tap_notice(&self, number: usize) {

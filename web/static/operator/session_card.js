@@ -42,6 +42,7 @@ export class SessionCard {
   follow(session) {
     // The button that was pressed goes away, and would take the focus to the page's beginning.
     const isHere = byId("session-card").contains(document.activeElement);
+    if (session?.session !== this.#session?.session) byId("pause-reason", HTMLInputElement).value = "";
     this.#session = session;
     const seconds = session?.remaining_seconds;
     this.#endsAt = seconds == null ? null : performance.now() + seconds * 1000;
