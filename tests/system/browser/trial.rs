@@ -4,6 +4,7 @@
 use super::aftermath::{database, export, researcher};
 use super::blinding;
 use super::driver::Driver;
+use super::instruments::choose_in_view;
 use super::screenshots::{resize, shoot};
 use super::theatre::{Theatre, kill, start_again};
 use super::wait::until;
@@ -219,20 +220,24 @@ async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre) {
     theatre.tap_notice(6).await;
     operator.sees("#phase", "Setting 6 of 6: inspecting").await;
 
-    operator.click("#session-actions button:nth-child(2)").await;
-    operator.type_into("#reason", "The lamp was moved").await;
-    shoot(operator, "operator-4-reason").await;
-    operator.click("#reason-go").await;
-
+    // One tap pauses. Why can be told afterwards.
+    operator.click_labelled("#session-actions", "Pause").await;
     surgeon.sees("#panel", "The operator has paused the session").await;
     shoot(surgeon, "surgeon-8-paused").await;
-    operator.sees("#log", "Paused: The lamp was moved").await;
+    operator.sees("#log", "Paused").await;
+
+    operator.sees("#pause-reason-label", "Why you paused at").await;
+    operator.type_into("#pause-reason", "The lamp was moved").await;
+    shoot(operator, "operator-4-reason").await;
+    operator.click("#reason-wanted [type=submit]").await;
+    operator.sees("#log", ": The lamp was moved").await;
+    operator.sees_no("#reason-wanted").await;
 
     operator.click("#session-actions .primary").await;
     surgeon.sees_no("#panel").await;
 
     operator.sees("#session-actions", "End setting 6 now").await;
-    operator.click("#session-actions button:first-child").await;
+    operator.click_labelled("#session-actions", "End setting").await;
     operator.sees("#reason-heading", "End setting 6 now").await;
     operator.sees_no("#reason").await;
     shoot(operator, "operator-11-end-setting").await;
@@ -282,7 +287,7 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     let give = async |items: std::ops::Range<usize>| {
         for (item, point) in [4, 2, 3, 1, 4, 3, 2, 2, 4, 2].into_iter().enumerate().take(items.end).skip(items.start) {
-            theatre.choose(&format!("usability-{item}"), point).await;
+            choose_in_view(theatre, &format!("usability-{item}"), point).await;
         }
     };
 

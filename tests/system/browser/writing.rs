@@ -14,7 +14,7 @@ const REMARKS: &str = "[data-question=remarks] textarea";
 impl Theatre {
     /// The operator ends the session and removes it from the screens.
     pub async fn put_away(&self) {
-        self.operator.click("#session-actions .danger").await;
+        self.operator.click_labelled("#session-actions", "Abort").await;
         self.give_reason("Enough").await;
         self.operator.sees("#phase", "Aborted").await;
         self.operator.click("#session-actions .primary").await;
