@@ -82,7 +82,7 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     let mut lens = problems.keep(lens::open_or_await(&arguments.lens, Arc::clone(clock)));
     let optics = lens.as_ref().map_or_else(|| stand_in(clock), |lens| Ok(lens.optics()))?;
     let settings = CameraSettings { fps: arguments.fps.into(), seed, optics, clock: Arc::clone(clock) };
-    let camera = problems.keep(camera::open(&arguments.camera, settings));
+    let camera = problems.keep(camera::open_or_await(&arguments.camera, settings));
 
     // A camera that cannot be opened is reported once, and not again by the calibration that comes with it.
     let own = camera::own_calibration(&arguments.camera).filter(|_| camera.is_some());
