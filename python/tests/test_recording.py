@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import parfocal
 from parfocal.program import find_program
@@ -61,6 +62,17 @@ def test_reflectances_are_between_dark_and_white(made: Path) -> None:
     assert float(reflectance[100, 200, band]) == pytest.approx(expected, abs=1e-6)
     assert reflectance.sel(wavelength=550, method="nearest").shape == (272, 512)
     assert recording.reflectance().shape == (recording.sizes["frame"], 272, 512, 16)
+
+
+def test_colours_are_those_of_the_program(made: Path, tmp_path: Path) -> None:
+    run("recording", "video", str(made), "--out", str(tmp_path / "pictures"))
+    first = min((tmp_path / "pictures").glob("*.png"))
+    with Image.open(first) as picture:
+        expected = np.asarray(picture.convert("RGB")).astype(int)
+    found = parfocal.open_recording(made).rgb(0).astype(int)
+    # The program computes in whole numbers.
+    assert np.abs(found - expected).max() <= 3
+    assert np.abs(found - expected).mean() < 0.6
 
 
 def test_a_frame_that_is_not_there_is_named(made: Path) -> None:

@@ -1,4 +1,4 @@
-"""parfocal for Python: exports, recordings, a client, and a server for tests.
+"""parfocal for Python: exports, recordings, a client, a server for tests, and training environments.
 
 Everything is imported when it is first used, so ``import parfocal`` is quick.
 """
@@ -21,6 +21,7 @@ from .errors import (
 
 if TYPE_CHECKING:
     from .client import AsyncClient, Client
+    from .environment import FocusEnv, FocusVectorEnv
     from .export import Export, load
     from .lens import EmulatedLens
     from .live import Frame
@@ -34,6 +35,8 @@ _HOMES = {
     "Client": "client",
     "EmulatedLens": "lens",
     "Export": "export",
+    "FocusEnv": "environment",
+    "FocusVectorEnv": "environment",
     "Frame": "live",
     "Recording": "recording",
     "Server": "server",
@@ -48,6 +51,8 @@ __all__ = [
     "Client",
     "EmulatedLens",
     "Export",
+    "FocusEnv",
+    "FocusVectorEnv",
     "Frame",
     "IncompatibleServer",
     "NoProgram",

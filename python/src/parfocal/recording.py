@@ -32,7 +32,7 @@ _MOST_BYTES = 2 << 30
 
 
 class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
-    """A recording: an `xarray.Dataset` whose methods also give reflectances and cubes.
+    """A recording: an `xarray.Dataset` whose methods also give reflectances, colours and cubes.
 
     ``mosaic`` has the dimensions frame, y and x. Times, focal powers and frame numbers are coordinates
     of ``frame``; ``wavelength`` is one of the sixteen bands. Slices such as
@@ -59,6 +59,19 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
             balanced = xr.dot(parts, rows, dim="from_wavelength").assign_coords(wavelength=self["wavelength"])
             balanced = balanced.astype(np.float32)
         return balanced.rename("reflectance").assign_attrs(long_name="reflectance", units="1")
+
+    def rgb(self, frame: int) -> npt.NDArray[np.uint8]:
+        """Return one frame's picture in sRGB, one pixel a mosaic cell: height, width, 3."""
+        if any(colour not in self.variables for colour in ("red", "green", "blue")):
+            raise BadRecording(
+                "This recording was made by a version that did not keep the weights of its colours. "
+                "Get pictures with: parfocal recording video DIR --out FOLDER."
+            )
+        weights = np.stack([self[colour].to_numpy() for colour in ("red", "green", "blue")], axis=-1)
+        linear = np.clip(self._balanced(frame).to_numpy() @ weights.astype(np.float32), 0.0, 1.0)
+        encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        picture: npt.NDArray[np.uint8] = np.rint(255.0 * encoded).astype(np.uint8)
+        return picture
 
     def _frame(self, frame: int) -> xr.DataArray:
         count = self.sizes["frame"]
