@@ -228,16 +228,7 @@ function worker(version, caches) {
     },
   };
   const fetch = (/** @type {string | Request} */ what) => network.fetch(what);
-  vm.runInNewContext(SCRIPT, {
-    self,
-    caches,
-    fetch,
-    URL,
-    Response,
-    AbortController,
-    setTimeout,
-    clearTimeout,
-  });
+  vm.runInNewContext(SCRIPT, { self, caches, fetch, URL, Response, AbortSignal });
 
   const lives = async (/** @type {string} */ name) => {
     /** @type {Promise<unknown>} */

@@ -46,12 +46,7 @@ function openPage() {
     outbox: /** @type {any} */ (outbox),
     record: /** @type {any} */ (record),
     here: () => place,
-    stamp: () => ({
-      device: "tablet",
-      sequence: 1,
-      client_millis: time.wall(),
-      clock: { page: "page", at: time.wall(), slept: 0 },
-    }),
+    stamp: () => ({ client_millis: time.wall() }),
     now: time.page,
     later: time.later,
     changed: () => {},

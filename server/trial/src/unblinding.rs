@@ -105,7 +105,6 @@ mod tests {
     use crate::event::Event;
     use crate::phase::SessionStatus;
     use crate::session::Plan;
-    use crate::tablet::WhenAway;
 
     const SESSION: SessionId = SessionId(Uuid::from_u128(1));
     const OTHER: SessionId = SessionId(Uuid::from_u128(2));
@@ -122,7 +121,6 @@ mod tests {
             after_segment: Vec::new(),
             closing: Vec::new(),
             consent: None,
-            when_tablet_away: WhenAway::Pause,
         };
 
         let mut state = SessionState::new(plan);

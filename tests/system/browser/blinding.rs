@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 57] = [
+const KEYS: [&str; 53] = [
     "age",
     "answers",
     "area",
@@ -48,7 +48,6 @@ const KEYS: [&str; 57] = [
     "labels",
     "lens_simulated",
     "low",
-    "may_pause",
     "may_resume",
     "name",
     "notice",
@@ -56,7 +55,6 @@ const KEYS: [&str; 57] = [
     "pairs",
     "patch",
     "paused",
-    "paused_by",
     "per_cell",
     "phase",
     "points",
@@ -65,7 +63,6 @@ const KEYS: [&str; 57] = [
     "questions",
     "quick_comments",
     "radius",
-    "reduced",
     "run",
     "remaining_seconds",
     "scales",
@@ -77,7 +74,6 @@ const KEYS: [&str; 57] = [
     "text",
     "ties",
     "title",
-    "travel",
     "type",
     "unrecorded",
     "view",
@@ -193,19 +189,9 @@ fn json(seen: &mut Seen, text: &str) {
     }
     if view["phase"] == "inspecting" {
         let mut form = view.clone();
-        let changing = [
-            "setting",
-            "segment",
-            "remaining_seconds",
-            "comments",
-            "prompt",
-            "paused",
-            "paused_by",
-            "may_pause",
-            "may_resume",
-            "unrecorded",
-        ];
-        for changing in changing {
+        for changing in
+            ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume", "unrecorded"]
+        {
             form[changing] = Value::Null;
         }
         seen.inspecting.entry(session).or_default().insert(form.to_string());

@@ -2,7 +2,6 @@
 
 mod accounts;
 pub mod analysis;
-mod backup;
 mod blinding;
 mod checks;
 mod crowd;

@@ -11,15 +11,6 @@ const EVERY_MS = 2000;
 const button = byId("record", HTMLButtonElement);
 let recording = false;
 let busy = false;
-/** What was told about a recording before the session under way. */
-let told = "";
-let notice = "";
-
-/** Another session begins: what became of an earlier one's recording is no longer told. */
-export function forgetNotice() {
-  told = notice;
-  byId("recording-notice").hidden = true;
-}
 
 /** @param {Api.RecordingStatus} status */
 function draw(status) {
@@ -38,16 +29,12 @@ function draw(status) {
  *
  * @param {Api.RecordingStatus} status
  */
-function drawNotice({ notice: now, notice_warns: warns }) {
-  notice = now ?? "";
-  // The same words a second time would be told again after another recording.
-  if (recording) told = "";
+function drawNotice({ notice, notice_warns: warns }) {
   const line = byId("recording-notice");
   line.className = warns ? "notice-line warn" : "notice-line";
   line.setAttribute("role", warns ? "alert" : "status");
-  const isNews = !recording && notice !== "" && notice !== told;
-  setText(line, isNews ? notice : "");
-  line.hidden = !isNews;
+  setText(line, (!recording && notice) || "");
+  line.hidden = recording || !notice;
 }
 
 async function refresh() {

@@ -1,18 +1,29 @@
 // Shows the surgeon's link, to be copied. In a study the link opens only the session under way.
 
 import { get } from "../shared/api.js";
-import { copyOnPress } from "../shared/copy.js";
 import { byId, setText } from "../shared/dom.js";
 import { tellTrouble } from "../shared/trouble.js";
+
+const TOLD_MS = 2000;
 
 /** How often the link is asked for again. The server's address may change, for example with the network. */
 const ASK_AGAIN_MS = 60_000;
 
 export function offerLink() {
-  const button = byId("copy-link", HTMLButtonElement);
+  const button = byId("copy-link");
   const link = byId("surgeon-link", HTMLInputElement);
 
-  copyOnPress(button, link);
+  button.onclick = async () => {
+    link.select();
+    try {
+      await navigator.clipboard.writeText(link.value);
+    } catch {
+      // The clipboard interface is missing on plain http.
+      document.execCommand("copy");
+    }
+    setText(button, "Copied");
+    setTimeout(() => setText(button, "Copy link"), TOLD_MS);
+  };
   setInterval(askAgain, ASK_AGAIN_MS);
 }
 

@@ -63,14 +63,16 @@ export class Drafts {
   }
 
   /**
-   * The draft in `slot`; null if there is none.
+   * The draft in `slot`; null if there is none. Older versions of the page stored the value alone.
    *
    * @param {string} slot
    * @returns {Kept | null}
    */
   #read(slot) {
     try {
-      return JSON.parse(this.#store.read(slot) ?? "null");
+      const kept = JSON.parse(this.#store.read(slot) ?? "null");
+      if (kept === null) return null;
+      return kept.given ? kept : { key: this.#newId(), given: this.#origins.stamp(), value: kept };
     } catch {
       return null;
     }

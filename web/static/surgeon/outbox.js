@@ -6,7 +6,6 @@
 // next opened.
 
 import { inWords, Refused } from "../shared/api.js";
-import { NO_CONNECTION } from "./words.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
@@ -22,7 +21,7 @@ const LONGEST_WAIT_MS = 8000;
  * @property {string} id sorts in the order in which things were said
  * @property {string} path
  * @property {string | null} slot
- * @property {Stamp} given
+ * @property {Stamp} [given]
  * @property {boolean} drafted
  * @property {Record<string, any>} body
  * @property {boolean} [stored]
@@ -263,7 +262,7 @@ export class Outbox {
   async #send(entry) {
     entry.sending = true;
     try {
-      await this.#around.send(entry.path, { ...entry.body, ...this.#around.origins.tell(entry.given) });
+      await this.#around.send(entry.path, { ...entry.body, ...this.#origin(entry) });
       this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");
@@ -295,7 +294,7 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, NO_CONNECTION);
+    this.trouble = inWords(error, "No connection. This page keeps trying.");
     const heard = error instanceof Refused;
     this.#tell(entry, "waiting", this.trouble, heard);
     return heard;
@@ -324,6 +323,18 @@ export class Outbox {
     this.#done.add(entry.id);
     this.#around.store.remove(PREFIX + entry.id);
     this.#around.spare.remove(entry.id);
+  }
+
+  /**
+   * Where and when `entry` was said. Comments from older versions of the page have only the wall clock's time. Answers
+   * from those versions have no time at all.
+   *
+   * @param {Entry} entry
+   */
+  #origin({ given, body }) {
+    if (given) return this.#around.origins.tell(given);
+    if (body.client_millis === undefined) return {};
+    return this.#around.origins.tell({ client_millis: body.client_millis });
   }
 
   /** @param {Entry} entry */

@@ -1,6 +1,6 @@
 // The questions on screen: draws them, sends the answers, and says which questions are still open.
 
-import { make, setText } from "../shared/dom.js";
+import { make } from "../shared/dom.js";
 import { tell, tellUntilAnswered } from "../shared/trouble.js";
 import { PATH, placeOf, slotOf } from "./answers.js";
 import { drafts, later } from "./device.js";
@@ -17,7 +17,6 @@ export class QuestionPanel {
   #questionnaire;
   /** @type {QuestionBox[]} */
   #boxes;
-  #progress = make("p", { className: "progress number" });
   #missing = make("p", { id: "missing", className: "message", role: "alert" });
 
   /**
@@ -51,8 +50,6 @@ export class QuestionPanel {
 
     return answerTo(question, answered, {
       settings: state.settings,
-      said: state.said ?? [],
-      lot: state.session,
       later,
       draft: () => drafts.open(`answer.${slot}`),
       give: (_, value, part, from) => {
@@ -74,10 +71,9 @@ export class QuestionPanel {
       { className: "questions" },
       make("h2", { tabIndex: -1 }, heading),
       ...this.#boxes.map(({ element }) => element),
-      make("div", { className: "done" }, this.#progress, this.#missing, done),
+      make("div", { className: "done" }, this.#missing, done),
     );
-    this.#drawProgress();
-    return { className: "asking", nodes: [form] };
+    return { className: "", nodes: [form] };
   }
 
   async #done() {
@@ -118,7 +114,6 @@ export class QuestionPanel {
   /** The surgeon has changed an answer. Clears the message about open questions once none is marked as open. */
   #settled() {
     if (!this.#questionnaire.marked) tell(this.#missing, "");
-    this.#drawProgress();
   }
 
   /**
@@ -158,10 +153,5 @@ export class QuestionPanel {
 
   #draw() {
     for (const box of this.#boxes) box.draw();
-    this.#drawProgress();
-  }
-
-  #drawProgress() {
-    setText(this.#progress, this.#questionnaire.progressWords);
   }
 }

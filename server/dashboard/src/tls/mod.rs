@@ -9,7 +9,6 @@ mod authority;
 mod certificates;
 mod error;
 mod facts;
-mod fitness;
 mod given;
 mod names;
 

@@ -147,7 +147,11 @@ impl Writer {
             return Ok(());
         }
 
-        store.write_telemetry(async |connection| self.write_on(connection, store.run()).await).await
+        let turn = store.telemetry_turn().await;
+        let mut connection = store.inner.telemetry.acquire().await?;
+        let written = self.write_on(&mut connection, store.run()).await;
+        turn.end(connection, &written);
+        written
     }
 
     async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
@@ -197,7 +201,11 @@ impl Store {
         let started = self.inner.started;
         let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
 
-        self.write(async |connection| seal(connection, segments, &wall).await).await
+        let turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let sealed = seal(&mut connection, segments, &wall).await;
+        turn.end(connection, &sealed);
+        sealed
     }
 }
 
@@ -210,7 +218,7 @@ async fn seal(connection: &mut SqliteConnection, segments: &BTreeSet<SegmentId>,
     }
 
     for session in sessions {
-        chain::seal(&mut transaction, &session, wall).await?;
+        chain::seal(&mut transaction, &session, wall, false).await?;
     }
     Ok(transaction.commit().await?)
 }

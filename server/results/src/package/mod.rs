@@ -10,7 +10,6 @@ mod error;
 mod join;
 mod labels;
 mod parquet;
-mod playable;
 mod r;
 mod redcap;
 mod source;

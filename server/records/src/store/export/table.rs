@@ -36,23 +36,14 @@ pub struct Column {
     pub unit: &'static str,
     /// What it means.
     pub description: &'static str,
-    /// Whether and how the chain hashes it.
-    pub proof: Proof,
+    /// The first format of exports that has it.
+    pub since: u64,
 }
 
-/// Whether and how the chain hashes a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Proof {
-    /// Not at all: it follows from other columns or from other records.
-    None,
-    /// Openly: no export withholds it.
-    Open,
-    /// With a salt: it can be withheld or erased.
-    Sealed,
-}
-
-/// The format of exports that this version writes. A change of the tables or their columns gives it another number.
-pub const FORMAT: u64 = 1;
+/// The format of exports that this version writes. Each format added something. 7: voice comments. 6: personal
+/// accounts. 5: recordings, studies, corrections, scores, consents, withdrawals and erasures. 4: the chain. 3: what the
+/// policies knew about the optic. 2: what was said late, and on which device. 1: did not yet state its format.
+pub const FORMAT: u64 = 7;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]
@@ -173,13 +164,13 @@ impl<T: Cell> Cell for Option<T> {
 pub struct Meaning {
     unit: &'static str,
     description: &'static str,
-    proof: Proof,
+    since: u64,
 }
 
-/// A column that means `description`, has no unit, and is not hashed.
+/// A column that means `description`, has no unit, and has been there since the first format.
 #[must_use]
 pub const fn means(description: &'static str) -> Meaning {
-    Meaning { unit: "", description, proof: Proof::None }
+    Meaning { unit: "", description, since: 1 }
 }
 
 impl Meaning {
@@ -189,22 +180,16 @@ impl Meaning {
         Self { unit, ..self }
     }
 
-    /// The same in a column that the chain hashes openly.
+    /// The same in a column that exports have since `format`.
     #[must_use]
-    pub const fn open(self) -> Self {
-        Self { proof: Proof::Open, ..self }
-    }
-
-    /// The same in a column that the chain hashes with a salt.
-    #[must_use]
-    pub const fn sealed(self) -> Self {
-        Self { proof: Proof::Sealed, ..self }
+    pub const fn since(self, format: u64) -> Self {
+        Self { since: format, ..self }
     }
 
     /// The column called `name`.
     #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
-        Column { name, kind, unit: self.unit, description: self.description, proof: self.proof }
+        Column { name, kind, unit: self.unit, description: self.description, since: self.since }
     }
 }
 
@@ -307,6 +292,17 @@ impl Table {
         self.columns.iter().map(|column| column.name)
     }
 
+    /// The first format of exports that has it.
+    #[must_use]
+    pub fn since(&self) -> u64 {
+        self.columns.iter().map(|column| column.since).min().unwrap_or(1)
+    }
+
+    /// The columns that it had in exports of format `format`.
+    pub fn columns_of(&self, format: u64) -> impl Iterator<Item = &'static Column> {
+        self.columns.iter().filter(move |column| column.since <= format)
+    }
+
     /// Its Frictionless schema.
     pub fn schema(&self) -> Value {
         let fields: Vec<Value> = self.columns.iter().map(Column::field).collect();
@@ -352,10 +348,11 @@ impl Column {
         }
     }
 
-    /// Whether `csv`, in this column of a CSV file, stands for `cell`.
+    /// Whether `csv`, in this column of a CSV file, stands for `cell`. Earlier versions wrote texts without an
+    /// apostrophe.
     #[must_use]
     pub fn tells(&self, csv: &str, cell: &Value) -> bool {
-        csv == self.csv(cell)
+        csv == self.csv(cell) || csv == plain(cell)
     }
 }
 
@@ -385,7 +382,7 @@ mod tests {
     use super::*;
 
     fn column(kind: Type) -> Column {
-        Column { name: "text", kind, unit: "", description: "", proof: Proof::None }
+        Column { name: "text", kind, unit: "", description: "", since: 1 }
     }
 
     #[test]
@@ -409,7 +406,7 @@ mod tests {
         #[derive(Debug)]
         MarkRow {
             number: u32 = means("Order"),
-            at: Option<Timestamp> = means("When").in_unit("UTC"),
+            at: Option<Timestamp> = means("When").in_unit("UTC").since(2),
             text: Option<String> = means("What"),
         }
     }
@@ -419,17 +416,19 @@ mod tests {
         let columns: Vec<_> = MarkRow::TABLE
             .columns
             .iter()
-            .map(|column| (column.name, column.kind, column.unit, column.description))
+            .map(|column| (column.name, column.kind, column.unit, column.description, column.since))
             .collect();
 
         let expected = [
-            ("number", Type::Integer, "", "Order"),
-            ("at", Type::Datetime, "UTC", "When"),
-            ("text", Type::String, "", "What"),
+            ("number", Type::Integer, "", "Order", 1),
+            ("at", Type::Datetime, "UTC", "When", 2),
+            ("text", Type::String, "", "What", 1),
         ];
 
         assert_eq!(columns, expected);
         assert_eq!(MarkRow::TABLE.key, ["number", "at"]);
+        let first: Vec<_> = MarkRow::TABLE.columns_of(1).map(|column| column.name).collect();
+        assert_eq!(first, ["number", "text"]);
 
         let row = MarkRow { number: 3, at: Some(Timestamp::UNIX_EPOCH), text: None };
         assert_eq!(row.cells(), [json!(3), json!("1970-01-01T00:00:00Z"), Value::Null]);
@@ -487,9 +486,9 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_stands_for_its_text_as_it_is_written() {
+    fn cells_of_earlier_versions_are_known() {
         let text = column(Type::String);
-        assert!(text.tells("'=1+1", &json!("=1+1")) && !text.tells("=1+1", &json!("=1+1")));
+        assert!(text.tells("'=1+1", &json!("=1+1")) && text.tells("=1+1", &json!("=1+1")));
         assert!(!text.tells("'1+1", &json!("1+1")) && !text.tells("'=1+1", &json!("'=1+1 ")));
     }
 }

@@ -2,29 +2,38 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
 use super::writing::{change_study, insert_study};
 use super::{NewStudy, StudyChange};
 use crate::store::lock::FolderLock;
 use crate::store::schema::DATABASE;
-use crate::store::writer::Writer;
+use crate::store::values::drop_if_failed;
 use crate::store::{Reader, Store, StoreError};
 use parfocal_trial::study::definition::StudyName;
 
 /// Writes studies. Clone freely.
 #[derive(Clone)]
 pub struct StudyBook {
-    writer: Writer,
+    way: Backend,
     reader: Reader,
-    /// Keeps servers out while a command writes, so that no server decides on data that is being changed.
-    _lock: Option<Arc<FolderLock>>,
+}
+
+#[derive(Clone)]
+enum Backend {
+    /// Within the server.
+    Server(Store),
+    /// From the command line. The lock keeps servers out, so that no server decides on data that is being changed.
+    CommandLine { pool: SqlitePool, _lock: Arc<FolderLock> },
 }
 
 impl StudyBook {
     /// The book of the server.
     #[must_use]
     pub fn of_server(store: &Store) -> Self {
-        Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), _lock: None }
+        Self { way: Backend::Server(store.clone()), reader: store.reader().clone() }
     }
 
     /// Opens the book of data folder `folder` for a command.
@@ -39,13 +48,22 @@ impl StudyBook {
 
         let lock = Arc::new(FolderLock::of(folder)?);
         let reader = Reader::open(folder).await?;
-        Ok(Self { writer: Writer::of_command(&file).await?, reader, _lock: Some(lock) })
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            .synchronous(SqliteSynchronous::Full);
+        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+        Ok(Self { way: Backend::CommandLine { pool, _lock: lock }, reader })
     }
 
     /// The run of the server that writes in it; `None` for a command.
     #[must_use]
     pub fn run(&self) -> Option<i64> {
-        self.writer.run()
+        match &self.way {
+            Backend::Server(store) => Some(store.run()),
+            Backend::CommandLine { .. } => None,
+        }
     }
 
     /// The reader of the same database.
@@ -59,7 +77,15 @@ impl StudyBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn plan(&self, new: &NewStudy, planned: &StudyChange) -> Result<(), StoreError> {
-        self.writer.write(async |connection| insert_study(connection, self.run(), new, planned).await).await
+        let (pool, _turn) = match &self.way {
+            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Backend::CommandLine { pool, .. } => (pool, None),
+        };
+
+        let mut connection = pool.acquire().await?;
+        let done = insert_study(&mut connection, self.run(), new, planned).await;
+        drop_if_failed(connection, &done);
+        done
     }
 
     /// Writes all of `change` of `study`, or nothing. It is on disk when this returns.
@@ -67,11 +93,22 @@ impl StudyBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
-        self.writer.write(async |connection| change_study(connection, self.run(), study, change).await).await
+        let (pool, _turn) = match &self.way {
+            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Backend::CommandLine { pool, .. } => (pool, None),
+        };
+
+        let mut connection = pool.acquire().await?;
+        let done = change_study(&mut connection, self.run(), study, change).await;
+        drop_if_failed(connection, &done);
+        done
     }
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        self.writer.close(&self.reader).await;
+        if let Backend::CommandLine { pool, .. } = &self.way {
+            self.reader.close().await;
+            pool.close().await;
+        }
     }
 }

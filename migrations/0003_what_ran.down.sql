@@ -1,0 +1,3 @@
+ALTER TABLE runs DROP COLUMN weights;
+ALTER TABLE comments DROP COLUMN waited_ms;
+ALTER TABLE comments DROP COLUMN frame_run;

@@ -1,0 +1,11 @@
+DROP TABLE surgeon_devices;
+ALTER TABLE answers DROP COLUMN late;
+ALTER TABLE answers DROP COLUMN waited_by;
+ALTER TABLE answers DROP COLUMN waited_ms;
+ALTER TABLE answers DROP COLUMN client_millis;
+ALTER TABLE answers DROP COLUMN sequence;
+ALTER TABLE answers DROP COLUMN device;
+ALTER TABLE comments DROP COLUMN late;
+ALTER TABLE comments DROP COLUMN waited_by;
+ALTER TABLE comments DROP COLUMN sequence;
+ALTER TABLE comments DROP COLUMN device;

@@ -1,0 +1,3 @@
+DROP TABLE accesses;
+DROP TABLE chain_salts;
+DROP TABLE chain;
