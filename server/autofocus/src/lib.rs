@@ -21,8 +21,7 @@ pub use registry::{PolicyEntry, PolicyError, Registry};
 
 use std::sync::Arc;
 
-use parfocal_base::BlurRate;
-use parfocal_base::FocalPower;
+use parfocal_base::{BlurRate, FocalPower};
 use parfocal_imaging::View;
 
 /// Step of the paper's policies in focal power.
