@@ -5,16 +5,18 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
-# GigE Vision and USB3 Vision come in wherever their libraries are; nothing needs them.
-FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
+# GigE Vision and USB3 Vision come in wherever their libraries are; nothing needs them. The shell asks when it comes to
+# the command, because .ci/setup may install the libraries just before.
+FEATURES := $$(.ci/features)
 
-# A Debian package of the release build: target/parfocal_VERSION_amd64.deb.
+# What a release consists of, in target/: a Debian package, the Python package (wheel and source archive), an SBOM, checksums.
+# The program tells what it is made of: `cargo audit bin target/release/parfocal`.
 package:
 	@.ci/setup package
-	@cargo build --release --locked $(FEATURES)
-	@deploy/debian/build
+	@cargo auditable build --release --locked $(FEATURES)
+	@FEATURES="$(FEATURES)" deploy/release
 
-.PHONY: run test package check lint web web-types unit interface readme packaged bench screenshots fuzz endurance
+.PHONY: run test package check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -26,14 +28,14 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint web unit interface readme packaged
+check: lint web unit interface python readme packaged
 
 # Tests and program are one build, so all is checked as it is shipped and compiled once. `cargo test` alone makes a
 # development build, which is faster after a change.
 lint:
 	cargo fmt --check
 	cargo clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
-	$(if $(FEATURES),cargo clippy --release --locked -- --deny warnings)
+	[ -z "$(FEATURES)" ] || cargo clippy --release --locked -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -46,12 +48,21 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
+# One failing test does not keep the others from running.
 unit:
-	cargo test --release --locked $(FEATURES)
+	cargo test --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
 	.ci/schemathesis $(FEATURES)
+
+# The Python package: format, lint, types, tests.
+python:
+	.ci/python
+
+# After a change of the HTTP interface and `make web-types`: the Python package's types and methods.
+python-interface:
+	python3 python/tools/generate_interface.py
 
 readme:
 	.ci/readme

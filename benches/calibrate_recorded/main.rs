@@ -10,7 +10,7 @@ use parfocal_base::PolicyName;
 use parfocal_devices::simulation::phantom::{Haste, Trajectory};
 use parfocal_learning::evaluation::{Outcome, evaluate};
 use parfocal_learning::scans::benchmark::SEED;
-use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
+use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, Recorded, RecordedScan};
 
 /// The paper's robotic column: policy and mean absolute error.
 const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];
@@ -31,7 +31,7 @@ fn main() {
 
 fn scan(seed: u64, haste: Haste, poses: usize) -> Arc<RecordedScan> {
     let trajectory = Trajectory::new(seed, poses, haste);
-    Arc::new(RecordedScan::phantom(&trajectory, seed, FOCAL_POWERS, &|| ()))
+    Arc::new(RecordedScan::phantom(&trajectory, seed, FOCAL_POWERS, Kept::Patches, &|| ()))
 }
 
 fn report(scans: Vec<Arc<RecordedScan>>, haste: Haste) {

@@ -20,7 +20,9 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::{self, Camera, CameraSettings, Frame, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
-use parfocal_imaging::{GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER};
+use parfocal_imaging::{
+    GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, Surroundings, View, WIDER,
+};
 use parfocal_pipeline::control::{
     Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper,
 };
@@ -34,7 +36,9 @@ fn patch() -> Patch {
 }
 
 fn view() -> View {
-    View { wider: [Some(patch()); WIDER.len()], ..View::from(patch()) }
+    let levels = (0..Surroundings::SIDE * Surroundings::SIDE).map(|index| texture(index) as f32).collect();
+    let surroundings = Some(Surroundings { levels, patch: (48, 48) });
+    View { patch: patch(), wider: [Some(patch()); WIDER.len()], surroundings }
 }
 
 fn metrics(criterion: &mut Criterion) {

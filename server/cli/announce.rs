@@ -34,6 +34,14 @@ pub fn announcement(
         let _ = writeln!(text, "\n*** {warning} ***");
     }
 
+    for (device, working, message) in
+        [("camera", status.camera.working, &status.camera.message), ("lens", status.lens.working, &status.lens.message)]
+    {
+        if !working {
+            let _ = writeln!(text, "\n*** THE {} IS NOT THERE YET: {message} ***", device.to_uppercase());
+        }
+    }
+
     text.push('\n');
     for role in ROLES {
         let _ = writeln!(text, "{:>10}  {}", role_name(role), link(role));

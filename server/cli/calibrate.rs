@@ -6,10 +6,12 @@ use std::time::Duration;
 
 use super::output::{Failure, print};
 use parfocal_base::clock::{Clock, SystemClock};
-use parfocal_devices::camera::calibration::{self, tables};
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::calibration::tables::WavelengthRange;
+use parfocal_devices::camera::calibration::{self, maker, tables};
 use parfocal_devices::camera::{self, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
-use parfocal_imaging::{Average, Calibration, Reference};
+use parfocal_imaging::{Average, BANDS, Band, Calibration, Reference};
 
 /// Frames skipped before the first that counts, so that settings take effect and automatic controls settle.
 const WARM_UP: u32 = 10;
@@ -54,9 +56,13 @@ struct Import {
     /// `white`, `spectral_correction`.
     #[arg(value_name = "FILE")]
     from: Option<PathBuf>,
-    /// The responses of the bands as CSV: a line per wavelength with nm and 16 responses.
-    #[arg(long, value_name = "CSV")]
+    /// The responses of the bands: the maker's own XML file of the sensor, or a CSV file with a line per wavelength, nm
+    /// and 16 responses.
+    #[arg(long, value_name = "XML|CSV")]
     responses: Option<PathBuf>,
+    /// Wavelengths in nm between which the sensor is used. A band is its highest peak between them.
+    #[arg(long, value_name = "FROM-TO", default_value = "460-600", value_parser = parse_range, requires = "responses")]
+    range: WavelengthRange,
     /// The spectral correction as CSV: 16 lines of 16.
     #[arg(long, value_name = "CSV")]
     correction: Option<PathBuf>,
@@ -162,7 +168,7 @@ fn import(arguments: &Import) -> Result<(), Failure> {
     }
 
     if let Some(path) = &arguments.responses {
-        calibration.bands = tables::bands(path)?;
+        calibration.bands = bands(path, &arguments.range)?;
     }
 
     if let Some(path) = &arguments.correction {
@@ -170,6 +176,29 @@ fn import(arguments: &Import) -> Result<(), Failure> {
     }
 
     arguments.to.save(calibration, &changed)
+}
+
+/// The bands in the file `path`, the maker's own or a table.
+fn bands(path: &Path, range: &WavelengthRange) -> Result<[Band; BANDS], Failure> {
+    if !maker::is_makers(path) {
+        return Ok(tables::bands(path, range)?);
+    }
+
+    let file = maker::read(path, range)?;
+    if file.virtual_bands > 0 {
+        let path = path.display();
+        tell(format_args!("{path}: its spectral correction was not read; give yours by --correction"));
+    }
+    Ok(file.bands)
+}
+
+fn parse_range(text: &str) -> Result<WavelengthRange, String> {
+    let numbers =
+        text.split_once('-').and_then(|(from, to)| Some((from.parse::<f64>().ok()?, to.parse::<f64>().ok()?)));
+    let range = numbers.filter(|(from, to)| 300.0 <= *from && from < to && *to <= 1100.0);
+    range
+        .map(|(from, to)| from..=to)
+        .ok_or_else(|| "must be two wavelengths from 300 to 1100 nm, as 460-600".to_owned())
 }
 
 impl Destination {

@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::output::Failure;
 use parfocal_base::clock::Clock;
-use parfocal_dashboard::tls::{Certificates, keep_current};
+use parfocal_dashboard::tls::Certificates;
 
 /// How connections are encrypted.
 #[derive(Debug, Args)]
@@ -38,14 +38,18 @@ impl Encryption {
         Err(format!("{problem}; add --tls, or --insecure on a network that you trust").into())
     }
 
-    /// The certificates of a server that listens on `listening`, or `None` without TLS. Starts the task that keeps them
-    /// current.
-    pub fn start(
+    /// Whether the certificate is given in files, and not made by the local authority.
+    pub const fn is_given(&self) -> bool {
+        self.tls_certificate.is_some()
+    }
+
+    /// The certificates of a server that listens on `listening`, or `None` without TLS.
+    pub fn certificates(
         &self,
         data_dir: &Path,
         listening: IpAddr,
         clock: &Arc<dyn Clock>,
-    ) -> Result<Option<Arc<Certificates>>, Failure> {
+    ) -> Result<Option<Certificates>, Failure> {
         if !self.tls {
             return Ok(None);
         }
@@ -54,8 +58,6 @@ impl Encryption {
             (Some(certificate), Some(key)) => Certificates::given(certificate.clone(), key.clone(), clock.wall())?,
             _ => Certificates::local(data_dir, listening, clock.wall())?,
         };
-        let certificates = Arc::new(certificates);
-        tokio::spawn(keep_current(Arc::clone(&certificates), Arc::clone(clock)));
         Ok(Some(certificates))
     }
 }

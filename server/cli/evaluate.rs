@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{Failure, bar, print};
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_autofocus::{Registry, scripted, shipped};
+use parfocal_autofocus::{FieldOfView, Registry, scripted, shipped};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_base::{BlurRate, PolicyName};
@@ -24,7 +24,7 @@ use parfocal_learning::scans::ScanSet;
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
 use parfocal_learning::scans::detail::{warning, without_detail};
 use parfocal_learning::scans::footage;
-use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, POSES, Recorded, RecordedScan};
+use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, Recorded, RecordedScan};
 use parfocal_learning::scans::simulated::Scene;
 use parfocal_learning::scans::stack::source::StackSource;
 
@@ -173,12 +173,22 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     Ok((registry, policies))
 }
 
+/// What the policies look at of a recorded scan's pictures.
+fn kept(registry: &Registry, policies: &[PolicyName]) -> Result<Kept, Failure> {
+    for name in policies {
+        if registry.build(name)?.field_of_view() == FieldOfView::Surroundings {
+            return Ok(Kept::Surroundings);
+        }
+    }
+    Ok(Kept::Patches)
+}
+
 /// Runs the policies on the requested scans, or on the requested shard of them.
 fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
 
     let part = arguments.shard.unwrap_or(Part::WHOLE);
-    let Scans { set, seed, count, between } = scans(arguments, part)?;
+    let Scans { set, seed, count, between } = scans(arguments, part, kept(&registry, &policies)?)?;
     if set.count() == 0 {
         return Err(format!("shard {part} has no scans: there are only {count}; make fewer shards").into());
     }
@@ -305,7 +315,7 @@ struct Scans {
     between: Option<Interpolation>,
 }
 
-fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
+fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure> {
     if arguments.scans == "simulated" {
         return simulated(arguments, part);
     }
@@ -329,7 +339,8 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
             return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
         }
         let count = arguments.count.unwrap_or(1);
-        let scans = part.scans(count).into_iter().map(|index| phantom(arguments.seed().wrapping_add(index as u64)));
+        let scans =
+            part.scans(count).into_iter().map(|index| phantom(arguments.seed().wrapping_add(index as u64), kept));
         return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed(), count, between });
     }
 
@@ -351,15 +362,16 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
 
     let folder = ScanFolder::open(folder)?;
     let bar = bar(folder.poses().len(), 0);
-    let scan = RecordedScan::read(&folder, &|| bar.inc(1))?;
+    let scan = RecordedScan::read(&folder, kept, &|| bar.inc(1))?;
     bar.finish_and_clear();
 
     Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
 }
 
-fn phantom(seed: u64) -> Arc<RecordedScan> {
+fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
     let bar = bar(POSES, 0);
-    let scan = RecordedScan::phantom(&Trajectory::new(seed, POSES, HASTE), seed, FOCAL_POWERS, &|| bar.inc(1));
+    let trajectory = Trajectory::new(seed, POSES, HASTE);
+    let scan = RecordedScan::phantom(&trajectory, seed, FOCAL_POWERS, kept, &|| bar.inc(1));
     bar.finish_and_clear();
     Arc::new(scan)
 }

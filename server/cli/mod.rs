@@ -6,6 +6,7 @@ mod backup;
 mod calibrate;
 mod doctor;
 mod encryption;
+mod environment;
 mod evaluate;
 mod export;
 mod inspect;
@@ -49,6 +50,8 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Check whether this machine is ready for a trial, and say what to do if it is not.
     Doctor(doctor::Arguments),
+    /// Simulated scans for a training in another program, as Python's `parfocal.FocusEnv` uses them.
+    Environment(environment::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
     /// Show content area, patch and focus metrics of pictures and mosaics.
@@ -98,6 +101,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Backup(arguments) => backup::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Environment(arguments) => environment::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),

@@ -1,94 +1,42 @@
 //! `parfocal serve`: wires camera, lens, control loop, trial and pages together and serves the pages.
 
+mod arguments;
+mod given;
+
 use std::io::{IsTerminal, Write};
-use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use clap::Args;
 use getrandom::SysRng;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
+pub use self::arguments::Arguments;
+use self::given::Given;
 use super::announce::announcement;
-use super::encryption::Encryption;
-use super::library::protocols;
 use super::output::Failure;
-use parfocal_autofocus::{Registry, scripted, shipped};
+use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::priority;
-use parfocal_base::{BlurRate, PolicyName};
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
-use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach};
-use parfocal_dashboard::tls::Certificates;
-use parfocal_devices::camera::{self, CameraSettings, calibration};
-use parfocal_devices::lens;
-use parfocal_devices::lens::{Lens, LensDynamics, LensInfo, MeasuredDynamics};
-use parfocal_imaging::{Calibration, Developer, Reconstructor, Size};
-use parfocal_pipeline::control::{self, Command, ControlLoop, Drive, Rig, Settings};
+use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
+use parfocal_dashboard::tls::{Certificates, keep_current};
+use parfocal_imaging::{Calibration, Size};
+use parfocal_pipeline::control::{self, Command, ControlLoop, Drive, Settings};
 use parfocal_pipeline::live;
 use parfocal_recording as recording;
 use parfocal_records::accounts::{Accounts, Cost};
-use parfocal_records::store::{self, Store, telemetry};
+use parfocal_records::store::{self, Backups, LockedFolder, Store, telemetry};
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::{Conductor, Parts};
 use parfocal_session::playback::Player;
 use parfocal_session::recorder::{self, Recordings};
-
-/// Arguments of `parfocal serve`.
-#[derive(Debug, Args)]
-pub struct Arguments {
-    /// Address to listen on; 0.0.0.0:8080 lets a tablet connect, and needs --tls.
-    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
-    bind: SocketAddr,
-    #[command(flatten)]
-    encryption: Encryption,
-    /// Folder for the database and the keys.
-    #[arg(long, value_name = "DIR", default_value = "data")]
-    data_dir: PathBuf,
-    /// Camera: phantom, footage:PATH, scan:DIR, recording:DIR or gige:ID (gige:list lists them); docs/scripting.md has
-    /// their options.
-    #[arg(long, value_name = "SPEC", default_value = "phantom")]
-    camera: String,
-    /// Lens: simulated, emulated (an emulated Optotune driver), optotune:auto or optotune:DEVICE.
-    #[arg(long, value_name = "SPEC", default_value = "simulated")]
-    lens: String,
-    /// Frame rate to request from the camera, per second.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    fps: u32,
-    /// Seed that repeats simulated devices and practice sessions; random by default. Real sessions always use the
-    /// system's random source.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-    /// Folder with more trial protocols; `trial-protocols` by default, if it exists.
-    #[arg(long, value_name = "DIR")]
-    protocols: Option<PathBuf>,
-    /// Add a policy from a TorchScript file, under the name `file:PATH`, also for protocols. May be repeated.
-    #[arg(long = "policy", value_name = "file:PATH")]
-    policies: Vec<String>,
-    /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
-    #[arg(long, value_name = "DIR")]
-    weights: Option<PathBuf>,
-    /// How fast the optic blurs, for the policies that can use it: pixels (standard deviation) for a change of focal
-    /// power by 1, as `parfocal scan info` measures them.
-    #[arg(long, value_name = "PIXELS")]
-    blur: Option<BlurRate>,
-    /// Calibration of the sensor: a TOML file, or a folder of `parfocal calibrate`; a typical unit's by default.
-    #[arg(long, value_name = "PATH")]
-    calibration: Option<PathBuf>,
-    /// How the lens moves: the dynamics.toml of `parfocal lens measure`; typical values by default.
-    #[arg(long, value_name = "FILE")]
-    lens_dynamics: Option<PathBuf>,
-}
 
 /// Telemetry records that may wait for the disk: 15 s at 50 frames per second.
 const TELEMETRY_CAPACITY: usize = 750;
@@ -116,7 +64,7 @@ const DEVICES: Duration = Duration::from_secs(5);
 /// Serves until Ctrl-C, SIGTERM or the end of the terminal.
 ///
 /// # Errors
-/// If the address is taken, or a folder, camera or lens cannot be used.
+/// If the address is taken, or a folder, camera or lens cannot be used. The error names everything that is wrong.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Log through a queue: a paused terminal, or a pipe that nobody reads, must not block the control loop when it logs
     // a line. Lines that do not fit are dropped.
@@ -147,31 +95,22 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         tracing::debug!("memory is not locked; `parfocal serve --help` says how to allow it");
     }
 
-    arguments.encryption.check(arguments.bind)?;
-
-    // Bind first: if that fails, the rest need not be set up. Early visitors wait in the listener's queue.
-    let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let mut seeded = seeded(arguments)?;
+    let given = given::look(arguments, &clock, seeded.random()).await?;
+    let Given { folder, keys, certificates, calibration, developer, library, rig, lens_info, dynamics, listener } =
+        given;
     let address = listener.local_addr()?;
 
-    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
-    let calibration = Arc::new(calibration_of(arguments)?);
-    let registry = registry(arguments)?;
-
-    let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
+    let registry = rig.registry.clone();
+    let store = open_store(arguments, folder, &calibration, &registry, clock.as_ref()).await?;
     tracing::info!("the chain of records is at {}", store.reader().head().await?);
-    let keys = Keys::load_or_create(&arguments.data_dir)?;
-    let certificates = arguments.encryption.start(&arguments.data_dir, address.ip(), &clock)?;
     let settings = certificates.as_ref().map(Certificates::settings).transpose()?;
-    let mut seeded = seeded(arguments)?;
-    let library = protocols(arguments.protocols.as_deref(), &registry)?;
+    if let Some(certificates) = &certificates {
+        tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(&clock)));
+    }
 
-    let developer = Developer::new(&calibration);
-    let mut rig = rig(arguments, &clock, developer.reconstructor().clone(), registry.clone(), seeded.random())?;
     let mosaics = rig.camera.mosaic_size();
-    calibration::check_camera(&calibration, mosaics)?;
-    // Ask before the control loop takes the lens; nobody asks it again.
-    let lens_info = described(rig.lens.as_mut());
-    let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
 
     let (control_loop, control, records) =
@@ -223,6 +162,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         accounts: Accounts::of_server(&store, Arc::clone(&clock), Cost::default()),
         clock,
         study_exports: StudyExports::new(&arguments.data_dir),
+        backups: Backups::new(&arguments.data_dir),
         live,
         store: store.clone(),
         health,
@@ -236,6 +176,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         reach: reach.clone(),
         equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
         tablets: OpenTablets::default(),
+        tablet_trials: TabletTrials::default(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.observer(),
@@ -264,11 +205,6 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
 
     Ok(())
-}
-
-/// The lens's description of itself, if it gives one.
-fn described(lens: &mut dyn Lens) -> Option<LensInfo> {
-    lens.info().inspect_err(|error| tracing::warn!(%error, "the lens did not describe itself")).ok()
 }
 
 /// Ends the recording, then stops camera and lens.
@@ -310,28 +246,9 @@ fn bound_real_time() -> std::io::Result<()> {
     Ok(())
 }
 
-/// The calibration given on the command line, else the camera's own, else that of a typical unit.
-fn calibration_of(arguments: &Arguments) -> Result<Calibration, Failure> {
-    let own = camera::own_calibration(&arguments.camera);
-    Ok(calibration::read_or_default(arguments.calibration.as_deref().or(own.as_deref()))?)
-}
-
-/// The policies that ship and those from files. Each policy from a file is built once, to check it.
-fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
-    let mut registry = Registry::standard().knowing(arguments.blur);
-    if let Some(folder) = &arguments.weights {
-        registry = shipped::with_folder(registry, folder)?;
-    }
-
-    for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
-        registry = scripted::with_file(registry, &name);
-        registry.build(&name)?;
-    }
-    Ok(registry)
-}
-
 async fn open_store(
     arguments: &Arguments,
+    folder: LockedFolder,
     calibration: &Calibration,
     registry: &Registry,
     clock: &dyn Clock,
@@ -347,7 +264,7 @@ async fn open_store(
         seed: arguments.seed,
     };
 
-    Ok(Store::open(&arguments.data_dir, &run).await?)
+    Ok(Store::open_locked(folder, &run).await?)
 }
 
 /// A random source that may be predictable; real sessions draw nothing from it.
@@ -356,48 +273,6 @@ fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
         Some(seed) => ChaCha12Rng::seed_from_u64(seed),
         None => ChaCha12Rng::try_from_rng(&mut SysRng)?,
     })
-}
-
-/// Opens lens and camera.
-fn rig(
-    arguments: &Arguments,
-    clock: &Arc<dyn Clock>,
-    reconstructor: Reconstructor,
-    registry: Registry,
-    seed: u64,
-) -> Result<Rig, Failure> {
-    let clock = Arc::clone(clock);
-    let lens = lens::open(&arguments.lens, Arc::clone(&clock))?;
-
-    let settings = CameraSettings { fps: arguments.fps.into(), seed, optics: lens.optics(), clock: Arc::clone(&clock) };
-    let camera = camera::open(&arguments.camera, settings)?;
-    Ok(Rig { camera, lens, reconstructor, registry, clock })
-}
-
-/// Reads lens dynamics from the file `path`; they must have been measured on this lens.
-fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
-    let named = |problem: String| format!("lens dynamics {}: {problem}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
-    let measured = MeasuredDynamics::from_toml(&text).map_err(named)?;
-    let info = lens.info()?;
-
-    if measured.serial != info.serial {
-        let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
-        return Err(named(format!("{problem}; measure it with `parfocal lens measure`")).into());
-    }
-    Ok(measured.dynamics())
-}
-
-fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
-    match error.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            format!("{address} is in use by another program; stop it, or choose another address with --bind")
-        }
-        std::io::ErrorKind::AddrNotAvailable => {
-            format!("this machine does not have the address {address}; choose another with --bind")
-        }
-        _ => format!("cannot listen on {address}: {error}; choose another address with --bind"),
-    }
 }
 
 /// The signals that end the server: Ctrl-C, Ctrl-\, a service manager's stop, and the end of the terminal. Registered

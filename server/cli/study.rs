@@ -35,7 +35,7 @@ enum Action {
     /// Plan a study from a definition; docs/study.md explains its keys.
     New(NewArguments),
     /// Allow new sessions. The first time, draw the orders and print the commitment to them.
-    Open(Move),
+    Open(Open),
     /// Allow no more new sessions.
     Close(Move),
     /// Lock a closed study, so that it cannot be changed any more.
@@ -66,6 +66,17 @@ struct NewArguments {
 struct Move {
     /// Name of the study.
     study: String,
+    #[command(flatten)]
+    signed: Signed,
+}
+
+#[derive(Debug, Args)]
+struct Open {
+    /// Name of the study.
+    study: String,
+    /// Open it even if its plan cannot work as it is meant.
+    #[arg(long)]
+    despite_concerns: bool,
     #[command(flatten)]
     signed: Signed,
 }
@@ -127,7 +138,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     wait_for(async {
         match &arguments.action {
             Action::New(new) => plan(new).await,
-            Action::Open(open) => change(&open.study, Change::Open, &open.signed).await,
+            Action::Open(open) => {
+                let despite_concerns = open.despite_concerns;
+                change(&open.study, Change::Open { despite_concerns }, &open.signed).await
+            }
             Action::Close(close) => change(&close.study, Change::Close, &close.signed).await,
             Action::Lock(lock) => {
                 let despite_outstanding = lock.despite_outstanding;
@@ -239,6 +253,9 @@ fn in_short(detail: &StudyDetail) -> String {
     );
     if let Some(commitment) = &detail.commitment_line {
         let _ = writeln!(text, "{commitment}");
+    }
+    for concern in &detail.concerns {
+        let _ = writeln!(text, "warning: {concern}");
     }
     text
 }

@@ -1,22 +1,30 @@
-//! `parfocal study analyse`: an unblinded study's analysis in words, as JSON or as a folder. Only reads the database.
+//! `parfocal study analyse`: an unblinded study's analysis in words, as JSON or as a folder, from a database or from a
+//! package. Only reads.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::output::{Failure, print};
+use parfocal_base::notices;
 use parfocal_records::store::Reader;
-use parfocal_results::analysis::{Analysis, Comparison, ProtocolAnalysis, analyse, decimals};
+use parfocal_records::store::export::verify::Verdict;
+use parfocal_results::analysis::{
+    Analysis, Comparison, ProtocolAnalysis, SiteAnalysis, analyse, analyse_package, decimals,
+};
+use parfocal_results::package;
 
 /// Arguments of `parfocal study analyse`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Name of the study.
+    /// Name of a study in the database, or a package: a folder that `parfocal export --study` or `parfocal study merge`
+    /// wrote with the policies. A package is verified first.
+    #[arg(value_name = "STUDY|PACKAGE")]
     study: String,
-    /// Folder of the server's database.
-    #[arg(long, value_name = "DIR", default_value = "data")]
-    data_dir: PathBuf,
+    /// Folder of the server's database; `data` by default.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
     /// Print it as JSON.
     #[arg(long)]
     json: bool,
@@ -28,10 +36,15 @@ pub struct Arguments {
 /// Analyses the study.
 ///
 /// # Errors
-/// If there is no such study, it is not unblinded, or the folder cannot be written.
+/// If there is no such study or package, it is not unblinded, the package does not verify, or the folder cannot be
+/// written.
 pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let reader = Reader::open(&arguments.data_dir).await?;
-    let analysis = analyse(&reader, &arguments.study).await?;
+    let analysis = if let Some(folder) = package_of(arguments).await? {
+        verified(folder)?
+    } else {
+        let reader = Reader::open(folder_of(arguments)).await?;
+        analyse(&reader, &arguments.study).await?
+    };
     let written = match &arguments.out {
         Some(out) => Some((out, analysis.into_folder(out).await?)),
         None => None,
@@ -47,8 +60,68 @@ pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&text)
 }
 
+/// Folder of the database.
+fn folder_of(arguments: &Arguments) -> &Path {
+    arguments.data_dir.as_deref().unwrap_or(Path::new("data"))
+}
+
+/// The package that the arguments name; `None` if they name a study of the database.
+async fn package_of(arguments: &Arguments) -> Result<Option<&Path>, Failure> {
+    let name = &arguments.study;
+    let folder = Path::new(name);
+    let is_path = name.contains(std::path::MAIN_SEPARATOR);
+    if arguments.data_dir.is_some() && !is_path {
+        return Ok(None);
+    }
+
+    if !package::is_package(folder) {
+        if is_path || folder.is_dir() && !is_study(arguments).await {
+            return Err(format!(
+                "{name} is not a package of a study; give a folder that `parfocal export --study` or `parfocal study \
+                 merge` wrote (unpack a ZIP file first), or the name of a study"
+            )
+            .into());
+        }
+        return Ok(None);
+    }
+    if !is_path && is_study(arguments).await {
+        return Err(format!(
+            "'{name}' is a package here, and also a study of the database in data: write ./{name} for the package, or \
+             add --data-dir data for the study"
+        )
+        .into());
+    }
+    Ok(Some(folder))
+}
+
+/// Whether the database has a study with the name that was given.
+async fn is_study(arguments: &Arguments) -> bool {
+    let Ok(reader) = Reader::open(folder_of(arguments)).await else { return false };
+    reader.study_names().await.is_ok_and(|names| names.contains(&arguments.study))
+}
+
+/// The analysis of the package in `folder`, if it verifies.
+fn verified(folder: &Path) -> Result<Analysis, Failure> {
+    for check in package::check(folder, None) {
+        match check.verdict {
+            Verdict::Failed(problem) => {
+                let (folder, name) = (folder.display(), check.name);
+                return Err(format!(
+                    "{folder} was not analysed, because it does not verify: {name}: {problem}; `parfocal verify \
+                     {folder}` shows every check"
+                )
+                .into());
+            }
+            Verdict::NotChecked(reason) => notices::tell(format_args!("{}: not checked: {reason}", check.name)),
+            Verdict::Passed(_) => {}
+        }
+    }
+    Ok(analyse_package(folder)?)
+}
+
 fn in_words(analysis: &Analysis) -> String {
     let mut text = format!("{}: {}\nplanned analysis: {}\n", analysis.study, analysis.title, analysis.planned);
+    let _ = writeln!(text, "sites: {}", analysis.sites.join(", "));
     for note in &analysis.notes {
         let _ = writeln!(text, "{note}");
     }
@@ -63,8 +136,20 @@ fn write_protocol(text: &mut String, protocol: &ProtocolAnalysis) {
     for note in &protocol.notes {
         let _ = writeln!(text, "{note}");
     }
-    for compared in &protocol.outcomes {
+    for (place, compared) in protocol.outcomes.iter().enumerate() {
         write_outcome(text, compared);
+        for site in &protocol.by_site {
+            write_site(text, site, &site.outcomes[place]);
+        }
+    }
+}
+
+/// The figures of one site, below those of all.
+fn write_site(text: &mut String, site: &SiteAnalysis, compared: &Comparison) {
+    let _ = writeln!(text, "  at {}: {} surgeons, {} sessions", site.site, site.surgeons, site.sessions);
+    write_policies(text, "    ", compared);
+    for sentence in sentences(compared) {
+        let _ = writeln!(text, "    {sentence}");
     }
 }
 
@@ -73,12 +158,27 @@ fn write_outcome(text: &mut String, compared: &Comparison) {
     let better = outcome.better.map_or_else(String::new, |end| format!("; {end} is better"));
     let _ = writeln!(text, "\n{} ({}{better})", outcome.label, outcome.unit);
 
+    write_policies(text, "  ", compared);
+    if compared.left_out > 0 {
+        let _ = writeln!(text, "  surgeons left out of the tests because a value is missing: {}", compared.left_out);
+    }
+    for sentence in sentences(compared).chain([&compared.repeats.said, &compared.position.said]) {
+        let _ = writeln!(text, "  {sentence}");
+    }
+}
+
+/// What was found of the policies.
+fn sentences(compared: &Comparison) -> impl Iterator<Item = &String> {
+    std::iter::once(&compared.difference.said).chain(compared.pairs.iter().map(|pair| &pair.said))
+}
+
+fn write_policies(text: &mut String, indent: &str, compared: &Comparison) {
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| decimals(value, 3));
     for line in &compared.policies {
         let summary = &line.summary;
         let _ = writeln!(
             text,
-            "  {:24} n {:3}  missing {:3}  mean {:>8}  median {:>8}  sd {:>8}",
+            "{indent}{:24} n {:3}  missing {:3}  mean {:>8}  median {:>8}  sd {:>8}",
             line.policy,
             summary.n,
             line.missing,
@@ -86,14 +186,5 @@ fn write_outcome(text: &mut String, compared: &Comparison) {
             number(summary.median),
             number(summary.sd),
         );
-    }
-
-    if compared.left_out > 0 {
-        let _ = writeln!(text, "  surgeons left out of the tests because a value is missing: {}", compared.left_out);
-    }
-    let pairs = compared.pairs.iter().map(|pair| &pair.said);
-    let said = std::iter::once(&compared.difference.said).chain(pairs);
-    for sentence in said.chain([&compared.repeats.said, &compared.position.said]) {
-        let _ = writeln!(text, "  {sentence}");
     }
 }

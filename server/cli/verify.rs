@@ -1,7 +1,9 @@
 //! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged, and matches its
 //! commitments.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -35,6 +37,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(format!("{} does not exist; give an export, a data folder or a database", path.display()).into());
     }
 
+    if is_zip(path) {
+        return Err(format!(
+            "{0} is a ZIP file: unpack it, for example with `unzip {0}`, and verify the folder that was in it",
+            path.display()
+        )
+        .into());
+    }
+
     let (what, checks) = if is_package(path) {
         ("package", check(path, arguments.head.as_ref()))
     } else if is_export(path) {
@@ -50,6 +60,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     Err(format!("{failed} of {} checks failed: do not rely on this {what}", checks.len()).into())
+}
+
+/// Whether `path` is a ZIP file, by its first bytes.
+fn is_zip(path: &Path) -> bool {
+    let mut start = [0; 4];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    read.is_ok() && start == *b"PK\x03\x04"
 }
 
 fn line(check: &Check) -> String {

@@ -138,6 +138,21 @@ fn a_makers_tables_are_imported() {
     assert!((number("centre_nm", 3) - 484.0).abs() < 1e-9 && (number("fwhm_nm", 3) - 10.0).abs() < 1e-9);
     assert_eq!(toml["spectral_correction"][4][4].as_float(), Some(0.5));
 
+    // A lobe outside the sensor's range is higher, and still no band.
+    let lobe = |nm: u32| {
+        let nm = f64::from(nm);
+        let height = |centre: f64, height: f64| (height - (nm - centre).abs() * height / 10.0).max(0.0);
+        let response = |band: u32| (height(430.0, 2.0) + height(465.0 + 8.0 * f64::from(band), 1.0)).to_string();
+        format!("{nm},{}\n", (0..16).map(response).collect::<Vec<_>>().join(","))
+    };
+    fs::write(path("lobes.csv"), (400..=640).map(lobe).collect::<String>()).unwrap();
+    let lobes = ["calibrate", "import", "--responses", &path("lobes.csv"), "--out", &out];
+    done(&lobes);
+    let toml: toml::Table = toml::from_str(&fs::read_to_string(path("unit/calibration.toml")).unwrap()).unwrap();
+    assert!((toml["centre_nm"][0].as_float().unwrap() - 465.0).abs() < 1e-9, "{toml}");
+    let said = refused(&[&lobes[..], &["--range", "480-600"]].concat());
+    assert!(said.contains("lobes.csv: band 0 has no peak between 480 and 600 nm"), "{said}");
+
     fs::write(path("correction.csv"), "1,2,3\n").unwrap();
     let said = refused(&["calibrate", "import", "--correction", &path("correction.csv"), "--out", &out]);
     assert!(said.contains("line 1 must have 16 numbers"), "{said}");

@@ -78,7 +78,7 @@ fn collect(folder: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
 
 thread_local! {
     static EXPORT: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(|folder| {
-        let template = Path::new(ROOT).join("tests/trial/export-of-format-6");
+        let template = Path::new(ROOT).join("tests/vectors/export");
         for entry in fs::read_dir(template).unwrap() {
             let file = entry.unwrap().path();
             fs::copy(&file, folder.join(file.file_name().unwrap())).unwrap();
@@ -176,7 +176,7 @@ pub fn calibration_table(bytes: &[u8]) {
     ALONE.with(|folder| {
         let file = folder.path().join("table.csv");
         fs::write(&file, bytes).unwrap();
-        let _ = tables::bands(&file);
+        let _ = tables::bands(&file, &(460.0..=600.0));
         let _ = tables::correction(&file);
     });
 }

@@ -10,7 +10,7 @@ use parfocal_base::FocalPower;
 use parfocal_devices::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
 use parfocal_imaging::{GrayImage, PatchArea};
 use parfocal_learning::evaluation::shard::{Shard, merge};
-use parfocal_learning::scans::recorded::{RecordedScan, evenly_spread};
+use parfocal_learning::scans::recorded::{Kept, RecordedScan, evenly_spread};
 use parfocal_learning::scans::recording::{self, Imported};
 use parfocal_learning::scans::stack::{FocalStack, check};
 use parfocal_learning::training::run::checkpoint::{self, Checkpoint};
@@ -66,7 +66,7 @@ pub fn scan(bytes: &[u8]) {
             let Ok(scan) = ScanFolder::open(folder) else { return };
             let _ = scan.missing();
             if let Ok(whole) = scan.whole() {
-                let _ = RecordedScan::read(&whole, &|| {});
+                let _ = RecordedScan::read(&whole, Kept::Patches, &|| {});
             }
         });
     });

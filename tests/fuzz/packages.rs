@@ -177,7 +177,7 @@ spares = 2
         hex::encode(protocol.sha256())
     );
     trial.conductor.plan_study(Role::Researcher, definition, Vec::new(), signature()).await.unwrap();
-    change(trial, Change::Open).await;
+    change(trial, Change::Open { despite_concerns: true }).await;
 }
 
 fn signature() -> Signature {

@@ -12,10 +12,11 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
+use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach, TabletTrials};
 use parfocal_dashboard::tls::Certificates;
 use parfocal_imaging::{Calibration, Developer, Size};
 use parfocal_pipeline::live;
+use parfocal_records::store::Backups;
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::playback::Player;
 use parfocal_session::recorder::{Parts, Recordings};
@@ -424,6 +425,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
     Arc::new(App {
         accounts: trial.accounts(),
         study_exports: StudyExports::new(folder.path()),
+        backups: Backups::new(folder.path()),
         live: live.clone(),
         store: trial.store.clone(),
         health: HealthWatch::new(
@@ -453,6 +455,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
         reach,
         equipment: Equipment::new(None, calibration, None),
         tablets: OpenTablets::default(),
+        tablet_trials: TabletTrials::default(),
         metrics: Metrics::default(),
         shutdown,
         control: control.observer(),

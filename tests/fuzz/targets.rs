@@ -115,7 +115,7 @@ pub fn optotune(bytes: &[u8]) {
 
 /// A picture or mosaic from any bytes is read or refused, and its content area is searched for.
 pub fn picture(bytes: &[u8]) {
-    let _ = decode_raw(bytes);
+    let _ = decode_raw(bytes, None);
     for mosaic in [false, true] {
         let gray = match decode(bytes, mosaic) {
             Ok(Picture::Rgb(_, gray) | Picture::Gray(gray)) => gray,

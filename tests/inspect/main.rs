@@ -1,5 +1,7 @@
 //! `parfocal inspect` as people and scripts use it.
 
+mod formats;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -163,8 +165,15 @@ fn a_mosaic_is_developed_at_the_size_that_is_asked_for() {
         assert!(output.status.success(), "{}", complaint(&output));
         reports.push(objects(&output));
 
-        let picture = image::open(out.join("mosaic.png.overlay.png")).unwrap().to_rgb8();
+        let picture = image::open(out.join(format!("mosaic.png.{size}.png"))).unwrap().to_rgb8();
         assert_eq!(picture.dimensions(), (width, height));
+        // The overlay lies beside it. In the picture itself no pixel has a colour that is only drawn.
+        let overlay = image::open(out.join("mosaic.png.overlay.png")).unwrap().to_rgb8();
+        assert_eq!(overlay.dimensions(), (width, height));
+        let coloured = |picture: &image::RgbImage| picture.pixels().filter(|p| p[0].abs_diff(p[2]) > 200).count();
+        assert_eq!(coloured(&picture), 0, "{size}");
+        assert!(coloured(&overlay) > 50, "{size}");
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
 
         // Within the patch, where nothing is drawn.
         let row = |x: u32| f64::from(picture.get_pixel(x, height / 2)[1]);
@@ -180,8 +189,9 @@ fn a_mosaic_is_developed_at_the_size_that_is_asked_for() {
     // Without --size it is the size of the cells.
     let out = folder.path().join("default");
     assert!(inspect(&["--mosaic", "--out", out.to_str().unwrap()], &[path.as_path()]).status.success());
-    let name = "mosaic.png.overlay.png";
-    assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join("cell").join(name)).unwrap());
+    for name in ["mosaic.png.cell.png", "mosaic.png.overlay.png"] {
+        assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join("cell").join(name)).unwrap());
+    }
 }
 
 #[test]

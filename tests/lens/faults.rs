@@ -3,10 +3,12 @@
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::process::Command;
+use std::sync::Arc;
 
 use parfocal_base::FocalPower;
-use parfocal_devices::lens::LensError;
+use parfocal_base::clock::SystemClock;
 use parfocal_devices::lens::emulator::{Fault, Model};
+use parfocal_devices::lens::{self, LensError};
 
 use super::{emulator, last_command, open, power, quick, refused, until};
 
@@ -112,6 +114,33 @@ fn a_hot_lens_follows_but_says_that_it_cannot_be_relied_on() {
     assert!(health.message.contains("at 47.0 °C") && health.message.contains("between 20 and 40 °C"), "{health:?}");
     emulator.set_temperature(30.0);
     until("it is well again", || lens.health().message.contains("follows commands between"));
+}
+
+#[test]
+fn a_driver_that_is_not_there_yet_is_looked_for() {
+    let mut emulator = emulator(quick());
+    let spec = format!("optotune:{}", emulator.path().display());
+    emulator.unplug();
+    assert!(matches!(lens::open(&spec, Arc::new(SystemClock)), Err(LensError::Gone(_))), "where it must be there now");
+
+    let mut lens = lens::open_or_await(&spec, Arc::new(SystemClock)).unwrap();
+    let health = lens.health();
+    assert!(!health.working && health.message.ends_with("trying again"), "{health:?}");
+    assert!(matches!(lens.set(FocalPower::MAX), Err(LensError::Gone(_))));
+
+    emulator.plug_in().unwrap();
+    until("it is found", || lens.health().working);
+    assert!(lens.health().simulated, "it is known by now that there is no glass");
+    lens.set(FocalPower::MAX).unwrap();
+    until("it follows", || last_command(&emulator) == Some(3000));
+}
+
+#[test]
+fn only_a_driver_that_does_not_answer_is_waited_for() {
+    let emulator = emulator(quick());
+    emulator.set_fault(Fault::Stranger);
+    let spec = format!("optotune:{}", emulator.path().display());
+    assert!(matches!(lens::open_or_await(&spec, Arc::new(SystemClock)), Err(LensError::Refused(_))));
 }
 
 #[test]

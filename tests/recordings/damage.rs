@@ -5,6 +5,16 @@ use std::io::{Read, Seek, SeekFrom, Write};
 
 use super::*;
 
+/// Damages a frame in the middle of a recording.
+pub(super) fn damage_frame(recording: &Path, frame: usize) {
+    let shard = recording.join("mosaic/c/0/0/0");
+    // By the format's description: pairs of offset and length, and four bytes of checksum, at the end.
+    let bytes = fs::read(&shard).unwrap();
+    let index = &bytes[bytes.len() - 25 * 16 - 4..];
+    let offset = u64::from_le_bytes(index[16 * frame..16 * frame + 8].try_into().unwrap());
+    flip(&shard, offset + 40);
+}
+
 /// Flips a bit of the byte at offset `at`.
 fn flip(file: &Path, at: u64) {
     let mut file = OpenOptions::new().read(true).write(true).open(file).unwrap();
@@ -39,13 +49,7 @@ fn what_a_killed_recording_had_stored_opens() {
 fn a_damaged_frame_is_named_and_the_others_are_read() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 30);
-    let shard = recording.join("mosaic/c/0/0/0");
-
-    // By the format's description: pairs of offset and length, and four bytes of checksum, at the end.
-    let bytes = fs::read(&shard).unwrap();
-    let index = &bytes[bytes.len() - 25 * 16 - 4..];
-    let offset = u64::from_le_bytes(index[16 * 3..16 * 3 + 8].try_into().unwrap());
-    flip(&shard, offset + 40);
+    damage_frame(&recording, 3);
 
     let told = check(&recording);
     assert!(told.contains("frame 3 does not match its checksum"), "{told}");

@@ -78,7 +78,10 @@ fn sample(frame: usize, x: usize, y: usize) -> u16 {
 }
 
 fn mosaic(frame: usize) -> MosaicFrame {
-    let (width, height) = SIZE;
+    mosaic_of(frame, SIZE)
+}
+
+fn mosaic_of(frame: usize, (width, height): (usize, usize)) -> MosaicFrame {
     let samples = (0..width * height).map(|place| sample(frame, place % width, place / width)).collect();
     MosaicFrame::new(width, height, samples).unwrap()
 }
@@ -104,9 +107,13 @@ fn header() -> Header {
 
 /// A recording of `frames` frames at 50 a second whose camera lost every tenth frame. No focal power was measured.
 fn made_up(folder: &TempDir, frames: usize) -> PathBuf {
+    made_up_of(folder, frames, SIZE)
+}
+
+fn made_up_of(folder: &TempDir, frames: usize, size: (usize, usize)) -> PathBuf {
     let path = folder.path().join("recording");
     let calibration = Calibration::default();
-    let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
+    let writer = Writer::create(&path, header(), size, &calibration).unwrap();
     camera::calibration::save(&path.join(CALIBRATION), &calibration, &[]).unwrap();
 
     let recorder = Recorder::start(writer, Moment::from_nanos(1_000_000_000)).unwrap();
@@ -119,7 +126,7 @@ fn made_up(folder: &TempDir, frames: usize) -> PathBuf {
             asked: FocalPower::new(frame as f64 / frames as f64).unwrap(),
             measured: None,
             optimal: None,
-            mosaic: Arc::new(mosaic(frame)),
+            mosaic: Arc::new(mosaic_of(frame, size)),
         });
         // Wait: if more frames were offered at once than fit, some would be lost, as they should.
         wait_for(|| recorder.progress().frames > frame as u64);
@@ -265,6 +272,52 @@ fn a_span_becomes_a_video_or_pictures() {
 
     let told = complaint(&parfocal(&[&arguments[..], &["--from", "9"]].concat()));
     assert!(told.contains("lies within the seconds asked for"), "{told}");
+}
+
+/// Width and height of a video's pictures.
+fn video_size(video: &Path) -> String {
+    let mut probe = Command::new("ffprobe");
+    probe.args(["-v", "error", "-show_entries", "stream=width,height", "-of", "csv=p=0"]);
+    said(&probe.arg(video).output().unwrap()).trim().to_owned()
+}
+
+#[test]
+fn a_video_is_a_new_and_whole_file_of_a_known_kind_and_any_size() {
+    let folder = TempDir::new().unwrap();
+    // Cells of 17x9 pixels; most encoders take even sizes only.
+    let recording = made_up_of(&folder, 12, (68, 36));
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let video = |name: &str| {
+        let name = out.join(name);
+        parfocal(&["recording", "video", text(&recording), "--out", text(&name)])
+    };
+
+    for name in ["odd.mp4", "odd.mkv", "odd.mov", "odd.AVI"] {
+        let output = video(name);
+        assert!(output.status.success(), "{name}: {}", complaint(&output));
+        assert_eq!(video_size(&out.join(name)), "18,10", "{name}");
+    }
+
+    let before = fs::read(out.join("odd.mp4")).unwrap();
+    let told = complaint(&video("odd.mp4"));
+    assert!(told.contains("odd.mp4 exists already"), "{told}");
+    assert!(fs::read(out.join("odd.mp4")).unwrap() == before);
+
+    for name in ["film.webm", "film.mp4.old"] {
+        let told = complaint(&video(name));
+        assert!(told.contains(&format!("{name}: videos are .mp4, .mkv, .mov or .avi, not .")), "{told}");
+    }
+    assert!(video("film.webm/").status.success());
+
+    // Of what was written before a damaged frame, nothing is left.
+    damage::damage_frame(&recording, 9);
+    let told = complaint(&video("damaged.mp4"));
+    assert!(told.contains("frame 9 does not match its checksum"), "{told}");
+    let mut names: Vec<String> =
+        fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["film.webm", "odd.AVI", "odd.mkv", "odd.mov", "odd.mp4"]);
 }
 
 #[test]

@@ -120,3 +120,81 @@ fn pictures_that_are_not_a_focal_stack_are_refused_before_anything_is_written() 
     save(&texture(8, 100), &pictures.join("plane 13.png"));
     assert!(told(&[]).contains("all pictures of a stack must have one size"));
 }
+
+/// The pictures of [`stack`], each as gray levels row by row.
+fn levels() -> Vec<Vec<u8>> {
+    let sharp = texture(8, 200);
+    let blurred = |index: i32| gaussian_blur(&sharp, 5.0 / 12.0 * (f64::from(index) - 6.0).abs());
+    (0..13).map(|index| blurred(index).data.iter().map(|level| level.round() as u8).collect()).collect()
+}
+
+#[test]
+fn a_stack_in_one_file_is_one_in_a_folder() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    stack(&pictures, &[]);
+    let cut = ["--size", "96", "--poses", "20"];
+    let make = |stack: &Path, out: &str| {
+        let out = folder.path().join(out);
+        let output = parfocal(&[&["scan", "from-stack", text(stack), "--out", text(&out)], &cut[..]].concat());
+        assert!(output.status.success(), "{}", complaint(&output));
+        let images: Vec<_> =
+            contents(&out).into_iter().filter(|(path, _)| path.extension().is_some_and(|end| end == "png")).collect();
+        (images, said(&output), complaint(&output))
+    };
+    let (expected, _, _) = make(&pictures, "of a folder");
+
+    let ome = r#"<?xml version="1.0" encoding="UTF-8"?><OME><Image ID="Image:0"><Pixels ID="Pixels:0" SizeX="200"
+        SizeY="200" SizeZ="13" SizeC="1" SizeT="1" PhysicalSizeZ="2.5" PhysicalSizeZUnit="&#181;m"/></Image></OME>"#;
+    let image_j = "ImageJ=1.54f\nimages=13\nslices=13\nspacing=0.5\nunit=mm\n";
+    for (name, description, told, peak) in [
+        ("plain.tif", "", "13 pages: taken in their order", "6.000"),
+        ("stack.ome.tif", ome, "13 pages: 2.5 µm apart, as its OME metadata say", "15.000"),
+        ("image-j.tif", image_j, "13 pages: 0.5 mm apart, as ImageJ wrote", "3.000"),
+    ] {
+        let file = folder.path().join(name);
+        fs::write(&file, tiff::pages(&levels(), 200, description)).unwrap();
+        let (found, printed, note) = make(&file, &format!("of {name}"));
+        assert!(found == expected, "{name}");
+        assert!(note.contains(told), "{note}");
+        assert!(printed.contains(&format!("sharpest at position {peak}")), "{printed}");
+    }
+
+    let hyperstack = "ImageJ=1.54f\nimages=13\nchannels=13\nslices=13\n";
+    let file = folder.path().join("hyper.tif");
+    fs::write(&file, tiff::pages(&levels(), 200, hyperstack)).unwrap();
+    let told = complaint(&parfocal(&["scan", "from-stack", text(&file), "--out", text(&folder.path().join("no"))]));
+    assert!(told.contains("it has 13 positions, 13 channels and 1 times"), "{told}");
+}
+
+#[test]
+fn policies_are_evaluated_on_a_stack_in_one_file() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    stack(&pictures, &[]);
+    let file = folder.path().join("pictures.tif");
+    fs::write(&file, tiff::pages(&levels(), 200, "")).unwrap();
+
+    let rows = |stack: &Path| {
+        let output = parfocal(&["evaluate", "--policies", "fixed", "--json", "--stacks", text(stack)]);
+        assert!(output.status.success(), "{}", complaint(&output));
+        serde_json::from_str::<Value>(&said(&output)).unwrap()["stacks"][0]["rows"].clone()
+    };
+    assert_eq!(rows(&file), rows(&pictures));
+}
+
+#[test]
+fn uneven_positions_are_interpolated_and_said() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    stack(&pictures, &[]);
+    fs::rename(pictures.join("plane 12.png"), pictures.join("plane 12.5.png")).unwrap();
+
+    let out = folder.path().join("scan");
+    let more = ["--size", "96", "--poses", "5"];
+    let output = parfocal(&[&["scan", "from-stack", text(&pictures), "--out", text(&out)], &more[..]].concat());
+    assert!(output.status.success(), "{}", complaint(&output));
+    let told = complaint(&output);
+    let expected = "the planes stand 1 apart: 12 are pictures as they were taken, 1 are mixed";
+    assert!(told.contains(expected), "{told}");
+}

@@ -113,3 +113,50 @@ fn a_folder_of_pictures_is_imported() {
     assert_eq!(optima, [0.5, 0.0]);
     assert_eq!(scan.poses()[&1].patch, (24, 24), "in the middle of 80x80");
 }
+
+/// Saves a scan of two focal powers whose samples, 0 to `most`, stand in files of 16 bit.
+fn deep(folder: &Path, most: u16) {
+    fs::create_dir_all(folder).unwrap();
+    for name in ["pose1_f0.png", "pose1_f1.png"] {
+        let level = |x: u32, y: u32| image::Luma([((x + 96 * y) * u32::from(most) / (96 * 96 - 1)) as u16]);
+        image::ImageBuffer::from_fn(96, 96, level).save(folder.join(name)).unwrap();
+    }
+}
+
+#[test]
+fn samples_of_twelve_bit_in_files_of_sixteen_keep_their_levels() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    deep(&pictures, 4095);
+    let import = |out: &str, more: &[&str]| {
+        let out = folder.path().join(out);
+        let output = parfocal(&[&["scan", "import", text(&pictures), "--out", text(&out)], more].concat());
+        (output, out)
+    };
+    let levels = |out: &Path| {
+        let scan = ScanFolder::open(out).unwrap();
+        let pose = &scan.poses()[&1];
+        let mut levels: Vec<u8> =
+            scan.picture(pose, &pose.images[0]).unwrap().data.into_iter().map(|level| level as u8).collect();
+        levels.sort_unstable();
+        levels.dedup();
+        levels
+    };
+
+    let (output, out) = import("guessed", &[]);
+    let told = complaint(&output);
+    assert!(told.contains("reach 4095, so they are read as 12 bit: 4095 is white"), "{told}");
+    assert_eq!(levels(&out), (0..=255).collect::<Vec<u8>>());
+
+    let (output, out) = import("given", &["--bits", "13"]);
+    assert!(output.status.success() && !complaint(&output).contains("bit"), "{}", complaint(&output));
+    assert_eq!(levels(&out), (0..=127).collect::<Vec<u8>>());
+
+    let told = complaint(&import("too few", &["--bits", "10"]).0);
+    assert!(told.contains("holds a sample of 4095, which is more than 10 bit; give --bits 12 or more"), "{told}");
+
+    deep(&pictures, 65_535);
+    let (output, out) = import("whole", &[]);
+    assert!(output.status.success() && !complaint(&output).contains("bit"), "{}", complaint(&output));
+    assert_eq!(levels(&out).len(), 256);
+}

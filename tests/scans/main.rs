@@ -5,6 +5,7 @@ mod bench;
 mod evaluation;
 mod from_stack;
 mod import;
+mod tiff;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -20,7 +21,7 @@ use parfocal_devices::camera::{self, CameraSettings, FrameImage};
 use parfocal_devices::lens::Optics;
 use parfocal_devices::lens::emulator::{Emulator, Model};
 use parfocal_devices::simulation::phantom::Trajectory;
-use parfocal_learning::scans::recorded::{HASTE, RecordedScan};
+use parfocal_learning::scans::recorded::{HASTE, Kept, RecordedScan};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -90,8 +91,8 @@ fn text(path: &Path) -> &str {
 fn what_is_recorded_is_what_is_evaluated_on() {
     let folder = TempDir::new().unwrap();
     let out = recorded(&folder, 4);
-    let stored = RecordedScan::read(&ScanFolder::open(&out).unwrap(), &|| ()).unwrap();
-    let made = RecordedScan::phantom(&Trajectory::new(7, 4, HASTE), 7, 5, &|| ());
+    let stored = RecordedScan::read(&ScanFolder::open(&out).unwrap(), Kept::Surroundings, &|| ()).unwrap();
+    let made = RecordedScan::phantom(&Trajectory::new(7, 4, HASTE), 7, 5, Kept::Surroundings, &|| ());
     assert!(stored == made, "the benchmark in memory is the scan on disk, to the last gray level");
 
     let plot = folder.path().join("plot.svg");

@@ -213,6 +213,30 @@ async fn the_operator_changes_them_through_the_server() {
     assert!(said.contains("Exposure must be from"), "{said}");
 }
 
+#[tokio::test]
+async fn a_server_starts_before_its_camera_and_finds_it() {
+    let Some(mut fake) = Fake::start(&[]) else { return };
+    fake.kill();
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", "gige:Aravis-Fake-TEST?width=512&height=512"]);
+    assert!(server.said.contains("THE CAMERA IS NOT THERE YET"), "{}", server.said);
+    let health = async || server.get("/healthz").send().await.unwrap().json::<Value>().await.unwrap();
+    let camera = async || {
+        let checks = server.get_as("operator", "/api/operator/checks").send().await.unwrap();
+        let checks: Value = checks.json().await.unwrap();
+        let findings = checks["findings"].as_array().unwrap().clone();
+        findings.into_iter().find(|finding| finding["subject"] == "camera").unwrap()
+    };
+    assert_eq!(camera().await["verdict"], "wrong");
+    assert!(camera().await["found"].as_str().unwrap().contains("looking for it again"), "{}", camera().await);
+
+    fake.restart();
+    let begun = SystemClock.now();
+    while health().await["status"] != "ok" {
+        assert!(SystemClock.now().since(begun) < 30 * SECOND, "it is never found: {}", health().await);
+    }
+    assert!(camera().await["found"].as_str().unwrap().contains("512x512"), "{}", camera().await);
+}
+
 /// Runs `parfocal calibrate` with the fake camera. Returns whether it succeeded, and its error output.
 fn calibrate(which: &str, options: &str, out: &std::path::Path) -> (bool, String) {
     let camera = format!("gige:Aravis-Fake-TEST?width=512&height=512{options}");

@@ -370,7 +370,7 @@ fn bad_input_is_answered_with_one_sentence() {
             "the weights belong to another network",
         ),
         (vec!["evaluate", "--weights", out, "--count", "1"], "there are no weights in"),
-        (vec!["serve", "--weights", out], "there are no weights in"),
+        (vec!["serve", "--weights", out, "--bind", "127.0.0.1:0", "--data-dir", out], "there are no weights in"),
     ] {
         let output = parfocal(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();

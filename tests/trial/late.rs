@@ -4,12 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use parfocal_base::ids::{DeviceId, SessionId};
-use parfocal_records::store::MIGRATOR;
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
-use parfocal_trial::phase::Phase;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::{Holding, NewAnswer, Origin, WaitClock};
 use parfocal_trial::role::Role;
@@ -266,36 +264,4 @@ async fn an_emergency_unblinding_does_not_wait_and_answers_count_until_the_sessi
     trial.conductor.answer(after).await.unwrap();
     let kept = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true]);
-}
-
-#[tokio::test]
-async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_count() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut trial = Trial::start(folder.path()).await;
-    let session = trial.whole_session("paper").await;
-    assert_eq!(trial.view().phase, Phase::Completed);
-    let before = trial.conductor.session_detail(session).await.unwrap().answers;
-    drop(trial);
-
-    let pool = crate::storage::raw(folder.path()).await;
-    MIGRATOR.undo(&pool, 4).await.unwrap();
-    // A changed answer long after the end, as the previous version stored it.
-    let changed = "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
-        SELECT '00000000-0000-4000-8000-000000000001', session, segment, question, '2', run,
-            '2026-03-02T09:00:00Z', monotonic_ns
-        FROM answers WHERE question = 'sharpness' ORDER BY number LIMIT 1";
-    sqlx::query(changed).execute(&pool).await.unwrap();
-    sqlx::query("UPDATE runs SET version = 'before'").execute(&pool).await.unwrap();
-    pool.close().await;
-
-    let trial = Trial::start(folder.path()).await;
-    let after = trial.conductor.session_detail(session).await.unwrap().answers;
-    assert_eq!(after.len(), before.len());
-    let sharp = after.iter().find(|line| line.question == "sharpness" && line.setting == Some(1)).unwrap();
-    assert_eq!((&sharp.value, sharp.changed), (&AnswerValue::Point(2), true));
-    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 6);
-    let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
-    assert!(rows(&out, "answers").iter().all(|row| row["late"] == "false" && row["device"].is_empty()));
-    assert_eq!(failed(&verify(&out, None)), [""; 0]);
 }

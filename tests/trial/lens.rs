@@ -20,23 +20,24 @@ async fn the_operator_moves_the_lens_before_a_session_is_made_and_after_it_is_cl
         Command::Drive { drive: Drive::Policy { name: PolicyName::new("fixed"), start: None }, segment: None },
     ];
 
-    trial.conductor.focus(Role::Operator, &by_hand).unwrap();
-    trial.conductor.focus(Role::Operator, &by_policy).unwrap();
+    trial.conductor.focus(Role::Operator, &by_hand).await.unwrap();
+    trial.conductor.focus(Role::Operator, &by_policy).await.unwrap();
     assert_eq!(trial.commanded(), moved);
 
     let session = trial.begin("practice").await;
     trial.commanded();
     for focus in [&by_hand, &by_policy, &Focus::Policy("unknown".to_owned()), &Focus::FocalPower(2.0)] {
-        let refused = trial.conductor.focus(Role::Operator, focus);
+        let refused = trial.conductor.focus(Role::Operator, focus).await;
         assert!(matches!(refused, Err(ConductError::Conflict(_))), "{focus:?}");
     }
     trial.conductor.act(Role::Operator, session, Action::Abort { reason: "over".to_owned() }).await.unwrap();
     trial.commanded();
-    assert!(trial.conductor.focus(Role::Operator, &by_hand).is_err(), "an ended session is still on the screens");
+    let refused = trial.conductor.focus(Role::Operator, &by_policy).await;
+    assert!(matches!(refused, Err(ConductError::Conflict(_))), "an ended session is still on the screens");
     assert_eq!(trial.commanded(), []);
 
     trial.conductor.dismiss(Role::Operator, session).unwrap();
-    trial.conductor.focus(Role::Operator, &by_hand).unwrap();
+    trial.conductor.focus(Role::Operator, &by_hand).await.unwrap();
     assert_eq!(trial.commanded(), moved[..1]);
 }
 
@@ -45,14 +46,14 @@ async fn nobody_but_the_operator_moves_the_lens_and_only_to_where_it_can_go() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     for role in [Role::Surgeon, Role::Researcher, Role::System] {
-        let refused = trial.conductor.focus(role, &Focus::FocalPower(0.25));
+        let refused = trial.conductor.focus(role, &Focus::FocalPower(0.25)).await;
         assert!(matches!(refused, Err(ConductError::Forbidden(_))), "{role:?}");
     }
 
-    let unknown = trial.conductor.focus(Role::Operator, &Focus::Policy("unknown".to_owned()));
+    let unknown = trial.conductor.focus(Role::Operator, &Focus::Policy("unknown".to_owned())).await;
     assert!(matches!(unknown, Err(ConductError::NotFound(_))));
     for value in [f64::NAN, -0.1, 1.1] {
-        let invalid = trial.conductor.focus(Role::Operator, &Focus::FocalPower(value));
+        let invalid = trial.conductor.focus(Role::Operator, &Focus::FocalPower(value)).await;
         assert!(matches!(invalid, Err(ConductError::Invalid(_))), "{value}");
     }
     assert_eq!(trial.commanded(), []);

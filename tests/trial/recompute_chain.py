@@ -135,8 +135,8 @@ def main(folder):
                 withheld += 1
             found = sha256("parfocal-record-1", kind, *content, sealed)
             assert found == row["content"], f"{kind} {row['key']} was changed"
-            names = "salt wall kind key session place adopted sealed content".split()
-            found = sha256("parfocal-entry-1", *(row[name] for name in names))
+            before = [row[name] for name in "salt wall kind key session place".split()]
+            found = sha256("parfocal-entry-1", *before, "false", row["sealed"], row["content"])
             assert found == row["entry"], f"row {number} was changed"
             seen += 1
         found = sha256("parfocal-chain-1", str(number), previous, row["entry"])

@@ -6,7 +6,7 @@ use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::question::{AnswerValue, QuestionKind};
-use parfocal_trial::remark::{CommentContent, NewAnswer, Origin};
+use parfocal_trial::remark::{CommentContent, NewAnswer, Origin, WaitClock};
 use parfocal_trial::role::Role;
 
 use crate::fixture::Trial;
@@ -39,7 +39,8 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
 
     let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
-    assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
+    // In the order in which they were said: nobody knows how long the other waited.
+    assert!((timeline.comments[1].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments);
 
     let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(
@@ -88,6 +89,57 @@ async fn a_comment_sent_twice_is_one_and_a_key_used_for_another_is_refused() {
     assert!(matches!(trial.conductor.comment(other).await, Err(ConductError::Conflict(_))));
 
     assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn a_comment_that_is_taken_back_stays_in_the_record_and_counts_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let slip = trial.comment("a slip");
+    trial.conductor.comment(slip.clone()).await.unwrap();
+    trial.say("meant").await;
+
+    let mut withdrawal = trial.comment("");
+    withdrawal.said = CommentContent::Withdrawal(slip.key);
+    trial.conductor.comment(withdrawal.clone()).await.unwrap();
+    trial.conductor.comment(withdrawal).await.unwrap();
+    assert_eq!(trial.view().comments, 1);
+    let shown: Vec<_> = trial.operator_view().latest_comments.into_iter().map(|line| line.said).collect();
+    assert_eq!(shown, [CommentContent::Text("meant".to_owned())]);
+
+    // The record keeps all three, and the timeline says which one was taken back.
+    let kept = trial.store.reader().comments(session).await.unwrap();
+    assert_eq!(kept[0].1.said, CommentContent::Text("a slip".to_owned()));
+    assert_eq!(kept[2].1.said, CommentContent::Withdrawal(slip.key));
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let withdrawn: Vec<bool> = timeline.comments.iter().map(|comment| comment.withdrawn).collect();
+    assert_eq!(withdrawn, [true, false]);
+    drop(trial);
+
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(trial.view().comments, 1, "also after a restart");
+}
+
+#[tokio::test]
+async fn what_was_said_without_a_network_stands_where_it_was_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    trial.wait(Duration::from_mins(1)).await;
+    trial.say("said at a minute").await;
+
+    let mut waited = trial.comment("said at half a minute");
+    waited.origin.waited_millis = Some(30_000);
+    waited.origin.waited_by = Some(WaitClock::PageClock);
+    trial.conductor.comment(waited).await.unwrap();
+
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let said: Vec<_> = timeline.comments.iter().map(|comment| comment.seconds.round()).collect();
+    assert_eq!(said, [30.0, 60.0]);
+    let shown: Vec<_> = trial.operator_view().latest_comments.into_iter().map(|line| line.said).collect();
+    let texts = ["said at a minute", "said at half a minute"].map(|text| CommentContent::Text(text.to_owned()));
+    assert_eq!(shown, texts, "newest first");
 }
 
 #[tokio::test]

@@ -177,7 +177,7 @@ async fn one_session_at_a_time_and_only_with_known_codes_and_protocols() {
     assert!(matches!(create(Role::Surgeon, PARTICIPANT, "paper").await, Err(ConductError::Forbidden(_))));
     assert!(matches!(create(Role::Operator, "S-99", "paper").await, Err(ConductError::NotFound(_))));
     let unknown = create(Role::Operator, PARTICIPANT, "papers").await.unwrap_err();
-    assert!(unknown.to_string().contains("paper, practice"), "{unknown}");
+    assert!(unknown.to_string().contains("follow-up, paper, practice"), "{unknown}");
     let session = trial.begin("paper").await;
     assert!(matches!(create(Role::Operator, PARTICIPANT, "paper").await, Err(ConductError::Conflict(_))));
     assert!(matches!(trial.conductor.dismiss(Role::Operator, session), Err(ConductError::Conflict(_))));

@@ -9,7 +9,7 @@ use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::{Hold, StepRecord};
-use parfocal_records::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
+use parfocal_records::store::{MIGRATOR, Reader, Store, StoreError, telemetry, verify_database};
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
@@ -53,6 +53,8 @@ async fn migrations_go_up_and_down_and_up_again() {
     assert!(up.contains("table events") && up.contains("trigger comments_no_delete"), "{up:?}");
     MIGRATOR.undo(&pool, 0).await.unwrap();
     assert_eq!(schema(&pool).await, BTreeSet::new());
+    assert!(matches!(Reader::open(folder.path()).await, Err(StoreError::Outdated)));
+    assert!(matches!(verify_database(folder.path(), None).await, Err(StoreError::Outdated)));
     MIGRATOR.run(&pool).await.unwrap();
     assert_eq!(schema(&pool).await, up);
 }

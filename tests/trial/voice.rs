@@ -264,7 +264,7 @@ async fn an_export_has_each_recording_as_a_file_and_a_changed_one_is_found() {
     assert_eq!((table[0]["media_type"].as_str(), table[0]["bytes"].as_str()), ("audio/webm;codecs=opus", "7500"));
     let kinds: Vec<_> = rows(&out, "comments").into_iter().map(|row| row["kind"].clone() + &row["text"]).collect();
     assert_eq!(kinds, ["voice"; 3]);
-    assert_eq!(json(&out, "datapackage.json")["parfocal"]["format"], 7);
+    assert_eq!(json(&out, "datapackage.json")["parfocal"]["format"], 1);
 
     let checks = verify(&out, None);
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");

@@ -6,6 +6,7 @@ export const VIEW = {
   phase: "inspecting",
   paused: false,
   may_resume: false,
+  may_pause: true,
   unrecorded: false,
   practice: false,
   title: "Trial",
@@ -19,6 +20,7 @@ export const VIEW = {
   questions: [],
   answers: {},
   comments: 3,
+  said: [],
 };
 
 /**

@@ -2,8 +2,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { nowWords as operatorWords } from "../static/operator/now.js";
+import { asCode, phaseWords, practiceFirst } from "../static/operator/session_words.js";
 import { Contact } from "../static/shared/contact.js";
 import { nowWords as surgeonWords } from "../static/surgeon/now.js";
+import { endsSoon } from "../static/surgeon/words.js";
 import { FakeTime, VIEW } from "./around.js";
 
 const PHASES = /** @type {const} */ ([
@@ -26,6 +28,8 @@ const SURGEON = {
   refused: false,
   unsent: false,
   unsaved: false,
+  soon: false,
+  over: false,
 };
 const OPERATOR = {
   known: true,
@@ -43,19 +47,31 @@ function operatorView(told) {
     participant: "S-01",
     protocol: "short",
     withdrawn: false,
+    may_focus_by_hand: false,
     latest_comments: [],
     log: [],
     ...told,
   };
 }
 
+test("a tablet whose link ended with its session keeps its last words, whatever becomes of the connection", () => {
+  const over = { ...SURGEON, over: true, missed: true };
+  const ended = { ...VIEW, phase: /** @type {const} */ ("completed") };
+  assert.equal(surgeonWords({ ...over, view: ended }), "You are done. Give the tablet back.");
+  assert.equal(
+    surgeonWords({ ...over, view: ended, unsaved: true }),
+    "Keep this page open until everything is saved.",
+  );
+  assert.match(surgeonWords({ ...over, view: null }), /Scan the operator’s code/);
+});
+
 test("each phase has a line of its own, which fits on a tablet’s screen", () => {
   const surgeon = PHASES.map((phase) => surgeonWords({ ...SURGEON, view: { ...VIEW, phase } }));
   const operator = PHASES.map((phase) => operatorWords({ ...OPERATOR, view: operatorView({ phase }) }));
 
-  // Two of the phases share a line: what to do is the same after every end of a session.
+  // For the surgeon two of the phases share a line: what to do is the same after every end of a session.
   assert.equal(new Set(surgeon).size, PHASES.length - 1);
-  assert.equal(new Set(operator).size, PHASES.length - 1);
+  assert.equal(new Set(operator).size, PHASES.length);
   for (const line of surgeon) assert.ok(line.length > 0 && line.length <= 85, line);
 });
 
@@ -137,4 +153,30 @@ test("a server counts as missed 2 s after its connection was lost, or after 7 s 
   assert.equal(contact.isMissed, true);
   contact.heard();
   assert.equal(contact.isMissed, false);
+});
+
+test("the last seconds of a setting are told calmly, and voice only where it is recorded", () => {
+  assert.match(surgeonWords({ ...SURGEON, view: VIEW, soon: true }), /ends in a moment/);
+  assert.match(surgeonWords({ ...SURGEON, view: VIEW }), /and write what you notice/);
+  assert.match(surgeonWords({ ...SURGEON, view: { ...VIEW, voice: true } }), /say or write/);
+  assert.equal(endsSoon(VIEW, 10.4), false);
+  assert.equal(endsSoon(VIEW, 9.9), true);
+  assert.equal(endsSoon({ ...VIEW, paused: true }, 3), false);
+});
+
+test("practice does not end as the trial does", () => {
+  const over = { ...VIEW, practice: true, phase: /** @type {const} */ ("completed") };
+  assert.match(surgeonWords({ ...SURGEON, view: over }), /Practice is over. Keep the tablet/);
+});
+
+test("a session without the consent that it needs is not ready, and practice is offered first", () => {
+  const ready = operatorView({ phase: "ready", consent_required: "v2" });
+  assert.equal(phaseWords(ready), "Consent is missing");
+  assert.equal(phaseWords(operatorView({ phase: "ready" })), "Ready to start");
+  const offered = [{ practice: false }, { practice: true }];
+  assert.deepEqual(practiceFirst(offered), [{ practice: true }, { practice: false }]);
+});
+
+test("a code is taken as it was meant, a name is not", () => {
+  assert.deepEqual(["s01", "s-0", "S-01", "anna"].map(asCode), ["S01", "S-0", "S-01", "anna"]);
 });

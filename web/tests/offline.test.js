@@ -228,7 +228,16 @@ function worker(version, caches) {
     },
   };
   const fetch = (/** @type {string | Request} */ what) => network.fetch(what);
-  vm.runInNewContext(SCRIPT, { self, caches, fetch, URL, Response, AbortSignal });
+  vm.runInNewContext(SCRIPT, {
+    self,
+    caches,
+    fetch,
+    URL,
+    Response,
+    AbortController,
+    setTimeout,
+    clearTimeout,
+  });
 
   const lives = async (/** @type {string} */ name) => {
     /** @type {Promise<unknown>} */

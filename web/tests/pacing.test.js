@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { drawAndAcknowledge, readFrame } from "../static/shared/pacing.js";
+import { Pictures, readFrame } from "../static/shared/pacing.js";
 import { Reconnection } from "../static/shared/reconnection.js";
 import { settle } from "./around.js";
 
@@ -22,16 +22,23 @@ const FRAME = message('{"frame": 7}', [0xff, 0xd8, 1, 2]);
 function notingPage() {
   /** @type {string[]} */
   const notes = [];
+  const clock = { ms: 1000 };
   return {
     notes,
+    clock,
     page: {
       decode: async (/** @type {Uint8Array} */ jpeg) => `${jpeg.length} bytes`,
       draw: (/** @type {{ frame: number }} */ header, /** @type {string} */ picture) => {
         notes.push(`draw ${header.frame}: ${picture}`);
       },
-      acknowledge: (/** @type {number} */ frame) => {
-        notes.push(`acknowledge ${frame}`);
+      acknowledge: (
+        /** @type {number} */ frame,
+        /** @type {number} */ held,
+        /** @type {boolean} */ shown,
+      ) => {
+        notes.push(`acknowledge ${frame}${shown ? "" : " unseen"} after ${held} ms`);
       },
+      now: () => clock.ms,
       complain: (/** @type {unknown} */ error) => {
         notes.push(`complain: ${error instanceof Error ? error.message : error}`);
       },
@@ -50,25 +57,26 @@ test("a message holds a header of the length that it states, then the picture", 
 
 test("a picture is acknowledged after it was drawn, once", async () => {
   const { notes, page } = notingPage();
-  await drawAndAcknowledge(FRAME, page);
-  assert.deepEqual(notes, ["draw 7: 4 bytes", "acknowledge 7"]);
+  await new Pictures(page).take(FRAME);
+  assert.deepEqual(notes, ["draw 7: 4 bytes", "acknowledge 7 after 0 ms"]);
 });
 
 test("nothing is acknowledged while a picture is being decoded", async () => {
-  const { notes, page } = notingPage();
+  const { notes, page, clock } = notingPage();
   /** @type {(picture: string) => void} */
   let decoded = () => {};
   const decode = () =>
     new Promise((/** @type {(picture: string) => void} */ done) => {
       decoded = done;
     });
-  const drawn = drawAndAcknowledge(FRAME, { ...page, decode });
+  const drawn = new Pictures({ ...page, decode }).take(FRAME);
   await settle();
   assert.deepEqual(notes, []);
 
+  clock.ms += 30;
   decoded("slow");
   await drawn;
-  assert.deepEqual(notes, ["draw 7: slow", "acknowledge 7"]);
+  assert.deepEqual(notes, ["draw 7: slow", "acknowledge 7 after 30 ms"]);
 });
 
 test("a picture that cannot be decoded or drawn is acknowledged too: the next may be good", async () => {
@@ -76,15 +84,43 @@ test("a picture that cannot be decoded or drawn is acknowledged too: the next ma
   const decode = async () => {
     throw new Error("no JPEG");
   };
-  await drawAndAcknowledge(FRAME, { ...broken.page, decode });
-  assert.deepEqual(broken.notes, ["complain: no JPEG", "acknowledge 7"]);
+  await new Pictures({ ...broken.page, decode }).take(FRAME);
+  assert.deepEqual(broken.notes, ["complain: no JPEG", "acknowledge 7 unseen after 0 ms"]);
 
   const undrawn = notingPage();
   const draw = () => {
     throw new Error("no canvas");
   };
-  await drawAndAcknowledge(FRAME, { ...undrawn.page, draw });
-  assert.deepEqual(undrawn.notes, ["complain: no canvas", "acknowledge 7"]);
+  await new Pictures({ ...undrawn.page, draw }).take(FRAME);
+  assert.deepEqual(undrawn.notes, ["complain: no canvas", "acknowledge 7 unseen after 0 ms"]);
+});
+
+test("of pictures that arrive while one is being decoded only the newest is drawn, and all are acknowledged in order", async () => {
+  const { notes, page } = notingPage();
+  /** @type {(() => void)[]} */
+  const decoded = [];
+  const decode = () =>
+    new Promise((/** @type {(picture: string) => void} */ done) => {
+      decoded.push(() => done("a picture"));
+    });
+  const pictures = new Pictures({ ...page, decode });
+  for (const frame of [7, 8, 9]) pictures.take(message(`{"frame": ${frame}}`, [1]));
+  decoded[0]?.();
+  await settle();
+  assert.equal(decoded.length, 2, "the one in between is not decoded");
+  decoded[1]?.();
+  await settle();
+  const acknowledged = [
+    "acknowledge 7 after 0 ms",
+    "acknowledge 8 unseen after 0 ms",
+    "acknowledge 9 after 0 ms",
+  ];
+  assert.deepEqual(notes, [
+    "draw 7: a picture",
+    ...acknowledged.slice(0, 2),
+    "draw 9: a picture",
+    acknowledged[2],
+  ]);
 });
 
 test("waits between attempts double from 250 ms to 5 s, a quarter more or less, and begin anew once connected", () => {

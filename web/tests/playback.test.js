@@ -206,8 +206,87 @@ test("pictures far behind are forgotten, those that are needed stay", async () =
   assert.equal(pictures.get(4), undefined);
 });
 
+/**
+ * Plays `seconds` on a page that draws every 16.7 ms, from a server that takes 40 ms for a picture.
+ *
+ * @param {Track} track
+ * @param {number} speed
+ * @param {number} seconds
+ */
+async function playOnPage(track, speed, seconds) {
+  let now = 0;
+  let aborted = 0;
+  /** @type {{ due: number, answer: () => void }[]} */
+  let coming = [];
+  const pictures = new Pictures({
+    load: (frame, signal) =>
+      new Promise((answer) => {
+        coming.push({ due: now + 40, answer: () => answer(String(frame)) });
+        signal.addEventListener("abort", () => {
+          aborted += 1;
+        });
+      }),
+    explain: () => null,
+    arrived: () => {},
+    failed: (error) => assert.fail(String(error)),
+  });
+
+  const playhead = new Playhead(track);
+  const from = playhead.seconds;
+  playhead.speed = speed;
+  playhead.play();
+  const drawn = new Set();
+  for (; now < seconds * 1000 && playhead.playing; now += 1000 / 60) {
+    for (const { answer } of coming.filter(({ due }) => due <= now)) answer();
+    coming = coming.filter(({ due }) => due > now);
+    await settled();
+    playhead.advance(1 / 60, (frame) => pictures.get(frame) !== undefined);
+    pictures.want(playhead.needed(25));
+    if (playhead.frame !== null && pictures.get(playhead.frame)) drawn.add(playhead.frame);
+  }
+  return { moved: playhead.seconds - from, aborted, drawn: drawn.size };
+}
+
+for (const ms of [20, 1000 / 30, 40, 100]) {
+  test(`playback of a frame every ${ms.toFixed()} ms keeps up at every speed, and asks for nothing in vain`, async () => {
+    const track = new Track([recording("S", 0, Math.ceil(24_000 / ms), ms)]);
+    for (const speed of [0.25, 0.5, 1, 2, 4]) {
+      const { moved, aborted, drawn } = await playOnPage(track, speed, 5);
+      const expected = 5 * speed;
+      assert.ok(Math.abs(moved - expected) <= 0.05 * expected, `${speed}: ${moved} s of ${expected} s`);
+      assert.equal(aborted, 0, `at speed ${speed}`);
+      // All frames of the recording, but no more than a person can distinguish.
+      const pictures = Math.min((1000 / ms) * speed, 20) * 5;
+      assert.ok(drawn >= 0.9 * pictures, `${speed}: ${drawn} pictures of ${pictures}`);
+    }
+  });
+}
+
+test("playback that leaves frames out begins anew after a gap, and ends with the last frame", async () => {
+  // 50 frames a second, of which every second one is wanted. The first recording has an odd number of frames.
+  const track = new Track([recording("S", 0, 51, 20), recording("S-2", 10, 52, 20)]);
+  const playhead = new Playhead(track);
+  playhead.step(1);
+  playhead.play();
+  playhead.advance(0.96, always);
+  assert.deepEqual(playhead.needed(4), [49, 51, 53, 55], "the frame after the gap is among them");
+  playhead.advance(0.06, always);
+  playhead.advance(1, always);
+  assert.deepEqual([playhead.seconds, playhead.frame], [10, 51]);
+  playhead.advance(2, always);
+  assert.deepEqual([playhead.playing, playhead.frame], [false, 102]);
+
+  playhead.seek(0.06);
+  playhead.play();
+  playhead.advance(0.03, always);
+  assert.equal(playhead.frame, 3, "the frame on screen is one of those that were wanted");
+  playhead.step(1);
+  assert.equal(playhead.frame, 4, "and a step leads from what is on screen");
+});
+
 /** @type {Api.Timeline} */
 const TIMELINE = {
+  absences: [],
   comments: [],
   pauses: [],
   set_aside: [],
@@ -221,6 +300,7 @@ const TIMELINE = {
     { setting: 2, seconds: 12, frame: 3, asked: 0.5, metric: 0.5 },
     { setting: 2, seconds: 20, frame: 4, asked: 0.7, metric: 0.25 },
   ],
+  sights: [],
 };
 
 test("the metric's line reaches the top in every setting", () => {

@@ -3,7 +3,8 @@ import { test } from "node:test";
 
 import { Drafts } from "../static/surgeon/drafts.js";
 import { Origins } from "../static/surgeon/origin.js";
-import { answerTo, onTopOf, ordinal, Questionnaire } from "../static/surgeon/questions.js";
+import { answerTo, drawnOrder, onTopOf, ordinal, Questionnaire } from "../static/surgeon/questions.js";
+import { placeAt } from "../static/surgeon/ranking.js";
 import { countedIds, FakeTime, fakeStore } from "./around.js";
 
 /** @type {Api.Question} */
@@ -28,6 +29,9 @@ function openPage(store = fakeStore()) {
   /** @type {import("../static/surgeon/questions.js").Context} */
   const context = {
     settings: 3,
+    said: [["Blurred"], [], ["Sharp", "It wanders"]],
+    // The order drawn from this lot is 1, 2, 3.
+    lot: "s2",
     later: time.later,
     draft: ({ id }) => drafts.open(`answer.s/1/${id}`),
     give: ({ id }, value, part) => given.push({ question: id, value, part }),
@@ -314,4 +318,47 @@ test("settings may share a place where the protocol allows it", () => {
   );
   shared.show("saved");
   assert.equal(shared.unanswered, false);
+});
+
+test("no setting gains from the starting order of a ranking, which is the same on every device", () => {
+  assert.deepEqual(drawnOrder(6, "session/order"), drawnOrder(6, "session/order"));
+  const first = Array.from({ length: 6 }, () => 0);
+  for (let session = 0; session < 6000; session += 1) {
+    const order = drawnOrder(6, `f3b1-${session}/order`);
+    assert.deepEqual(
+      [...order].sort((a, b) => a - b),
+      [1, 2, 3, 4, 5, 6],
+    );
+    const best = (order[0] ?? 0) - 1;
+    first[best] = (first[best] ?? 0) + 1;
+  }
+  // 1000 each, with a standard deviation of 29.
+  assert.ok(
+    first.every((count) => count > 850 && count < 1150),
+    String(first),
+  );
+});
+
+test("a ranking recalls what was said of each setting", () => {
+  /** @type {RankingAnswer} */
+  const order = openPage().ask(ORDER);
+  assert.deepEqual(
+    [1, 2, 3].map((setting) => order.saidOf(setting)),
+    ["“Blurred”", "", "“Sharp” “It wanders”"],
+  );
+});
+
+test("a setting that is dragged takes the place of those above which it comes to stand", () => {
+  const middles = [100, 200, 300, 400];
+  assert.equal(placeAt(middles, 3, 40), 0);
+  assert.equal(placeAt(middles, 3, 310), 3);
+  assert.equal(placeAt(middles, 0, 260), 1);
+  assert.equal(placeAt(middles, 1, 200), 1);
+});
+
+test("long questionnaires say how far one is", () => {
+  const { ask } = openPage();
+  const usability = ask(USABILITY, [1, 1, 0, 1, 1, 1, 1, 1, 0, 1]);
+  assert.equal(new Questionnaire([usability, ask(SHARPNESS, 4)]).progressWords, "9 of 11 answered");
+  assert.equal(new Questionnaire([ask(SHARPNESS)]).progressWords, "", "one question is seen at a glance");
 });

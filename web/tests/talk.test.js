@@ -46,7 +46,12 @@ function openPage() {
     outbox: /** @type {any} */ (outbox),
     record: /** @type {any} */ (record),
     here: () => place,
-    stamp: () => ({ client_millis: time.wall() }),
+    stamp: () => ({
+      device: "tablet",
+      sequence: 1,
+      client_millis: time.wall(),
+      clock: { page: "page", at: time.wall(), slept: 0 },
+    }),
     now: time.page,
     later: time.later,
     changed: () => {},

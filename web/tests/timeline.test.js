@@ -5,7 +5,7 @@ import { lengthOf, linePath, powerAt, powerOf, Scale } from "../static/researche
 import { description, outstandingWords, setAsideWords } from "../static/researcher/timeline_words.js";
 
 /** @type {Api.Timeline} */
-const EMPTY = { comments: [], pauses: [], points: [], set_aside: [], settings: [] };
+const EMPTY = { absences: [], comments: [], pauses: [], points: [], set_aside: [], settings: [], sights: [] };
 
 /**
  * A point of setting 1, unless `rest` says otherwise.
@@ -24,6 +24,7 @@ const COMMENT = {
   text: "Said",
   at: "2026-01-01T00:00:00Z",
   late: false,
+  withdrawn: false,
   seconds: 0,
 };
 
@@ -32,6 +33,7 @@ test("the timeline is as long as the last thing that happened, whatever that is"
   assert.equal(lengthOf({ ...EMPTY, settings: [{ setting: 1, from: 2, to: 30 }] }), 30);
   assert.equal(lengthOf({ ...EMPTY, settings: [{ setting: 1, from: 2 }] }), 2, "a setting still under way");
   assert.equal(lengthOf({ ...EMPTY, pauses: [{ reason: "lamp", from: 4, to: 44 }] }), 44);
+  assert.equal(lengthOf({ ...EMPTY, absences: [{ reason: "away", from: 4, to: 45 }] }), 45);
   assert.equal(lengthOf({ ...EMPTY, points: [point(1, 0), point(50, 0)] }), 50);
   assert.equal(lengthOf({ ...EMPTY, comments: [{ ...COMMENT, seconds: 61 }] }), 61);
   const aside = { at: "", late: true, question: "q", text: "", value: 1, seconds: 70 };

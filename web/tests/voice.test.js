@@ -4,9 +4,10 @@ import { test } from "node:test";
 import { Refused } from "../static/shared/api.js";
 import { Origins } from "../static/surgeon/origin.js";
 import { VoiceOutbox } from "../static/surgeon/voice_outbox.js";
+import { heldWords, NO_CONNECTION } from "../static/surgeon/words.js";
 import { countedIds, FakeDisk, FakeTime, fakeStore, settle } from "./around.js";
 
-const PLACE = { session: "s", segment: "g", frame: 7, run: 1 };
+const PLACE = { session: "s", segment: "g", setting: 1, frame: 7, run: 1 };
 const noNetwork = () => new TypeError("Failed to fetch");
 
 /** @typedef {import("../static/surgeon/voice_outbox.js").Step} Step */
@@ -65,7 +66,7 @@ test("a recording is sent while it is spoken, in order, and taken off the device
     "3?session=s&through_ms=3000&ended=released 0 audio/mp4",
   ]);
   assert.equal(page.store.kept.size, 0);
-  assert.deepEqual([outbox.waiting, outbox.held("s"), outbox.status.text], [0, 0, ""]);
+  assert.deepEqual([outbox.waiting, outbox.held("s"), outbox.status.text], [0, 0, "Recording saved"]);
 });
 
 test("without a network everything stays on the device and lands in order, over a reload too", async () => {
@@ -77,7 +78,7 @@ test("without a network everything stays on the device and lands in order, over 
   await settle();
   assert.equal(page.store.kept.size, 2);
   assert.equal(outbox.waiting, 1, "one recording, however many pieces");
-  assert.match(outbox.status.text, /Saved here, not sent yet: 1 recording\. No connection/);
+  assert.deepEqual([outbox.heldUp, outbox.trouble, outbox.status.text], [1, NO_CONNECTION, ""]);
 
   // The page is loaded again, and the network is back.
   page.answers.length = 0;
@@ -116,11 +117,21 @@ test("a device without room says so, and sends all the same", async () => {
   const comment = outbox.begin(PLACE, page.origins.stamp());
   await settle();
   assert.equal(outbox.durable, false);
-  assert.match(outbox.status.text, /Kept on this page only, so do not close it/);
+  assert.equal(outbox.heldUp, 1);
 
   add(outbox, comment, 1);
   await settle();
   await page.time.pass(1000);
   assert.equal(outbox.waiting, 0);
   assert.equal(outbox.durable, true);
+});
+
+test("one line tells everything that waits, where it is, and what becomes of it", () => {
+  const held = { comments: 3, recordings: 1, durable: true, trouble: NO_CONNECTION };
+  assert.equal(heldWords(held), "Saved here: 3 comments, 1 recording. Sent when the network is back.");
+  assert.equal(heldWords({ ...held, comments: 0, trouble: null }), "Saved here: 1 recording.");
+  assert.equal(
+    heldWords({ ...held, recordings: 0, durable: false, trouble: "The disk is full." }),
+    "Kept on this page only, so do not close it: 3 comments. The disk is full.",
+  );
 });

@@ -177,7 +177,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session is under way. */
+        /**
+         * Puts a policy in charge of the focus, or sets the focal power by hand. While a session is under way only the latter,
+         *     and only while it is paused or after an abort; that is recorded in the session.
+         */
         post: operations["operator_focus"];
         delete?: never;
         options?: never;
@@ -300,6 +303,44 @@ export interface paths {
         put?: never;
         /** Changes an account. */
         post: operations["accounts_change"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/backup": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The state of the latest backup that the lead who is signed in asked for. It is kept for 15 minutes, unless words are
+         *     erased.
+         */
+        get: operations["accounts_backup_state"];
+        put?: never;
+        /** Begins to make a backup in the background, and records that. If one is being made already, no other begins. */
+        post: operations["accounts_start_backup"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/backup.db": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The backup as a file for `parfocal restore`. */
+        get: operations["accounts_backup_file"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -782,6 +823,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/surgeon/tablet-trials": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends. */
+        post: operations["surgeon_tried"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/surgeon/voice/{comment}/{piece}": {
         parameters: {
             query?: never;
@@ -1094,6 +1152,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/tablet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The page that tries a tablet. */
+        get: operations["surgeon_tablet_page"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/trust": {
         parameters: {
             query?: never;
@@ -1241,6 +1316,16 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "pause";
+            /** @description Reason for the pause, if it is known already. It can be given later, see [`Action::GiveReason`]. */
+            reason?: string;
+        } | {
+            /** @enum {string} */
+            action: "give-reason";
+            /**
+             * Format: int32
+             * @description Number of the pause among the session's events.
+             */
+            event: number;
             /** @description Reason for the pause. */
             reason: string;
         } | {
@@ -1319,6 +1404,8 @@ export interface components {
         Analysis: {
             /** @description SHA-256 of the study's definition. */
             definition_sha256: string;
+            /** @description Names of the definition's sites of which no session is here. */
+            missing_sites: string[];
             /** @description Notes that apply to all figures. */
             notes: string[];
             /** @description The planned analysis, as in the definition. */
@@ -1327,7 +1414,7 @@ export interface components {
             protocols: components["schemas"]["ProtocolAnalysis"][];
             /** @description Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`. */
             seed: string;
-            /** @description Names of the study's sites that this database runs. */
+            /** @description Names of the study's sites that this database, or the databases of this package, run. */
             sites: string[];
             /** @description Name of the study. */
             study: string;
@@ -1375,6 +1462,29 @@ export interface components {
         };
         /** @description The value of an answer. */
         AnswerValue: number | number[] | string;
+        /** @description The state of the latest backup. */
+        BackupState: {
+            /** @enum {string} */
+            state: "none";
+        } | {
+            /** @enum {string} */
+            state: "running";
+        } | {
+            /**
+             * Format: int64
+             * @description Size in bytes.
+             */
+            bytes: number;
+            /** @description Head of the backup's chain: number and the beginning of the hash. */
+            head: string;
+            /** @enum {string} */
+            state: "ready";
+        } | {
+            /** @description Reason for the failure, for people. */
+            reason: string;
+            /** @enum {string} */
+            state: "failed";
+        };
         /** @description What can be changed, and whether the last change failed. */
         CameraOffer: {
             /** @description Every setting that the camera offers now. */
@@ -1458,6 +1568,11 @@ export interface components {
             /** @enum {string} */
             kind: "voice";
             text?: never;
+        } | {
+            /** @enum {string} */
+            kind: "withdrawal";
+            /** @description The surgeon takes back the comment with this key, which stays in the record. */
+            text: components["schemas"]["IdempotencyKey"];
         };
         /** @description A comment, as it is shown. */
         CommentLine: components["schemas"]["CommentContent"] & {
@@ -1729,6 +1844,11 @@ export interface components {
             /** @description Description of the event. */
             text: string;
         };
+        /** @description A wish for a backup. */
+        MakeBackup: {
+            /** @description The lead's own passphrase, entered again. */
+            passphrase: string;
+        };
         /** @description An item or a score of an answer as a number. */
         Measure: {
             /** @description Name of the measure for people. */
@@ -1847,6 +1967,12 @@ export interface components {
          *     surgeon.
          */
         OperatorView: components["schemas"]["SurgeonView"] & {
+            /**
+             * Format: double
+             * @description Focal power to which the operator last moved the lens by hand in this pause or after the abort; none if nobody
+             *     did. It is the operator's own, and says nothing of a policy.
+             */
+            by_hand?: number | null;
             consent?: components["schemas"]["Consent"] | null;
             /** @description Version of the consent text that the session requires before its start; none if no consent is required. */
             consent_required?: string | null;
@@ -1854,10 +1980,13 @@ export interface components {
             latest_comments: components["schemas"]["CommentLine"][];
             /** @description The latest events in words, newest first. */
             log: components["schemas"]["LogLine"][];
+            /** @description Whether the operator may focus by hand: while the session is paused, and after an abort. */
+            may_focus_by_hand: boolean;
             /** @description Code of the participant. */
             participant: string;
             /** @description Name of the protocol. */
             protocol: string;
+            reason_wanted?: components["schemas"]["ReasonWanted"] | null;
             /** @description Name of the session's study; none outside studies. */
             study?: string | null;
             /** @description Why the disk has not taken the `unrecorded` event; none if that is not known. */
@@ -1931,6 +2060,11 @@ export interface components {
              */
             second: number;
         };
+        /**
+         * @description What paused a session. The surgeon can resume it too, unless it was the operator.
+         * @enum {string}
+         */
+        PauseCause: "operator" | "surgeon" | "restart" | "tablet-away" | "small-picture";
         /** @description When the session was paused, by a person or by a restart of the server. */
         PauseSpan: {
             /**
@@ -1956,6 +2090,19 @@ export interface components {
          * @enum {string}
          */
         Phase: "ready" | "notice" | "inspecting" | "questions" | "closing" | "completed" | "aborted";
+        /** @description The size of a picture, in pixels. */
+        PictureSize: {
+            /**
+             * Format: int32
+             * @description Height.
+             */
+            height: number;
+            /**
+             * Format: int32
+             * @description Width.
+             */
+            width: number;
+        };
         /** @description Rules for the places of aborted and withdrawn sessions, and for repeated sessions. */
         PlaceRules: {
             /** @description What happens to the place of an aborted session. */
@@ -2002,9 +2149,11 @@ export interface components {
         };
         /** @description The analysis of a protocol's sessions. */
         ProtocolAnalysis: {
+            /** @description The same for each site alone; empty if all sessions that count are of one site. */
+            by_site: components["schemas"]["SiteAnalysis"][];
             /** @description Notes that apply to this protocol's figures. */
             notes: string[];
-            /** @description The outcomes, compared between the policies. */
+            /** @description The outcomes, compared between the policies, over all sites. */
             outcomes: components["schemas"]["Comparison"][];
             /** @description Names of the policies. */
             policies: string[];
@@ -2100,6 +2249,18 @@ export interface components {
         } | {
             /** @enum {string} */
             kind: "recognition";
+        };
+        /** @description A pause whose reason can still be given. */
+        ReasonWanted: {
+            /** @description Time of the pause, by the server's wall clock. */
+            at: string;
+            /** @description Role that paused the session. */
+            by: components["schemas"]["Role"];
+            /**
+             * Format: int32
+             * @description Number of the pause among the session's events.
+             */
+            event: number;
         };
         /**
          * @description What is recorded during a session, from its start to its end.
@@ -2367,6 +2528,24 @@ export interface components {
             /** @description The words, in order. */
             words: components["schemas"]["Words"][];
         };
+        /** @description What the surgeon saw for a while. */
+        SightSpan: components["schemas"]["PictureSize"] & {
+            /**
+             * Format: double
+             * @description Start, in seconds.
+             */
+            from: number;
+            /**
+             * Format: double
+             * @description Pictures a second.
+             */
+            per_second: number;
+            /**
+             * Format: double
+             * @description End, in seconds.
+             */
+            to: number;
+        };
         /** @description A request to sign in. */
         SignIn: {
             /** @description Whether the answer contains the token, for a program, instead of setting a cookie. */
@@ -2396,6 +2575,19 @@ export interface components {
             /** @description Title of the site. */
             title: string;
         };
+        /** @description The figures of one site's sessions. */
+        SiteAnalysis: {
+            /** @description The outcomes, compared between the policies. */
+            outcomes: components["schemas"]["Comparison"][];
+            /** @description Number of its sessions that count. */
+            sessions: number;
+            /** @description Name of the site. */
+            site: string;
+            /** @description Number of its surgeons whose sessions count. */
+            surgeons: number;
+            /** @description Answers about sessions as a whole. */
+            whole_sessions: components["schemas"]["WholeSessions"][];
+        };
         /** @description A site of a study. */
         SiteDetail: components["schemas"]["Site"] & {
             /** @description Whether this database runs the site. */
@@ -2412,6 +2604,8 @@ export interface components {
         StudyAction: {
             /** @enum {string} */
             change: "open";
+            /** @description Whether to open it the first time even though its plan cannot work as it is meant. */
+            despite_concerns?: boolean;
         } | {
             /** @enum {string} */
             change: "close";
@@ -2435,6 +2629,8 @@ export interface components {
             analysis: string;
             /** @description The line to print, publish or mail before the first session; none until the orders are drawn. */
             commitment_line?: string | null;
+            /** @description What in the plan cannot work as it is meant, in sentences; empty once the study is open. */
+            concerns: string[];
             /** @description The definition, byte for byte. */
             definition: string;
             /** @description SHA-256 of the definition: the same at every site. */
@@ -2600,15 +2796,15 @@ export interface components {
             answers: {
                 [key: string]: components["schemas"]["AnswerValue"];
             };
-            /** @description Number of comments saved so far in this session. */
+            /** @description Number of comments saved so far in this session, without those that were taken back. */
             comments: number;
-            /**
-             * @description Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
-             *     operator.
-             */
+            /** @description Whether the surgeon may pause the session. */
+            may_pause: boolean;
+            /** @description Whether the surgeon may resume the session: not after a pause by the operator. */
             may_resume: boolean;
             /** @description Whether the session is paused in that phase (by the operator, or by a restart of the server). */
             paused: boolean;
+            paused_by?: components["schemas"]["PauseCause"] | null;
             /** @description Phase of the session. */
             phase: components["schemas"]["Phase"];
             /** @description Whether this is a practice session. */
@@ -2624,6 +2820,8 @@ export interface components {
              * @description Seconds of inspection left in the segment when the view was sent; none outside inspection.
              */
             remaining_seconds?: number | null;
+            /** @description The surgeon's own words about each setting, in the order they were said; empty outside the closing questions. */
+            said: string[][];
             segment?: components["schemas"]["SegmentId"] | null;
             /** @description Random id of the session. */
             session: components["schemas"]["SessionId"];
@@ -2645,8 +2843,22 @@ export interface components {
             /** @description The surgeon's code. */
             surgeon: string;
         };
+        /**
+         * @description Something that a trial needs of a tablet.
+         * @enum {string}
+         */
+        TabletPart: "encrypted" | "storage" | "disk" | "stream" | "picture" | "microphone" | "screen-on";
+        /** @description What a tablet found out about itself. */
+        TabletTrial: {
+            /** @description The tablet. */
+            device: components["schemas"]["DeviceId"];
+            /** @description What was tried. */
+            tried: components["schemas"]["TriedPart"][];
+        };
         /** @description A session over time. Seconds count from its start by the server's clocks, pauses included. */
         Timeline: {
+            /** @description When no tablet showed the surgeon's page. */
+            absences: components["schemas"]["PauseSpan"][];
             /** @description The comments. */
             comments: components["schemas"]["TimelineComment"][];
             /** @description When the session was paused and the lens held where it was. */
@@ -2657,6 +2869,8 @@ export interface components {
             set_aside: components["schemas"]["SetAside"][];
             /** @description When each setting was inspected. */
             settings: components["schemas"]["SettingSpan"][];
+            /** @description What size of picture the surgeon saw, and how many. */
+            sights: components["schemas"]["SightSpan"][];
         };
         /** @description A comment on the timeline. */
         TimelineComment: components["schemas"]["CommentContent"] & {
@@ -2683,6 +2897,8 @@ export interface components {
             /** @description Setting, from 1; none outside settings. */
             setting?: number | null;
             voice?: components["schemas"]["TimelineVoice"] | null;
+            /** @description Whether the surgeon took it back at once. */
+            withdrawn: boolean;
         };
         /** @description A point of the focal path. */
         TimelinePoint: {
@@ -2754,6 +2970,13 @@ export interface components {
              * @description Two-sided p.
              */
             p: number;
+        };
+        /** @description One thing that was tried on a tablet. */
+        TriedPart: {
+            /** @description What was tried. */
+            part: components["schemas"]["TabletPart"];
+            /** @description Whether it works. */
+            works: boolean;
         };
         /** @description A request to unblind a session. */
         Unblind: {
@@ -5002,6 +5225,322 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_backup_state: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BackupState"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_start_backup: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MakeBackup"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BackupState"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in, or the lead's passphrase is wrong */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The passphrase is missing */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Too many attempts failed */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_backup_file: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/vnd.sqlite3": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No lead is signed in */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The lead has no backup that is ready */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
                 };
             };
             /** @description The server failed; its log says more */
@@ -8501,6 +9040,129 @@ export interface operations {
             };
         };
     };
+    surgeon_tried: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TabletTrial"];
+            };
+        };
+        responses: {
+            /** @description Noted */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": boolean;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Not what the page sends */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     surgeon_keep_piece: {
         parameters: {
             query: {
@@ -10059,6 +10721,86 @@ export interface operations {
                 };
                 content: {
                     "text/javascript": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    surgeon_tablet_page: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
                 };
             };
             /** @description The request cannot be read */

@@ -37,6 +37,7 @@ declare global {
     type StudyAction = Schemas["StudyAction"];
     type StudyExportProgress = Schemas["StudyExportProgress"];
     type StudyExportState = Schemas["StudyExportState"];
+    type BackupState = Schemas["BackupState"];
     type SurgeonView = Schemas["SurgeonView"];
     type Timeline = Schemas["Timeline"];
     type TimelineComment = Schemas["TimelineComment"];
@@ -99,10 +100,14 @@ declare global {
       frame: number;
       run: number;
       age: number;
+      /** Milliseconds that the latest pictures took from the server to this page. */
+      travel: number;
       width: number;
       height: number;
       /** Pixels of the picture along each side of a mosaic cell; patch and area are in cells. */
       per_cell: number;
+      /** Whether the link is too slow for the size of pictures that the screen can show. */
+      reduced: boolean;
       estimated: boolean;
       patch: Patch;
       area: Circle | null;
@@ -125,7 +130,15 @@ declare global {
       certificate_until: string | null;
     }
 
+    interface TabletSign {
+      presence: "never-seen" | "present" | "hidden" | "silent";
+      away_seconds: number | null;
+      slow: boolean;
+      size: { width: number; height: number } | null;
+    }
+
     interface OperatorStatus {
+      tablet: TabletSign;
       camera: {
         name: string;
         working: boolean;

@@ -432,7 +432,7 @@ mod tests {
         let stripes = Patch(std::array::from_fn(|i| 128.0 + if i % 8 < 4 { 40.0 } else { -40.0 }));
         let stands = |wider| {
             let mut trace = Trace::default();
-            trace.input(&View { patch: flat, wider }, 0.5);
+            trace.input(&View { wider, ..flat.into() }, 0.5);
             (trace.aim(0.5, &certain(0.9)) - 0.5).abs() < 1e-9
         };
 
@@ -445,7 +445,7 @@ mod tests {
         let stripes = |width: usize| Patch(std::array::from_fn(|i| if i % (2 * width) < width { 90.0 } else { 160.0 }));
         let fine = stripes(2);
         let coarse = stripes(8);
-        let input = |wider| Trace::default().input(&View { patch: fine, wider }, 0.5);
+        let input = |wider| Trace::default().input(&View { wider, ..fine.into() }, 0.5);
         let alone = input([None; 2]);
         assert!(alone[NEAR_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
         let both = input([Some(fine), Some(coarse)]);
@@ -459,7 +459,7 @@ mod tests {
     #[test]
     fn the_blur_rate_is_an_input_if_it_is_known() {
         let patch = Patch(std::array::from_fn(|i| if i % 4 < 2 { 90.0 } else { 160.0 }));
-        let view = View { patch, wider: [None; 2] };
+        let view = View::from(patch);
         let unknown = Trace::default().input(&view, 0.5);
         assert!(unknown[SEEN_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
 

@@ -1,6 +1,7 @@
 //! Autofocus: focus metrics, and the policies that decide where the lens goes. Uses no camera, lens or database.
 
 pub mod belief;
+mod bisection;
 mod fixed;
 mod hill_climber;
 pub mod learned;
@@ -14,6 +15,7 @@ pub mod shipped;
 pub mod spectrum;
 pub mod weights;
 
+pub use bisection::Bisection;
 pub use fixed::Fixed;
 pub use hill_climber::HillClimber;
 pub use metrics::{mgm, mlr};
@@ -46,6 +48,8 @@ pub enum FieldOfView {
     Patch,
     /// The patch and the wider patches around it. For them the control loop develops sixteen times as many pixels.
     Wide,
+    /// As [`FieldOfView::Wide`], and these pixels themselves.
+    Surroundings,
 }
 
 /// What a policy sees of a frame.

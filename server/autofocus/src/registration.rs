@@ -62,7 +62,7 @@ pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; C
 /// The displacement `(x, y)` in whole pixels: `now` at a place shows what `before` shows at that place plus the
 /// displacement. It is the peak of their phase correlation (Kuglin and Hines 1975). Blur hardly moves the peak, since
 /// it reduces the amplitude of each frequency and leaves its phase.
-fn displacement(before: &Spectrum, now: &Spectrum) -> (isize, isize) {
+pub(super) fn displacement(before: &Spectrum, now: &Spectrum) -> (isize, isize) {
     let map = correlate(before, now, &WAVES);
     let mut best = f32::NEG_INFINITY;
     let mut place = (0, 0);

@@ -178,7 +178,9 @@ mod tests {
 
     #[test]
     fn the_standard_registry_has_the_promised_names_in_the_promised_order() {
-        let promised = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
+        let classical = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-bisection"];
+        let learned = ["mgm-learned", "mlr-learned", "cnn-learned", "parfocal"];
+        let promised = [classical, learned].concat();
         assert_eq!(names(&Registry::standard())[..promised.len()], promised);
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::belief::BeliefTracker;
 use super::learned::{Learned, Sight};
 use super::weights::WeightsError;
-use super::{Fixed, HillClimber, Policy, Registry, mgm, mlr};
+use super::{Bisection, Fixed, HillClimber, Policy, Registry, mgm, mlr};
 
 /// The kind of network that a learned policy's weights are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,8 +61,9 @@ impl Registry {
             .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
                 Box::new(HillClimber::new(mgm))
             })
-            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
-                Box::new(HillClimber::new(mlr))
+            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || Box::new(HillClimber::new(mlr)))
+            .with("mgm-bisection", "halves where the optimum may be, by which of two frames is sharper", || {
+                Box::new(Bisection::default())
             });
 
         with_shipped(classical)

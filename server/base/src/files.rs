@@ -1,6 +1,7 @@
 //! Files that are whole or absent, even when the disk is full or the power fails; and files that other
 //! accounts cannot read.
 
+use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
@@ -44,6 +45,31 @@ pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let created = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&beside);
     let written = created.and_then(|file| fill_through(file, |writer| writer.write_all(bytes)));
     put_in_place(&beside, path, written)
+}
+
+/// Has `make` write a new file, which becomes `path` once it is whole: `make` gets another name in the same folder.
+/// What is there already stays.
+///
+/// # Errors
+/// If there is a file at `path`, or it cannot be written. No part of it is left then.
+pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
+    let free = || -> io::Result<()> {
+        if fs::symlink_metadata(path).is_ok() { Err(io::ErrorKind::AlreadyExists.into()) } else { Ok(()) }
+    };
+    free()?;
+
+    let beside = partial(path);
+    let outcome = make(&beside).and_then(|()| {
+        // Looked at again: making it may have taken minutes.
+        let moved = free().and_then(|()| File::open(&beside)?.sync_data()).and_then(|()| fs::rename(&beside, path));
+        moved.map_err(E::from)
+    });
+
+    match &outcome {
+        Ok(()) => sync_folder_of(path),
+        Err(_) => drop(fs::remove_file(&beside)),
+    }
+    outcome
 }
 
 /// The path at which a file is written before it is moved to `path`.
@@ -111,7 +137,16 @@ pub fn make_private(path: &Path) -> io::Result<()> {
     fs::set_permissions(path, Permissions::from_mode(mode & !OTHERS & 0o7777))
 }
 
-/// All files below `folder`, at any depth: their paths relative to `folder`, sorted.
+/// Whether a file or folder with this name is not a person's but an operating system's, which puts it into folders that
+/// people open: hidden files such as `.DS_Store` and `._picture.jpg`, `Thumbs.db` and `desktop.ini`.
+#[must_use]
+pub fn is_systems_own(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with('.') || ["Thumbs.db", "desktop.ini"].iter().any(|own| name.eq_ignore_ascii_case(own))
+}
+
+/// All files below `folder`, at any depth, without [those of operating systems](is_systems_own): their paths relative
+/// to `folder`, sorted.
 ///
 /// # Errors
 /// If a folder cannot be read.
@@ -121,6 +156,9 @@ pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
     while let Some(within) = folders.pop() {
         for entry in fs::read_dir(folder.join(&within))? {
             let entry = entry?;
+            if is_systems_own(&entry.file_name()) {
+                continue;
+            }
             let name = within.join(entry.file_name());
             if entry.path().is_dir() {
                 folders.push(name);
@@ -132,6 +170,30 @@ pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
 
     files.sort();
     Ok(files)
+}
+
+/// The files of operating systems below `folder`, at any depth: their paths relative to `folder`, sorted. Of a hidden
+/// folder only the folder itself is listed.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn systems_own_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(within) = folders.pop() {
+        for entry in fs::read_dir(folder.join(&within))? {
+            let entry = entry?;
+            let name = within.join(entry.file_name());
+            if is_systems_own(&entry.file_name()) {
+                found.push(name);
+            } else if entry.path().is_dir() {
+                folders.push(name);
+            }
+        }
+    }
+
+    found.sort();
+    Ok(found)
 }
 
 /// Whether `name` is that of a file which a process killed in [`replace`] may have left.
@@ -223,6 +285,26 @@ mod tests {
         }
 
         assert_eq!(make_private(&folder.path().join("missing")).unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn files_of_operating_systems_are_told_from_peoples_own() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir_all(folder.path().join("voice/.Spotlight-V100")).unwrap();
+        let own = [".DS_Store", "._a.jpg", "Thumbs.db", "THUMBS.DB", "Desktop.ini", "voice/._b.webm"];
+        for name in own.iter().chain(&["a.jpg", "voice/b.webm", "thumbs.db.jpg", "voice/.Spotlight-V100/store"]) {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+
+        let named = |names: Vec<PathBuf>| -> Vec<String> {
+            names.into_iter().map(|name| name.to_string_lossy().into_owned()).collect()
+        };
+        assert_eq!(named(files_below(folder.path()).unwrap()), ["a.jpg", "thumbs.db.jpg", "voice/b.webm"]);
+        let mut expected = [&own[..], &["voice/.Spotlight-V100"]].concat();
+        expected.sort_unstable();
+        let mut found = named(systems_own_below(folder.path()).unwrap());
+        found.sort();
+        assert_eq!(found, expected);
     }
 
     #[test]

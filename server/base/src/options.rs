@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 /// Invalid options. The message says which and why.
@@ -50,6 +51,30 @@ impl<'a> Options<'a> {
         self.values.remove(name).map(parse).transpose()
     }
 
+    /// The number of option `name`, if it was given. It must be within `range`; `unit` says in what.
+    ///
+    /// # Errors
+    /// If its value is no number, or outside `range`, as NaN and infinity are.
+    pub fn take_within<T>(
+        &mut self,
+        name: &'static str,
+        range: RangeInclusive<T>,
+        unit: &str,
+    ) -> Result<Option<T>, BadOptions>
+    where
+        T: FromStr<Err: Display> + PartialOrd + Display,
+    {
+        match self.take(name)? {
+            Some(value) if !range.contains(&value) => Err(BadOptions(format!(
+                "in '{}': {name}={value}: must be from {} to {}{unit}",
+                self.spec,
+                range.start(),
+                range.end()
+            ))),
+            value => Ok(value),
+        }
+    }
+
     /// Rejects unknown options.
     ///
     /// # Errors
@@ -78,6 +103,21 @@ mod tests {
         assert_eq!(options.take::<f64>("min"), Ok(Some(5.5)));
         assert_eq!(options.take::<f64>("low"), Ok(None));
         assert_eq!(options.finish(), Ok(()));
+    }
+
+    #[test]
+    fn a_number_outside_its_range_is_refused_by_name() {
+        for value in ["nan", "NaN", "inf", "-inf", "infinity", "200.5", "-0.5", "1e999"] {
+            let spec = format!("x?low={value}");
+            let (_, mut options) = Options::split(&spec).unwrap();
+            let said = options.take_within("low", 0.0..=200.0, " °C").unwrap_err().to_string();
+            assert!(said.contains("low=") && said.ends_with(": must be from 0 to 200 °C"), "{said}");
+        }
+
+        let (_, mut options) = Options::split("x?low=-0&high=200").unwrap();
+        assert_eq!(options.take_within("low", 0.0..=200.0, ""), Ok(Some(-0.0)));
+        assert_eq!(options.take_within("high", 0..=200, ""), Ok(Some(200)));
+        assert_eq!(options.take_within("none", 0..=200, ""), Ok(None));
     }
 
     #[test]

@@ -14,28 +14,34 @@ use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
+use parfocal_devices::camera::footage::{is_raw, read_picture};
 use parfocal_imaging::{
-    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode,
-    decode_raw,
+    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, PixelFormat, RgbImage, Size,
+    content_area, decode_raw,
 };
 use report::{Kind, Report};
 
 /// Arguments of `parfocal inspect`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Pictures (PNG, JPEG or TIFF of 8 or 16 bit) or mosaics (16-bit gray pictures of 2048x1088, or .raw or .bin files
-    /// with 2048x1088 little-endian 16-bit samples)
+    /// Pictures (PNG, JPEG or TIFF of 8 or 16 bit) or mosaics (gray pictures of 2048x1088, or .raw or .bin files with
+    /// 2048x1088 samples of 8, 10, 12 or 16 bit)
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Print one JSON object per line instead of a table
     #[arg(long)]
     json: bool,
-    /// Save each picture into this folder as PNG, with content area, patch and metrics drawn in
+    /// Save each picture into this folder as NAME.overlay.png, with content area, patch and metrics drawn in, and of each
+    /// mosaic also NAME.SIZE.png, developed, with nothing drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Treat 16-bit gray pictures of any size as mosaics
+    /// Treat gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
+    /// Format of .raw and .bin files: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
+    /// length
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
     /// Size of the pictures that --out saves of mosaics: one pixel per mosaic cell, two by two per cell, or one per
     /// sample. Values and lengths are those of the cells at every size
     #[arg(long, value_enum, default_value_t, requires = "out")]
@@ -81,13 +87,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// State kept from file to file.
 struct Inspector<'a> {
     mosaic: bool,
+    raw: Option<PixelFormat>,
     out: Option<&'a Path>,
     size: Size,
     developer: Developer,
     calibration: Calibration,
     /// The calibration's title, if `--calibration` was given.
     titled: Option<String>,
-    /// Names already given to overlays.
+    /// Names already given to files.
     taken: HashSet<OsString>,
 }
 
@@ -108,6 +115,7 @@ impl<'a> Inspector<'a> {
 
         Ok(Self {
             mosaic: arguments.mosaic,
+            raw: arguments.raw,
             out: arguments.out.as_deref(),
             size: arguments.size,
             developer: Developer::new(&calibration),
@@ -140,14 +148,11 @@ impl<'a> Inspector<'a> {
         };
 
         if let Some(out) = self.out {
-            let target = out.join(self.overlay_name(path));
-            let failed =
-                |error: &dyn std::fmt::Display| named(&format_args!("cannot write {}: {error}", target.display()));
-
-            let mut picture = Cursor::new(Vec::new());
-            let drawn = overlay::draw(seen.rgb, &report).write_to(&mut picture, image::ImageFormat::Png);
-            drawn.map_err(|error| failed(&error))?;
-            replace(&target, picture.get_ref()).map_err(|error| failed(&error))?;
+            // A mosaic's picture is for whatever comes next, so nothing is drawn in; what is drawn in lies beside it.
+            if matches!(report.kind, Kind::Mosaic) {
+                save(path, &out.join(self.name(path, self.size.name())), &overlay::plain(&seen.rgb))?;
+            }
+            save(path, &out.join(self.name(path, "overlay")), &overlay::draw(seen.rgb, &report))?;
         }
 
         Ok(report)
@@ -157,10 +162,10 @@ impl<'a> Inspector<'a> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
         let bytes = fs::read(path).map_err(|error| named(&format_args!("cannot be read: {error}")))?;
 
-        let raw =
-            path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
-        let picture = if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { decode(&bytes, self.mosaic) };
-
+        let picture = match self.raw {
+            Some(format) if is_raw(path) => decode_raw(&bytes, Some(format)).map(|(frame, _)| Picture::Mosaic(frame)),
+            _ => read_picture(path, &bytes, self.mosaic),
+        };
         let picture = picture.map_err(|error| named(&error))?;
         if self.size != Size::Cell && !matches!(picture, Picture::Mosaic(_)) {
             return Err(named(&"--size is for mosaics, and this is a developed picture; leave it out").into());
@@ -196,18 +201,28 @@ impl<'a> Inspector<'a> {
         })
     }
 
-    /// A file name for the overlay of `path` that no other overlay of this run has.
-    fn overlay_name(&mut self, path: &Path) -> OsString {
+    /// A file name for the picture `what` of `path` that no other file of this run has.
+    fn name(&mut self, path: &Path, what: &str) -> OsString {
         let stem = path.file_name().unwrap_or(path.as_os_str());
         let numbered = |number: u32| {
             let mut name = stem.to_owned();
-            name.push(if number == 1 { ".overlay.png".to_owned() } else { format!(".overlay-{number}.png") });
+            name.push(if number == 1 { format!(".{what}.png") } else { format!(".{what}-{number}.png") });
             name
         };
 
         let mut names = (1..).map(numbered);
         names.find(|name| self.taken.insert(name.clone())).unwrap_or_default()
     }
+}
+
+/// Writes `picture`, which was made from `path`, to `target`, as PNG.
+fn save(path: &Path, target: &Path, picture: &image::RgbImage) -> Result<(), Failure> {
+    let failed =
+        |error: &dyn std::fmt::Display| format!("{}: cannot write {}: {error}", path.display(), target.display());
+
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|error| failed(&error))?;
+    Ok(replace(target, bytes.get_ref()).map_err(|error| failed(&error))?)
 }
 
 /// The patch of `gray` at `area`, which lies inside it.

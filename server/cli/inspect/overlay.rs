@@ -1,4 +1,4 @@
-//! The picture that `parfocal inspect --out` writes: content area, patch and metrics drawn in.
+//! The overlay that `parfocal inspect --out` writes: content area, patch and metrics drawn in.
 
 use super::report::Report;
 use parfocal_imaging::{ContentArea, GrayImage, PatchArea, RgbImage};
@@ -47,7 +47,17 @@ pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
     canvas.text(&format!("MGM {:.2}", report.mgm), 0);
     canvas.text(&format!("MLR {:.4}", report.mlr), 1);
 
-    let RgbImage { width, height, data } = canvas.picture;
+    encodable(canvas.picture)
+}
+
+/// The picture with nothing drawn in.
+pub(super) fn plain(rgb: &RgbImage) -> image::RgbImage {
+    encodable(rgb.clone())
+}
+
+/// The picture as the encoder takes it.
+fn encodable(rgb: RgbImage) -> image::RgbImage {
+    let RgbImage { width, height, data } = rgb;
     image::RgbImage::from_raw(width as u32, height as u32, data).unwrap_or_default()
 }
 

@@ -1,34 +1,34 @@
 //! `parfocal recording video`: a recording as a video for people, or its frames as pictures.
 
 use std::fs;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use image::{ImageBuffer, ImageFormat, Luma, Rgb};
 
 use crate::cli::output::{Failure, print};
-use parfocal_base::files::replace;
+use parfocal_base::files::{create_with, replace};
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
 use parfocal_recording::Recording;
 
-/// File endings of videos; `ffmpeg` chooses the format by them.
-const VIDEOS: [&str; 4] = ["mp4", "mkv", "mov", "avi"];
+/// File endings of videos, and ffmpeg's names of their formats.
+const VIDEOS: [(&str, &str); 4] = [("mp4", "mp4"), ("mkv", "matroska"), ("mov", "mov"), ("avi", "avi")];
 
 /// Arguments of `parfocal recording video`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Folder of the recording.
     folder: PathBuf,
-    /// A video (.mp4, .mkv, .mov or .avi), or a new folder for a picture of each frame.
+    /// A new video (.mp4, .mkv, .mov or .avi), or a new folder for a picture of each frame.
     #[arg(long, value_name = "FILE|DIR")]
     out: PathBuf,
     /// Begin so many seconds after the first frame.
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value = "0", value_parser = parse_seconds)]
     from: f64,
     /// End so many seconds after the first frame; at the last frame if left out.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
     to: Option<f64>,
     /// Size of the pictures: one pixel per mosaic cell, two by two per cell, or one per sample.
     #[arg(long, value_enum, default_value_t = Size::Cell)]
@@ -51,19 +51,47 @@ enum Pictures {
 /// # Errors
 /// If a frame cannot be read, `ffmpeg` is missing or fails, or a file cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let format = format(&arguments.out)?;
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
     let frames = chosen(arguments, &recording)?;
     let mut studio = Studio { developer: Developer::new(&calibration), size: arguments.size };
 
-    let ending = arguments.out.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    let video = VIDEOS.iter().any(|known| ending.eq_ignore_ascii_case(known));
-    if video {
-        save_video(arguments, &recording, &frames, &mut studio)?;
+    if let Some(format) = format {
+        let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
+            save_video(&Video { file, format }, &recording, &frames, &mut studio)
+        });
+        made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
     } else {
         save_pictures(arguments, &recording, &frames, &mut studio)?;
     }
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| seconds.is_finite() && *seconds >= 0.0);
+    seconds.ok_or_else(|| "must be a number of seconds, 0 or more".to_owned())
+}
+
+/// The video's format; `None` if `out` names a folder.
+fn format(out: &Path) -> Result<Option<&'static str>, Failure> {
+    let Some(ending) = out.extension().filter(|_| !out.as_os_str().as_encoded_bytes().ends_with(b"/")) else {
+        return Ok(None);
+    };
+    let known = VIDEOS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known));
+
+    let Some((_, format)) = known else {
+        return Err(format!(
+            "{}: videos are .mp4, .mkv, .mov or .avi, not .{}; for a folder of pictures, end its name with a /",
+            out.display(),
+            ending.display()
+        )
+        .into());
+    };
+    if fs::symlink_metadata(out).is_ok() {
+        return Err(format!("{} exists already; give a name that is not taken", out.display()).into());
+    }
+    Ok(Some(*format))
 }
 
 /// Numbers of the frames within the requested span.
@@ -100,19 +128,20 @@ impl Studio {
     }
 }
 
+/// A video to write.
+struct Video<'a> {
+    file: &'a Path,
+    format: &'static str,
+}
+
 /// Pipes the frames into `ffmpeg`, each repeated for as long as it was the latest.
-fn save_video(
-    arguments: &Arguments,
-    recording: &Recording,
-    frames: &[usize],
-    studio: &mut Studio,
-) -> Result<(), Failure> {
+fn save_video(video: &Video, recording: &Recording, frames: &[usize], studio: &mut Studio) -> Result<(), Failure> {
     let fps = recording.rate().map_or(25.0, |rate| rate.round().clamp(1.0, 1000.0));
     let rows = recording.rows();
     let start = rows[frames[0]].time;
     let tick = |frame: usize| ((rows[frame].time - start) as f64 / 1e9 * fps).round() as usize;
 
-    let mut encoder: Option<Child> = None;
+    let mut encoder: Option<Encoder> = None;
     let mut picture = RgbImage::default();
     let mut shown = 0;
 
@@ -124,9 +153,9 @@ fn save_video(
 
         studio.develop(&recording.frame(frame)?, &mut picture);
         if encoder.is_none() {
-            encoder = Some(start_encoder(&arguments.out, fps, &picture)?);
+            encoder = Some(Encoder(start_encoder(video, fps, &picture)?));
         }
-        let Some(input) = encoder.as_mut().and_then(|encoder| encoder.stdin.as_mut()) else { break };
+        let Some(input) = encoder.as_mut().and_then(|encoder| encoder.0.stdin.as_mut()) else { break };
 
         // If a write fails, `ffmpeg` has ended early, and its error output says why.
         if (shown..until).any(|_| input.write_all(&picture.data).is_err()) {
@@ -135,25 +164,41 @@ fn save_video(
         shown = until;
     }
 
-    let Some(encoder) = encoder else { return Ok(()) };
-    let ended = encoder.wait_with_output()?;
-    if ended.status.success() {
+    let Some(mut encoder) = encoder else { return Ok(()) };
+    drop(encoder.0.stdin.take());
+    let mut said = String::new();
+    if let Some(mut errors) = encoder.0.stderr.take() {
+        errors.read_to_string(&mut said)?;
+    }
+
+    if encoder.0.wait()?.success() {
         return Ok(());
     }
-    let said = String::from_utf8_lossy(&ended.stderr);
-    let last = said.lines().last().unwrap_or("no reason given");
-    Err(format!("ffmpeg cannot write {}: {last}", arguments.out.display()).into())
+    Err(format!("ffmpeg: {}", said.lines().last().unwrap_or("no reason given")).into())
 }
 
-fn start_encoder(out: &Path, fps: f64, picture: &RgbImage) -> Result<Child, Failure> {
+/// A running `ffmpeg`, ended if the frames cannot be read to the last.
+struct Encoder(Child);
+
+impl Drop for Encoder {
+    fn drop(&mut self) {
+        // These fail only if it has ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn start_encoder(video: &Video, fps: f64, picture: &RgbImage) -> Result<Child, Failure> {
     let mut target = std::ffi::OsString::from("file:");
-    target.push(out);
+    target.push(video.file);
 
     let size = format!("{}x{}", picture.width, picture.height);
     let rate = fps.to_string();
     let input = ["-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-video_size", &size, "-framerate", &rate];
     let mut command = Command::new("ffmpeg");
-    command.args(input).args(["-i", "-", "-pix_fmt", "yuv420p"]).arg(target);
+    command.args(input).args(["-i", "-", "-pix_fmt", "yuv420p"]);
+    // Two by two pixels share a colour: a column or line of black completes an odd size.
+    command.args(["-vf", "pad='ceil(iw/2)*2':'ceil(ih/2)*2'", "-f", video.format]).arg(target);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
 
     command.spawn().map_err(|error| {

@@ -21,7 +21,7 @@ pub(super) struct ViewInfo {
     frames_missing: u64,
     /// Bytes of the pictures.
     bytes: u64,
-    /// The sizes of the pictures, smallest first; empty if an earlier version did not record them.
+    /// The sizes of the pictures, smallest first.
     sizes: Vec<SizeInfo>,
     /// Descriptions of the pictures that cannot be read.
     pub(super) damaged: Vec<String>,
@@ -43,8 +43,8 @@ pub(super) fn look(path: &Path, recording: &ViewRecording) -> ViewInfo {
         rows.first().zip(rows.last()).map_or(0, |(first, last)| last.number.saturating_sub(first.number) + 1);
 
     let mut sizes: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-    for size in rows.iter().filter_map(|row| row.width.zip(row.height)) {
-        *sizes.entry(size).or_default() += 1;
+    for row in rows {
+        *sizes.entry((row.width, row.height)).or_default() += 1;
     }
 
     ViewInfo {

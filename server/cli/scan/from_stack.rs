@@ -23,12 +23,14 @@ const PLANES: usize = 21;
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Folder of pictures of one still scene, each at another position of focus. The position is
-    /// the one number in which the names differ, or else the order of the names.
+    /// the one number in which the names differ, or else the order of the names. Or a TIFF with a page for each
+    /// position: plain, OME-TIFF or `ImageJ`'s.
     folder: PathBuf,
     /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// File with a line `name,position` for each picture, used instead of the numbers in the names.
+    /// File with a line `name,position` for each picture, used instead of the numbers in the names. For a TIFF,
+    /// `page,position`, pages counted from 1.
     #[arg(long, value_name = "FILE")]
     list: Option<PathBuf>,
     /// Planes that each pose sees, fewer than the stack has; by default about half of them, 21 at most.
@@ -59,9 +61,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     let taken = stack.planes().len();
-    let (even, gaps) = stack.even()?;
-    if gaps > 0 {
-        tell(format_args!("note: {gaps} of {} planes are missing and are mixed from their neighbours", taken + gaps));
+    let (even, note) = stack.even()?;
+    if let Some(note) = note {
+        tell(format_args!("note: {note}"));
     }
 
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy();

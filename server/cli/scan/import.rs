@@ -16,6 +16,10 @@ pub struct Arguments {
     /// Name of the camera, for people; the folder's name by default.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    /// Bits of the samples in 16-bit files, for example 12; by default the fewest that hold the largest sample of all
+    /// pictures.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
+    bits: Option<u8>,
 }
 
 /// Imports the pictures.
@@ -23,7 +27,7 @@ pub struct Arguments {
 /// # Errors
 /// If the pictures are not a scan, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let imported = Imported::look(&arguments.folder)?;
+    let imported = Imported::look(&arguments.folder)?.of_bits(arguments.bits);
     let progress = bar(imported.len(), 0);
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy().into_owned();
     let camera = arguments.camera.clone().unwrap_or(folder);

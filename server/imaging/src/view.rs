@@ -1,6 +1,8 @@
 //! The policies' view of a frame: the patch in the middle of the view, and the same place at coarser
 //! scales.
 
+use std::sync::Arc;
+
 use super::geometry::{PATCH_SIDE, Patch};
 use super::reduce::fill_block_means;
 
@@ -31,12 +33,28 @@ impl Scale {
 ///
 /// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part of the view at a
 /// coarser scale. Its centre is that of the patch, or as near to it as the picture allows. Gray levels are not rounded.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct View {
     /// The patch at the picture's own scale: all that the paper's policies see.
     pub patch: Patch,
     /// The patches at the scales [`WIDER`]; `None` if the picture is smaller than the area that such a patch covers.
     pub wider: [Option<Patch>; WIDER.len()],
+    /// The pixels that the widest patch covers; `None` if there is no such patch, or nobody made them.
+    pub surroundings: Option<Surroundings>,
+}
+
+/// The pixels around a patch at the picture's own scale. Cheap to clone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surroundings {
+    /// Gray levels, row after row, [`Surroundings::SIDE`] in each row and as many rows.
+    pub levels: Arc<[f32]>,
+    /// Column and row of the patch's upper left pixel.
+    pub patch: (usize, usize),
+}
+
+impl Surroundings {
+    /// Pixels along each side.
+    pub const SIDE: usize = PATCH_SIDE * WIDER[WIDER.len() - 1].pixels();
 }
 
 /// A square of a picture's pixels.
@@ -90,14 +108,19 @@ impl View {
             Some(block_means(levels.get(first..)?, largest.side, WIDER[index]))
         };
 
-        Self { patch, wider: std::array::from_fn(means) }
+        let wider = std::array::from_fn(means);
+        let whole = largest.side == Surroundings::SIDE && levels.len() == largest.side * largest.side;
+        let place = (corner.0.saturating_sub(largest.x), corner.1.saturating_sub(largest.y));
+        let surroundings = whole.then(|| Surroundings { levels: levels.into(), patch: place });
+
+        Self { patch, wider, surroundings }
     }
 }
 
 impl From<Patch> for View {
     /// A view of `patch` alone.
     fn from(patch: Patch) -> Self {
-        Self { patch, wider: [None; WIDER.len()] }
+        Self { patch, wider: [None; WIDER.len()], surroundings: None }
     }
 }
 
@@ -155,6 +178,18 @@ mod tests {
         // The square of the middle scale is moved too: to the right, and up by 8 pixels.
         assert_eq!(Square::around((3, 200), Scale::Two, (300, 240)), Some(Square { x: 0, y: 176, side: 64 }));
         assert!((seen.wider[0].unwrap().0[33] - mean(2, 178, 2)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn surroundings_are_the_pixels_of_the_widest_patch() {
+        for (corner, place) in [((100, 90), (48, 48)), ((3, 200), (3, 88))] {
+            let around = view(corner, (300, 240)).surroundings.unwrap();
+            assert_eq!((around.patch, around.levels.len()), (place, 128 * 128));
+            let (left, top) = (corner.0 - place.0, corner.1 - place.1);
+            let expected = |i: usize| level(left + i % 128, top + i / 128);
+            assert!((0..128 * 128).all(|i| (around.levels[i] - expected(i)).abs() < f32::EPSILON));
+        }
+        assert_eq!(view((10, 10), (500, 127)).surroundings, None);
     }
 
     #[test]

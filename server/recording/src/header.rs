@@ -37,10 +37,8 @@ pub struct Header {
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
     /// Number of the server's start that recorded it, as in exports; `None` if it was made without a server.
-    #[serde(default)]
     pub run: Option<i64>,
     /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
-    #[serde(default)]
     pub monotonic_ns: Option<i64>,
     /// Frames that the camera delivered but the recorder was too slow for.
     pub frames_lost: u64,

@@ -148,8 +148,8 @@ pub struct BandArray {
 
 /// The values of a [`BandArray`], one per band.
 pub enum BandValues {
-    /// Wavelengths or widths in nm.
-    Nanometres(Vec<f64>),
+    /// Wavelengths or widths in nm, or weights.
+    Numbers(Vec<f64>),
     /// Rows or columns in a mosaic cell, from 0.
     Places(Vec<i64>),
 }
@@ -158,7 +158,7 @@ impl BandArray {
     /// The array's `zarr.json`.
     pub fn description(&self) -> Value {
         let data_type = match self.values {
-            BandValues::Nanometres(_) => "float64",
+            BandValues::Numbers(_) => "float64",
             BandValues::Places(_) => "int64",
         };
         let array = Array {
@@ -181,11 +181,10 @@ pub fn by_wavelength(calibration: &Calibration) -> Vec<usize> {
     order
 }
 
-/// The arrays that describe the bands: wavelength, width, and row and column in the cell.
+/// The arrays that describe the bands: wavelength, width, row and column in the cell, and weights in linear sRGB.
 pub fn band_arrays(calibration: &Calibration) -> Vec<BandArray> {
     let order = by_wavelength(calibration);
-    let lengths =
-        |value: &dyn Fn(usize) -> f64| BandValues::Nanometres(order.iter().map(|&band| value(band)).collect());
+    let numbers = |value: &dyn Fn(usize) -> f64| BandValues::Numbers(order.iter().map(|&band| value(band)).collect());
     let places =
         |value: &dyn Fn(usize) -> usize| BandValues::Places(order.iter().map(|&band| value(band) as i64).collect());
     let array = |name, values, attributes| BandArray { name, values, attributes };
@@ -195,11 +194,17 @@ pub fn band_arrays(calibration: &Calibration) -> Vec<BandArray> {
     let row = json!({"long_name": "row of the band in each cell of 4 x 4 samples, from 0", "units": "1"});
     let column = json!({"long_name": "column of the band in each cell of 4 x 4 samples, from 0", "units": "1"});
 
+    let [red, green, blue] = calibration.linear_srgb();
+    let weight = |colour: &str| json!({"long_name": format!("weight of the band's white-balanced samples in linear sRGB {colour}"), "units": "1"});
+
     vec![
-        array("wavelength", lengths(&|band| calibration.bands[band].centre_nm), wavelength),
-        array("fwhm", lengths(&|band| calibration.bands[band].fwhm_nm), width),
+        array("wavelength", numbers(&|band| calibration.bands[band].centre_nm), wavelength),
+        array("fwhm", numbers(&|band| calibration.bands[band].fwhm_nm), width),
         array("cell_row", places(&|band| band / CELL), row),
         array("cell_column", places(&|band| band % CELL), column),
+        array("red", numbers(&|band| red[band].into()), weight("red")),
+        array("green", numbers(&|band| green[band].into()), weight("green")),
+        array("blue", numbers(&|band| blue[band].into()), weight("blue")),
     ]
 }
 
@@ -212,7 +217,8 @@ pub fn group(header: &Header, arrays: &Map<String, Value>) -> Result<Value, Reco
     let mut attributes = serde_json::to_value(header).map_err(|error| RecordingError::Codec(error.to_string()))?;
 
     // Here xarray looks for the names of coordinates.
-    let beside = Column::ALL.map(Column::name).into_iter().chain(["fwhm", "cell_row", "cell_column"]);
+    let beside =
+        Column::ALL.map(Column::name).into_iter().chain(["fwhm", "cell_row", "cell_column", "red", "green", "blue"]);
     attributes["coordinates"] = beside.collect::<Vec<_>>().join(" ").into();
 
     Ok(json!({

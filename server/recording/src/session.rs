@@ -93,7 +93,7 @@ impl AnyRecording {
     }
 
     /// The number of the server's start that recorded it, and the monotonic clock at [`AnyRecording::started`],
-    /// nanoseconds. `None` for recordings of earlier versions, and for those made without a server.
+    /// nanoseconds. `None` for recordings that were made without a server.
     #[must_use]
     pub fn clock(&self) -> Option<(i64, i64)> {
         match self {

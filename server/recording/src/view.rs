@@ -43,10 +43,8 @@ pub struct ViewHeader {
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
     /// Number of the server's start that recorded it, as in exports.
-    #[serde(default)]
     pub run: Option<i64>,
     /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
-    #[serde(default)]
     pub monotonic_ns: Option<i64>,
     /// How it ended; `None` while it is under way, or if it was cut short.
     pub ended: Option<Ended>,

@@ -26,12 +26,10 @@ pub struct ViewRow {
     pub offset: u64,
     /// Its length in bytes.
     pub length: u64,
-    /// Its width in pixels; `None` in recordings of earlier versions.
-    #[serde(default)]
-    pub width: Option<u32>,
-    /// Its height in pixels; `None` in recordings of earlier versions.
-    #[serde(default)]
-    pub height: Option<u32>,
+    /// Its width in pixels.
+    pub width: u32,
+    /// Its height in pixels.
+    pub height: u32,
 }
 
 /// A recording of the view: its description and the places of its pictures, which stay on disk.

@@ -53,7 +53,7 @@ impl Writer {
         let mut fixed = Vec::new();
         for array in band_arrays(calibration) {
             let stored = match &array.values {
-                BandValues::Nanometres(values) => {
+                BandValues::Numbers(values) => {
                     Coder::new(float64(), FillValue::from(f64::NAN), &[BANDS], plain_codecs())?.encode(values)?
                 }
                 BandValues::Places(values) => {

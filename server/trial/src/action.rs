@@ -27,13 +27,21 @@ pub enum Action {
         /// Segment that the questions are about; none for the closing questions.
         segment: Option<SegmentId>,
     },
-    /// Operator: pause the session. The lens holds, and the segment's clock stops.
+    /// Operator or surgeon: pause the session. The lens holds, and the segment's clock stops.
     Pause {
+        /// Reason for the pause, if it is known already. It can be given later, see [`Action::GiveReason`].
+        #[serde(default)]
+        reason: String,
+    },
+    /// Operator: give the reason for a pause that happened without one.
+    GiveReason {
+        /// Number of the pause among the session's events.
+        event: u32,
         /// Reason for the pause.
         #[schema(pattern = r"\S")]
         reason: String,
     },
-    /// Operator, or surgeon after a restart of the server: resume a paused session.
+    /// Operator, or surgeon unless the operator paused: resume a paused session.
     Resume,
     /// Operator: end the session early.
     Abort {

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::account::AccountName;
 use super::role::Role;
+use super::tablet::PictureSize;
+use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 
@@ -27,7 +29,7 @@ pub struct Event {
 }
 
 /// What happened. `inspected_ms`: time inspected in the segment so far, without pauses, in milliseconds.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum EventKind {
     /// The session was made, and its order was drawn.
@@ -57,6 +59,41 @@ pub enum EventKind {
         reason: String,
         /// Time inspected so far, milliseconds.
         inspected_ms: u64,
+    },
+    /// The reason for an earlier event was given.
+    ReasonGiven {
+        /// Number of that event.
+        about: u32,
+        /// Its reason.
+        reason: String,
+    },
+    /// The operator moved the lens by hand, while the session was paused or after an abort. If the lens moves on within
+    /// a second, only its first and its last place are recorded.
+    FocusedByHand {
+        /// Where the lens was sent.
+        focal_power: FocalPower,
+        /// Where the lens was before; the segment continues from there. None if it was moved by hand before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        left_at: Option<FocalPower>,
+    },
+    /// No tablet shows the surgeon's page any longer.
+    TabletAway {
+        /// Whether a tablet has the page open, but behind something else or with its screen off.
+        hidden: bool,
+    },
+    /// A tablet shows the surgeon's page again.
+    TabletBack,
+    /// What the surgeon saw for a while: until the size of the picture changed, or the inspection ended or paused.
+    PicturesSeen {
+        /// Segment that was inspected.
+        segment: SegmentId,
+        /// Size of the pictures.
+        #[serde(flatten)]
+        size: PictureSize,
+        /// Number of pictures drawn.
+        pictures: u64,
+        /// For how long, milliseconds.
+        over_ms: u64,
     },
     /// The session was resumed.
     Resumed,
@@ -99,6 +136,11 @@ impl EventKind {
             Self::SegmentFinished { .. } => "segment-finished",
             Self::QuestionsFinished { .. } => "questions-finished",
             Self::Paused { .. } => "paused",
+            Self::ReasonGiven { .. } => "reason-given",
+            Self::FocusedByHand { .. } => "focused-by-hand",
+            Self::TabletAway { .. } => "tablet-away",
+            Self::TabletBack => "tablet-back",
+            Self::PicturesSeen { .. } => "pictures-seen",
             Self::Resumed => "resumed",
             Self::ServerRestarted { .. } => "server-restarted",
             Self::Completed => "completed",
@@ -112,7 +154,9 @@ impl EventKind {
     #[must_use]
     pub const fn segment(&self) -> Option<SegmentId> {
         match self {
-            Self::SegmentStarted { segment } | Self::SegmentFinished { segment, .. } => Some(*segment),
+            Self::SegmentStarted { segment }
+            | Self::SegmentFinished { segment, .. }
+            | Self::PicturesSeen { segment, .. } => Some(*segment),
             Self::QuestionsFinished { segment } => *segment,
             _ => None,
         }
@@ -135,9 +179,28 @@ impl EventKind {
     pub fn reason(&self) -> Option<&str> {
         match self {
             Self::Paused { reason, .. }
+            | Self::ReasonGiven { reason, .. }
             | Self::Aborted { reason, .. }
             | Self::Withdrawn { reason }
             | Self::Unblinded { reason, .. } => Some(reason),
+            _ => None,
+        }
+    }
+
+    /// Number of the event that this one is about, if any.
+    #[must_use]
+    pub const fn about(&self) -> Option<u32> {
+        match self {
+            Self::ReasonGiven { about, .. } => Some(*about),
+            _ => None,
+        }
+    }
+
+    /// Where the lens was sent by hand; none for other events.
+    #[must_use]
+    pub const fn focal_power(&self) -> Option<FocalPower> {
+        match self {
+            Self::FocusedByHand { focal_power, .. } => Some(*focal_power),
             _ => None,
         }
     }
@@ -148,6 +211,7 @@ impl EventKind {
         let mut kind = self.clone();
         match &mut kind {
             Self::Paused { reason, .. }
+            | Self::ReasonGiven { reason, .. }
             | Self::Aborted { reason, .. }
             | Self::Withdrawn { reason }
             | Self::Unblinded { reason, .. } => reason.clear(),
@@ -180,6 +244,16 @@ impl EventKind {
             }
             Self::QuestionsFinished { segment: None } => "Closing questions done".to_owned(),
             Self::Paused { reason, .. } => because("Paused", reason),
+            Self::ReasonGiven { about, reason } => because(&format!("Reason for event {about}"), reason),
+            Self::FocusedByHand { focal_power, .. } => format!("Focused by hand to {:.3}", focal_power.get()),
+            Self::TabletAway { hidden: false } => "The surgeon’s tablet is away".to_owned(),
+            Self::TabletAway { hidden: true } => "The surgeon’s page is not on screen".to_owned(),
+            Self::TabletBack => "The surgeon’s tablet is back".to_owned(),
+            Self::PicturesSeen { segment, size, pictures, over_ms } => {
+                let rate = per_second(*pictures, *over_ms);
+                let PictureSize { width, height } = size;
+                format!("Setting {} seen at {width}x{height}, {rate:.1} pictures a second", setting(*segment))
+            }
             Self::Resumed => "Resumed".to_owned(),
             Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
             Self::Completed => "Session completed".to_owned(),
@@ -195,6 +269,12 @@ impl EventKind {
 /// `what` with its reason. The reason may be empty, because none was given or because it was erased.
 fn because(what: &str, reason: &str) -> String {
     if reason.is_empty() { what.to_owned() } else { format!("{what}: {reason}") }
+}
+
+/// Pictures a second; 0 for no time.
+#[must_use]
+pub fn per_second(pictures: u64, over_ms: u64) -> f64 {
+    if over_ms == 0 { 0.0 } else { pictures as f64 * 1000.0 / over_ms as f64 }
 }
 
 fn seconds(milliseconds: u64) -> String {
@@ -215,6 +295,16 @@ mod tests {
             EventKind::SegmentFinished { segment, inspected_ms: 1 },
             EventKind::QuestionsFinished { segment: None },
             EventKind::Paused { reason: "🫖".to_owned(), inspected_ms: 1 },
+            EventKind::ReasonGiven { about: 4, reason: "🫖".to_owned() },
+            EventKind::FocusedByHand { focal_power: FocalPower::MIDDLE, left_at: None },
+            EventKind::TabletAway { hidden: true },
+            EventKind::TabletBack,
+            EventKind::PicturesSeen {
+                segment,
+                size: PictureSize { width: 512, height: 272 },
+                pictures: 20,
+                over_ms: 1000,
+            },
             EventKind::Resumed,
             EventKind::ServerRestarted { inspected_ms: 1 },
             EventKind::Completed,

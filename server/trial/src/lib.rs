@@ -26,6 +26,7 @@ pub mod role;
 pub mod session;
 pub mod standing;
 pub mod study;
+pub mod tablet;
 pub mod unblinding;
 pub mod view;
 pub mod voice;

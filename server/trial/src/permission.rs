@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use super::action::Action;
 use super::phase::Phase;
 use super::refusal::Refusal;
 use super::role::Role;
@@ -69,6 +70,17 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         (Request::MoveLens, CurrentSession::UnderWay | CurrentSession::Ended) => {
             Err(Refusal::conflict("a session is under way and controls the lens until it is closed"))
         }
+        _ => Ok(()),
+    }
+}
+
+/// Checks whether `action` is possible on a session that is closed.
+///
+/// # Errors
+/// If the action must come before the session is closed.
+pub fn check_while_on_screen(action: &Action) -> Result<(), Refusal> {
+    match action {
+        Action::GiveReason { .. } => Err(Refusal::conflict("the session is closed; a reason can be given until then")),
         _ => Ok(()),
     }
 }

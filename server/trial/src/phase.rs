@@ -32,7 +32,7 @@ impl Phase {
 }
 
 /// Whether a session is under way, completed or aborted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SessionStatus {
     /// Neither completed nor aborted. It may not have started yet.

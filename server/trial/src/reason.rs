@@ -1,9 +1,15 @@
-//! Reasons that people give for their actions. They are kept in the audit trail.
+//! Reasons that people, and sometimes the server, give for their actions. They are kept in the audit trail.
 
 use super::refusal::Refusal;
 
 /// Maximum length of a reason, in characters.
 const LONGEST: usize = 1000;
+
+/// Why the server pauses a session while no tablet shows the surgeon's page.
+pub const TABLET_AWAY: &str = "the surgeon’s tablet is away";
+
+/// Why the server pauses a session while the surgeon's picture is too small.
+pub const SMALL_PICTURE: &str = "the surgeon’s picture is smaller than the protocol allows";
 
 /// Checks a reason that may be empty, and returns it without surrounding blanks.
 ///

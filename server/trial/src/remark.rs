@@ -49,8 +49,8 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// A copy without a negative wait. If the page does not name the clock of a wait, it is the wall clock, which older
-    /// pages used.
+    /// A copy without a negative wait. A wait whose clock is not named counts as measured by the wall clock, which is
+    /// the less certain one.
     #[must_use]
     pub fn plausible(self) -> Self {
         let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);
@@ -98,6 +98,22 @@ pub enum CommentContent {
     Mark,
     /// A spoken comment. Its recording follows in pieces.
     Voice,
+    /// The surgeon takes back the comment with this key, which stays in the record.
+    Withdrawal(IdempotencyKey),
+}
+
+impl CommentContent {
+    /// Whether this says something by itself; a withdrawal is only about another comment.
+    #[must_use]
+    pub const fn says_something(&self) -> bool {
+        !matches!(self, Self::Withdrawal(_))
+    }
+
+    /// Whether the words are in the comment itself. A mark and a withdrawal have none, a voice comment's are a sound.
+    #[must_use]
+    pub const fn has_words(&self) -> bool {
+        matches!(self, Self::Text(_) | Self::Quick(_))
+    }
 }
 
 /// An answer as a surgeon's browser sends it. If there are several answers to a question, the one given last counts, in

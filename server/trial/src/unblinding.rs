@@ -105,6 +105,7 @@ mod tests {
     use crate::event::Event;
     use crate::phase::SessionStatus;
     use crate::session::Plan;
+    use crate::tablet::WhenAway;
 
     const SESSION: SessionId = SessionId(Uuid::from_u128(1));
     const OTHER: SessionId = SessionId(Uuid::from_u128(2));
@@ -121,6 +122,7 @@ mod tests {
             after_segment: Vec::new(),
             closing: Vec::new(),
             consent: None,
+            when_tablet_away: WhenAway::Pause,
         };
 
         let mut state = SessionState::new(plan);

@@ -11,6 +11,7 @@ use super::phase::Phase;
 use super::question::{AnswerValue, Question};
 use super::remark::CommentContent;
 use super::role::Role;
+use super::session::PauseCause;
 use parfocal_base::ids::{SegmentId, SessionId};
 
 /// A session as the surgeon's browser gets it. Nothing in it depends on the policy.
@@ -23,9 +24,12 @@ pub struct SurgeonView {
     pub phase: Phase,
     /// Whether the session is paused in that phase (by the operator, or by a restart of the server).
     pub paused: bool,
-    /// Whether the surgeon may resume the session: after a restart of the server, but not after a pause by the
-    /// operator.
+    /// What paused the session; none if it is not paused.
+    pub paused_by: Option<PauseCause>,
+    /// Whether the surgeon may resume the session: not after a pause by the operator.
     pub may_resume: bool,
+    /// Whether the surgeon may pause the session.
+    pub may_pause: bool,
     /// Whether the event that last stopped the session or its setting (a pause, an end) is not written to disk yet.
     pub unrecorded: bool,
     /// Whether this is a practice session.
@@ -50,8 +54,10 @@ pub struct SurgeonView {
     pub questions: Vec<Question>,
     /// Saved answers to those questions, by question id.
     pub answers: BTreeMap<String, AnswerValue>,
-    /// Number of comments saved so far in this session.
+    /// Number of comments saved so far in this session, without those that were taken back.
     pub comments: usize,
+    /// The surgeon's own words about each setting, in the order they were said; empty outside the closing questions.
+    pub said: Vec<Vec<String>>,
 }
 
 /// The current session as the operator sees it. It has no policy either, because the operator stands beside the
@@ -73,12 +79,31 @@ pub struct OperatorView {
     pub consent: Option<Consent>,
     /// Whether the participant withdrew.
     pub withdrawn: bool,
+    /// Whether the operator may focus by hand: while the session is paused, and after an abort.
+    pub may_focus_by_hand: bool,
+    /// Focal power to which the operator last moved the lens by hand in this pause or after the abort; none if nobody
+    /// did. It is the operator's own, and says nothing of a policy.
+    pub by_hand: Option<f64>,
+    /// The latest pause that has no reason yet; none if every pause has one.
+    pub reason_wanted: Option<ReasonWanted>,
     /// Why the disk has not taken the `unrecorded` event; none if that is not known.
     pub unrecorded_because: Option<String>,
     /// The latest comments, newest first.
     pub latest_comments: Vec<CommentLine>,
     /// The latest events in words, newest first.
     pub log: Vec<LogLine>,
+}
+
+/// A pause whose reason can still be given.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ReasonWanted {
+    /// Number of the pause among the session's events.
+    pub event: u32,
+    /// Role that paused the session.
+    pub by: Role,
+    /// Time of the pause, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: jiff::Timestamp,
 }
 
 /// A comment, as it is shown.

@@ -112,12 +112,24 @@ pub async fn database(theatre: &Theatre, session: &str) {
     assert_eq!(values("usability").await.unwrap(), items.collect::<Vec<_>>());
     assert_eq!(values("closing-remarks").await.unwrap(), ["\"That it stays still\""]);
 
+    // When a tablet was away, and what it saw, depends on how busy the machine is.
     let events = "SELECT kind FROM events
-                  WHERE session = ? AND kind NOT LIKE 'segment-%' AND kind != 'questions-finished' ORDER BY number";
+                  WHERE session = ? AND kind NOT LIKE 'segment-%' AND kind NOT LIKE 'tablet-%'
+                  AND kind NOT IN ('questions-finished', 'pictures-seen') ORDER BY number";
     let events: Vec<String> = sqlx::query_scalar(events).bind(session).fetch_all(&pool).await.unwrap();
     assert_eq!(
         events,
-        ["created", "started", "server-restarted", "resumed", "paused", "resumed", "completed", "unblinded"]
+        [
+            "created",
+            "started",
+            "server-restarted",
+            "resumed",
+            "paused",
+            "reason-given",
+            "resumed",
+            "completed",
+            "unblinded"
+        ]
     );
 
     let steps = "SELECT count(DISTINCT segment) FROM telemetry WHERE segment IS NOT NULL";

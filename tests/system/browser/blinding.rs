@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 53] = [
+const KEYS: [&str; 57] = [
     "age",
     "answers",
     "area",
@@ -48,6 +48,7 @@ const KEYS: [&str; 53] = [
     "labels",
     "lens_simulated",
     "low",
+    "may_pause",
     "may_resume",
     "name",
     "notice",
@@ -55,6 +56,7 @@ const KEYS: [&str; 53] = [
     "pairs",
     "patch",
     "paused",
+    "paused_by",
     "per_cell",
     "phase",
     "points",
@@ -63,6 +65,7 @@ const KEYS: [&str; 53] = [
     "questions",
     "quick_comments",
     "radius",
+    "reduced",
     "run",
     "remaining_seconds",
     "scales",
@@ -74,6 +77,7 @@ const KEYS: [&str; 53] = [
     "text",
     "ties",
     "title",
+    "travel",
     "type",
     "unrecorded",
     "view",
@@ -189,9 +193,19 @@ fn json(seen: &mut Seen, text: &str) {
     }
     if view["phase"] == "inspecting" {
         let mut form = view.clone();
-        for changing in
-            ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume", "unrecorded"]
-        {
+        let changing = [
+            "setting",
+            "segment",
+            "remaining_seconds",
+            "comments",
+            "prompt",
+            "paused",
+            "paused_by",
+            "may_pause",
+            "may_resume",
+            "unrecorded",
+        ];
+        for changing in changing {
             form[changing] = Value::Null;
         }
         seen.inspecting.entry(session).or_default().insert(form.to_string());

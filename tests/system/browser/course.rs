@@ -76,15 +76,16 @@ async fn practice(theatre: &Theatre) {
     theatre.finish_setting(5).await;
 
     surgeon.sees("#panel h2", "Final questions").await;
-    surgeon.click(".questions .done button").await;
-    surgeon.sees("#panel h2", "Thank you").await;
+    surgeon.tap_in_panel(".questions .done button").await;
+    surgeon.sees("#panel h2", "Practice is over").await;
 
     operator.sees("#session-actions", "Close and prepare the next").await;
     operator.click("#session-actions .primary").await;
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
-/// Another operator closes the session while this one is asked for a reason to pause it, and adds a participant.
+/// Another operator closes the session while this one is asked for a reason to abort it, and adds a participant. What
+/// this one was about to write of a pause is gone with the session.
 async fn beside_another_operator(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     let operator = &theatre.operator;
@@ -93,6 +94,10 @@ async fn beside_another_operator(theatre: &Theatre) {
     surgeon.sees("#change-what", "This is the first setting.").await;
     operator.sees("#session-actions button:first-child", "Pause").await;
     operator.click("#session-actions button:first-child").await;
+    operator.sees("#session-badges", "Paused").await;
+    operator.type_into("#pause-reason", "Half a reason").await;
+    operator.click_labelled("#session-actions", "Abort").await;
+    operator.sees("#reason-heading", "Abort the session").await;
 
     let other = async |path: &str, body: Value| {
         let request = client().post(theatre.server.url(path)).bearer_auth(theatre.server.key("operator"));
@@ -108,12 +113,13 @@ async fn beside_another_operator(theatre: &Theatre) {
     other("/api/operator/actions", abort).await;
     other("/api/operator/dismissals", json!({ "session": session })).await;
 
-    // This operator gives the reason to pause only now.
+    // This operator gives the reason to abort only now.
     operator.sees("#new-session", "Prepare session").await;
     theatre.give_reason("Too late").await;
     operator.sees("#reason-trouble", "This session was closed in the meantime").await;
     operator.click("#reason-dialog [data-close]").await;
     operator.sees("#participant", "S-08").await;
+    assert_eq!(operator.value("#pause-reason").await, "");
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
@@ -123,8 +129,7 @@ async fn a_link_that_breaks_without_a_word(theatre: &Theatre) {
     theatre.begin("S-05", "practice").await;
     theatre.surgeon.sees("#change-what", "This is the first setting.").await;
 
-    theatre.operator.click("#session-actions .danger").await;
-    theatre.give_reason("Only to see").await;
+    theatre.abort("Only to see").await;
     theatre.surgeon.sees("#panel h2", "The session was ended").await;
 
     theatre.operator.click("#session-actions .primary").await;
@@ -190,7 +195,7 @@ async fn abort(theatre: &Theatre) {
     theatre.tap_notice(2).await;
     theatre.say("The last word", 2).await;
 
-    operator.click("#session-actions .danger").await;
+    operator.click_labelled("#session-actions", "Abort").await;
     operator.sees("#reason-consequence", "All comments and answers so far are kept").await;
     theatre.give_reason("The participant was called away").await;
 

@@ -36,7 +36,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     })
     .await;
 
-    surgeon.sees("#comment-state", "Saved here, not sent yet: 1 comment").await;
+    surgeon.sees("#comment-state", "Saved here: 1 comment").await;
     surgeon.sees("#comment-state", "the disk is full").await;
     shoot(surgeon, "surgeon-13-full-disk").await;
     surgeon.reload().await;
@@ -65,22 +65,30 @@ async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
 
     operator.sees("#session-actions", "Pause").await;
     operator.click_labelled("#session-actions", "Pause").await;
-    theatre.give_reason("The phone").await;
     operator.sees("#session-badges", "Paused").await;
     surgeon.sees("#panel h2", "Paused").await;
     surgeon.sees("#unrecorded", "not recorded yet").await;
     operator.sees("#unrecorded", "The lens is held, but this is not recorded yet").await;
     operator.sees("#unrecorded", "another program has locked the database").await;
-    operator.sees("#log", "Paused: The phone (not recorded yet)").await;
+    operator.sees("#log", "Paused (not recorded yet)").await;
     shoot(operator, "operator-11-not-recorded").await;
     shoot(surgeon, "surgeon-14-not-recorded").await;
+
+    // Nor can the reason be saved. It stays in the box.
+    theatre.say_why_paused("The phone").await;
+    operator.sees("#session-trouble", "another program has locked the database").await;
+    assert_eq!(operator.value("#pause-reason").await, "The phone");
 
     other_program.close().await.unwrap();
     operator.sees_no("#unrecorded").await;
     surgeon.sees_no("#unrecorded").await;
     assert!(!operator.text("#log").await.contains("not recorded"));
+    operator.click("#reason-wanted [type=submit]").await;
+    operator.sees_no("#reason-wanted").await;
+    operator.sees("#log", ": The phone").await;
     let pool = super::theatre::database(theatre.server.data.path()).await;
-    let paused = "SELECT payload ->> 'reason' FROM events WHERE kind = 'paused'";
+    let paused = "SELECT given.payload ->> 'reason' FROM events AS paused LEFT JOIN events AS given
+        ON given.session = paused.session AND given.payload ->> 'about' = paused.number WHERE paused.kind = 'paused'";
     let reasons: Vec<String> = sqlx::query_scalar(paused).fetch_all(&pool).await.unwrap();
     assert_eq!(reasons, ["The phone"]);
     pool.close().await;

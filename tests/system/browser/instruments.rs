@@ -24,6 +24,13 @@ async fn mark(page: &Browser, css: &str, fraction: f64) {
     }
 }
 
+/// Selects point `point` of the scale called `name`, after scrolling to it as a surgeon does: the row with the button
+/// that goes on may lie over it, and the driver does not scroll to what is covered.
+pub async fn choose_in_view(theatre: &Theatre, name: &str, point: u8) {
+    theatre.surgeon.show(&format!("input[name='{name}'][value='{point}']")).await;
+    theatre.choose(name, point).await;
+}
+
 fn state(question: &str) -> String {
     format!("[data-question={question}] > .state")
 }
@@ -66,7 +73,7 @@ async fn first_setting(theatre: &Theatre) {
     mark(surgeon, "[data-question=effort]", 0.0).await;
     surgeon.sees(&state("effort"), "Saved").await;
     assert_eq!(surgeon.attribute("[data-question=effort] .track", "aria-valuenow").await.as_deref(), Some("0"));
-    theatre.choose("how-often", 3).await;
+    choose_in_view(theatre, "how-often", 3).await;
     surgeon.sees(&state("how-often"), "Saved").await;
     for (scale, fraction) in [(1, 0.3), (2, 0.15), (3, 0.6)] {
         mark(surgeon, &format!("[data-question=workload] fieldset:nth-child({scale})"), fraction).await;
@@ -106,12 +113,12 @@ async fn second_setting(theatre: &Theatre) {
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
     mark(surgeon, "[data-question=effort]", 0.75).await;
-    theatre.choose("how-often", 5).await;
+    choose_in_view(theatre, "how-often", 5).await;
     for scale in 1..=6 {
         mark(surgeon, &format!("[data-question=workload] fieldset:nth-child({scale})"), 1.0).await;
     }
     surgeon.sees(&state("workload"), "Saved").await;
-    theatre.choose("seen-before", 3).await;
+    choose_in_view(theatre, "seen-before", 3).await;
     surgeon.sees(&state("seen-before"), "Saved").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#panel h2", "Final questions").await;
@@ -123,12 +130,12 @@ async fn closing(theatre: &Theatre) {
         mark(surgeon, &format!("[data-question=surgical-workload] fieldset:nth-child({scale})"), fraction).await;
     }
     for pair in 6..21 {
-        theatre.choose(&format!("surgical-workload-{pair}"), 1).await;
+        choose_in_view(theatre, &format!("surgical-workload-{pair}"), 1).await;
     }
     surgeon.sees(&state("surgical-workload"), "Saved").await;
     shoot(surgeon, "surgeon-19-pairs").await;
     for setting in 0..2 {
-        theatre.choose(&format!("preference-{setting}"), 1).await;
+        choose_in_view(theatre, &format!("preference-{setting}"), 1).await;
     }
     surgeon.sees(&state("preference"), "Saved").await;
     shoot(surgeon, "surgeon-20-places").await;

@@ -78,6 +78,8 @@ async fn a_surgeon_goes_through_a_session_without_touching_the_screen() {
         .await;
 
         surgeon.sees("#panel h2", "a few questions").await;
+        // A key right after the questions have appeared was meant for what was there before.
+        surgeon.run(A_WHILE, &[]).await;
         surgeon.tab_to("sharpness").await;
         surgeon.press(' ').await;
         surgeon.press(Key::Right.into()).await;
@@ -88,8 +90,9 @@ async fn a_surgeon_goes_through_a_session_without_touching_the_screen() {
     }
 
     surgeon.sees("#panel h2", "Final questions").await;
+    surgeon.run(A_WHILE, &[]).await;
     surgeon.tab_to("Finish").await;
     surgeon.press(Key::Enter.into()).await;
-    surgeon.sees("#panel h2", "Thank you").await;
-    surgeon.sees("#now", "You are done. Give the tablet back.").await;
+    surgeon.sees("#panel h2", "Practice is over").await;
+    surgeon.sees("#now", "Keep the tablet: the trial comes next.").await;
 }

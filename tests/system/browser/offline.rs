@@ -63,7 +63,7 @@ impl Theatre {
 
     /// Waits until the tablet says that it holds `many` unsent items.
     async fn holds(&self, many: &str) {
-        self.surgeon.sees("#comment-state", &format!("Saved here, not sent yet: {many}.")).await;
+        self.surgeon.sees("#comment-state", &format!("Saved here: {many}. Sent when the network is back.")).await;
     }
 
     /// Reloads the surgeon's page while no server answers; the page opens anyway.
@@ -179,7 +179,7 @@ async fn a_restart_of_the_server_and_a_reload_meanwhile_lose_nothing() {
     theatre.sees_saved(2).await;
     theatre.keeps(COMMENTS, &["Half a comment", "Another"]).await;
     theatre.surgeon.sees("#now", "Press “Continue” when you are ready.").await;
-    theatre.surgeon.click("#panel button").await;
+    theatre.surgeon.tap_in_panel("#panel button").await;
     theatre.surgeon.sees("#now", "Look around").await;
 
     let errors = theatre.time_errors(COMMENT_ERRORS).await;

@@ -3,6 +3,7 @@
 use std::io::Cursor;
 
 use serde_json::json;
+use sha2::{Digest, Sha256};
 
 use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
@@ -56,7 +57,7 @@ async fn a_session(operator: &Browser) {
     assert_eq!(operator.value("#study").await, "");
     operator.select("#study", "scope-2026/leeds").await;
     operator.select("#protocol", "pair").await;
-    assert_eq!(operator.count("#protocol option").await, 1, "the study's protocols alone");
+    assert_eq!(operator.count("#protocol option").await, 2, "“Choose…” and the study’s protocol alone");
     shoot(operator, "operator-11-study").await;
 
     // The operator's link is not enough: the page asks to sign in, in a dialog, and keeps the selection.
@@ -155,12 +156,21 @@ async fn a_study_is_led_from_the_pages() {
     page.click("#plan-go").await;
     page.sees("#plan-trouble", "key 'spares': must be from 0 to 500 places, not 1000").await;
     shoot(&page, "study-1-malformed").await;
-    page.paste("#definition", &definition()).await;
+    // A file from Windows: its hash is that of its bytes, as every other site computes it.
+    let text = format!("\u{feff}{}", definition().replace('\n', "\r\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, &text).unwrap();
+    page.type_into("#file", file.to_str().unwrap()).await;
+    until("the file to be shown", || async { page.value("#definition").await.contains("spares = 1\n") }).await;
     page.click("#plan-go").await;
 
     page.sees("#stage", "planned").await;
+    page.sees("main", &hex::encode(Sha256::digest(&text))).await;
     page.sees("main", "Leeds General Infirmary").await;
     page.click("#open").await;
+    page.sees("#concerns", "Nobody here could unblind the study").await;
+    page.click("#reason-confirmed").await;
     shoot(&page, "study-2-opening").await;
     sign(&page, "The first surgeon comes").await;
     page.sees("#stage", "open").await;

@@ -61,7 +61,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     surgeon.cut("/answers").await;
     theatre.choose("sharpness", 3).await;
     surgeon.sees("[data-question=sharpness] > .state", "Saved here").await;
-    other.click("input[name=sharpness][value='5']").await;
+    other.tap_in_panel("input[name=sharpness][value='5']").await;
     other.sees("[data-question=sharpness] > .state", "Saved").await;
 
     surgeon.release().await;
@@ -74,7 +74,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     assert_eq!(chosen(&other, "sharpness").await.as_deref(), Some("5"));
 
     // Both report that they hold nothing after the session, and the researcher sees that they disagreed.
-    theatre.operator.click("#session-actions .danger").await;
+    theatre.operator.click_labelled("#session-actions", "Abort").await;
     theatre.give_reason("Enough").await;
     theatre.operator.sees("#phase", "Aborted").await;
     let empty = "SELECT CAST(count(*) AS TEXT) FROM surgeon_devices AS d, events AS e WHERE d.holding = 0

@@ -59,6 +59,17 @@ pub fn start_again(server: &mut Server) {
     *server = start(Arc::clone(&server.data), &server.address.to_string());
 }
 
+impl Browser {
+    /// Taps `css` in the panel over the picture, once the panel takes taps: right after it has appeared it takes none.
+    pub async fn tap_in_panel(&self, css: &str) {
+        until("the panel to take taps", || async {
+            self.count(css).await > 0 && self.count("#panel[data-fresh]").await == 0
+        })
+        .await;
+        self.click(css).await;
+    }
+}
+
 impl Theatre {
     /// Starts a server and both browsers, which enter by their links.
     pub async fn open(driver: &Driver) -> Self {
@@ -109,6 +120,18 @@ impl Theatre {
     pub async fn give_reason(&self, reason: &str) {
         self.operator.type_into("#reason", reason).await;
         self.operator.click("#reason-go").await;
+    }
+
+    /// The operator aborts the session, because of `reason`.
+    pub async fn abort(&self, reason: &str) {
+        self.operator.click_labelled("#session-actions", "Abort").await;
+        self.give_reason(reason).await;
+    }
+
+    /// The operator writes, after a pause, why it was.
+    pub async fn say_why_paused(&self, reason: &str) {
+        self.operator.type_into("#pause-reason", reason).await;
+        self.operator.click("#reason-wanted [type=submit]").await;
     }
 
     /// The surgeon taps the notice of setting `number` when it is shown, again and again until the page accepts the
@@ -180,8 +203,17 @@ impl Theatre {
         self.surgeon.sees_no("[data-question=sharpness]").await;
     }
 
-    /// The surgeon selects point `point` of the scale called `name`.
+    /// The surgeon selects point `point` of the scale called `name`, again and again until the page accepts the tap: it
+    /// ignores taps right after the questions have appeared.
     pub async fn choose(&self, name: &str, point: u8) {
-        self.surgeon.click(&format!("input[name='{name}'][value='{point}']")).await;
+        let input = format!("input[name='{name}'][value='{point}']");
+        self.surgeon.click(&input).await;
+        until("the point to be chosen", || async {
+            self.surgeon.is(&input, "checked").await || {
+                self.surgeon.try_click(&input).await;
+                false
+            }
+        })
+        .await;
     }
 }

@@ -248,7 +248,7 @@ async fn what_is_said_while_the_server_is_dead_is_kept_here_and_lands_once() {
     hold(&theatre.surgeon).await;
     theatre.surgeon.sees("#talk-label", "Recording 0:02").await;
     kill(&mut theatre.server);
-    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
+    theatre.surgeon.sees("#comment-state", "Saved here: 1 recording.").await;
     theatre.surgeon.sees("#talk-label", "Recording 0:0").await;
     shoot(&theatre.surgeon, "surgeon-voice-3-no-server").await;
 
@@ -275,11 +275,11 @@ async fn a_page_loaded_again_while_the_server_is_dead_still_holds_what_was_said(
     let_go(&theatre.surgeon).await;
     // The browser ends a recording a moment after the finger has left. A page that closes before then loses the end.
     theatre.surgeon.sees("#talk-label", "Hold to talk").await;
-    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
+    theatre.surgeon.sees("#comment-state", "Saved here: 1 recording.").await;
 
     theatre.surgeon.reload().await;
     theatre.surgeon.sees("#now", "No server since").await;
-    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
+    theatre.surgeon.sees("#comment-state", "Saved here: 1 recording.").await;
     assert!(!theatre.surgeon.is("#talk", "disabled").await, "the page may still use the microphone");
 
     start_again(&mut theatre.server);
@@ -331,7 +331,7 @@ async fn a_tablet_that_loses_its_power_in_the_middle_of_a_word_has_all_but_the_l
     page.sees("#talk-label", "Recording 0:04").await;
     theatre.write("sharper on the left").await;
     page.type_into("#comment", "\u{e007}").await;
-    page.sees("#comment-state", "Saved here, not sent yet: 1 comment.").await;
+    page.sees("#comment-state", "Saved here: 1 comment, 1 recording.").await;
     assert_eq!(recorded(&theatre).await, []);
 
     let tone = folder.path().join("tone.wav");

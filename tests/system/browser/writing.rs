@@ -14,7 +14,7 @@ const REMARKS: &str = "[data-question=remarks] textarea";
 impl Theatre {
     /// The operator ends the session and removes it from the screens.
     pub async fn put_away(&self) {
-        self.operator.click("#session-actions .danger").await;
+        self.operator.click_labelled("#session-actions", "Abort").await;
         self.give_reason("Enough").await;
         self.operator.sees("#phase", "Aborted").await;
         self.operator.click("#session-actions .primary").await;
@@ -25,7 +25,7 @@ impl Theatre {
     async fn answer_elsewhere(&self, driver: &Driver) {
         let other = driver.browser().await;
         other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
-        other.click("input[name=sharpness][value='3']").await;
+        other.tap_in_panel("input[name=sharpness][value='3']").await;
         other.sees("[data-question=sharpness] > .state", "Saved").await;
         other.click(".questions .done button").await;
     }

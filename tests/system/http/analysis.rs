@@ -90,6 +90,9 @@ impl Study {
     /// Changes the study.
     pub async fn change(&self, change: &str) {
         let mut body = json!({"change": change, "reason": "as planned"});
+        if change == "open" {
+            body["despite_concerns"] = true.into();
+        }
         if change == "lock" {
             body["despite_outstanding"] = true.into();
         }
@@ -387,6 +390,15 @@ async fn a_studys_analysis_has_scipys_figures_on_the_page_on_the_command_line_an
     let name = "parfocal-focus-2026-analysis/analysis_tests.csv";
     std::io::Read::read_to_string(&mut zip.by_name(name).unwrap(), &mut packed).unwrap();
     assert_eq!(packed, std::fs::read_to_string(folder.join("analysis_tests.csv")).unwrap());
+
+    // Telemetry included, the package says the same as the database, digit by digit.
+    let package = out.path().join("package");
+    let mut export = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    export.args(["export", "--study", STUDY, "--unblinded", "--data-dir"]).arg(data).arg("--out").arg(&package);
+    assert!(export.output().unwrap().status.success());
+    let mut of_package = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    let printed = of_package.args(["study", "analyse", "--json"]).arg(&package).output().unwrap().stdout;
+    assert_eq!(serde_json::from_slice::<Value>(&printed).unwrap(), analysis);
 
     // JSON, page and ZIP file count as a look each. Refused requests do not, and the command only reads.
     assert_eq!(looks(data).await, 3);

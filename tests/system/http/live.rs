@@ -222,7 +222,10 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let server = Server::start();
     let mut surgeon = Page::open(&server, "surgeon").await;
     let frame = surgeon.frame().await;
-    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "per_cell", "run", "width"]);
+    assert_eq!(
+        frame.fields(),
+        ["age", "area", "estimated", "frame", "height", "patch", "per_cell", "reduced", "run", "travel", "width"]
+    );
     assert!(frame.header["age"].as_f64().unwrap() % 100.0 == 0.0, "finer, it would hold the policy's own time");
     surgeon.sent_so_far().await;
     let told = surgeon.told();
@@ -316,4 +319,67 @@ async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
     let first = &stream[PART.len()..end - 2];
     assert_eq!(&stream[end - 2..end], b"\r\n");
     image::load_from_memory_with_format(first, image::ImageFormat::Jpeg).unwrap();
+}
+
+async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
+    let answer = server.post_as(role, path).json(&body).send().await.unwrap();
+    assert!(answer.status().is_success(), "{path} {body}: {}", answer.status());
+    answer.json().await.unwrap_or_default()
+}
+
+#[tokio::test]
+async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers_setting() {
+    let server = Server::start();
+    let mut operator = Page::open(&server, "operator").await;
+    operator.until(|told| told["tablet"]["presence"] == "never-seen").await;
+    let mut surgeon = Page::open(&server, "surgeon").await;
+    operator.until(|told| told["tablet"]["presence"] == "present").await;
+
+    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
+    let new = json!({"participant": "S-01", "protocol": "paper"});
+    let view = post(&server, "operator", "/api/operator/sessions", new).await;
+    let session = &view["session"];
+    post(&server, "operator", "/api/operator/actions", json!({"session": session, "action": "start"})).await;
+    let started = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().json::<Value>().await.unwrap();
+    let tap = json!({"session": session, "action": "acknowledge", "segment": started["segment"]});
+    post(&server, "surgeon", "/api/surgeon/actions", tap).await;
+    surgeon.watch(20).await;
+
+    drop(surgeon);
+    operator.until(|told| told["tablet"]["presence"] == "silent" && told["tablet"]["away_seconds"].is_u64()).await;
+    operator.until(|told| told["view"]["paused_by"] == "tablet-away").await;
+    let mut back = Page::open(&server, "surgeon").await;
+    back.watch(5).await;
+    operator.until(|told| told["tablet"]["presence"] == "present").await;
+    operator.until(|told| told["view"]["log"][0]["text"] == "The surgeon’s tablet is back").await;
+    let view = server.get_as("operator", "/api/operator/session").send().await.unwrap().json::<Value>().await.unwrap();
+    let told: Vec<&str> = view["log"].as_array().unwrap().iter().filter_map(|line| line["text"].as_str()).collect();
+    assert!(told.iter().any(|text| text.starts_with("Setting 1 seen at 512x272")), "{told:?}");
+    assert!(told.contains(&"Paused: the surgeon’s tablet is away"), "{told:?}");
+}
+
+/// The emergency: pause, then the lens by hand. Neither asks for anything.
+#[tokio::test]
+async fn two_requests_lead_from_a_running_setting_to_focus_by_hand() {
+    let server = Server::start();
+    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
+    let new = json!({"participant": "S-01", "protocol": "practice"});
+    let view = post(&server, "operator", "/api/operator/sessions", new).await;
+    let session = &view["session"];
+    let act = async |body: Value| post(&server, "operator", "/api/operator/actions", body).await;
+    act(json!({"session": session, "action": "start"})).await;
+    let focus = async || {
+        let answer = server.post_as("operator", "/api/operator/focus").json(&json!({"focal_power": 0.8})).send().await;
+        answer.unwrap().status().as_u16()
+    };
+    assert_eq!(focus().await, 409);
+
+    act(json!({"session": session, "action": "pause"})).await;
+    assert_eq!(focus().await, 204);
+    let view = server.get_as("operator", "/api/operator/session").send().await.unwrap().json::<Value>().await.unwrap();
+    assert_eq!((&view["by_hand"], &view["may_focus_by_hand"]), (&json!(0.8), &json!(true)));
+    let event = &view["reason_wanted"]["event"];
+    let view = act(json!({"session": session, "action": "give-reason", "event": event, "reason": "bleeding"})).await;
+    assert_eq!(view["reason_wanted"], Value::Null);
+    assert!(view["log"][0]["text"].as_str().unwrap().contains("bleeding"));
 }

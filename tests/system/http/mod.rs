@@ -2,6 +2,7 @@
 
 mod accounts;
 pub mod analysis;
+mod backup;
 mod blinding;
 mod checks;
 mod crowd;

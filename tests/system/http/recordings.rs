@@ -176,8 +176,8 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     let mut surgeon = Page::open(&server, "surgeon").await;
 
     surgeon.say(json!({"type": "screen", "width": 1200})).await;
-    let kept = until_viewed(&mut surgeon, &folder, |row| row.width == Some(1024)).await;
-    assert_eq!(kept.height, Some(544));
+    let kept = until_viewed(&mut surgeon, &folder, |row| row.width == 1024).await;
+    assert_eq!(kept.height, 544);
 
     // Nobody else changes the recorded size, although the operator's screen is larger.
     let mut operator = Page::open(&server, "operator").await;
@@ -187,7 +187,7 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
 
     surgeon.say(json!({"type": "screen", "width": 400})).await;
     let small = surgeon.watch_until(|header| header["per_cell"] == 1).await;
-    until_viewed(&mut surgeon, &folder, |row| row.number > small.number() && row.width == Some(512)).await;
+    until_viewed(&mut surgeon, &folder, |row| row.number > small.number() && row.width == 512).await;
 
     abort(&server, &session).await;
     until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
@@ -195,10 +195,10 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     assert!(view.check().is_empty());
     for (number, row) in view.rows().iter().enumerate() {
         let picture = image::load_from_memory(&view.picture(number).unwrap()).unwrap();
-        assert_eq!((Some(picture.width()), Some(picture.height())), (row.width, row.height), "picture {number}");
+        assert_eq!((picture.width(), picture.height()), (row.width, row.height), "picture {number}");
     }
     assert!(view.rows().windows(2).all(|pair| pair[0].number < pair[1].number), "every frame once");
-    assert!(view.rows().iter().all(|row| row.width < Some(2048)), "never the operator's size");
+    assert!(view.rows().iter().all(|row| row.width < 2048), "never the operator's size");
 
     // The recording keeps what the surgeon's page got of a frame. While the size changes, which can also happen by
     // itself on a busy machine, two frames may be kept at the size before or after.
@@ -209,7 +209,7 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     });
     let sent: Vec<_> = sent.collect();
     let changes = sent.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
-    let kept: BTreeMap<u64, Option<u32>> = view.rows().iter().map(|row| (row.number, row.width)).collect();
+    let kept: BTreeMap<u64, Option<u32>> = view.rows().iter().map(|row| (row.number, Some(row.width))).collect();
     let differ = sent.iter().filter(|(number, width)| kept.get(number).is_some_and(|kept| kept != width)).count();
     assert!(changes >= 2 && differ <= 2 * changes, "{differ} differ, {changes} changes: {sent:?} {kept:?}");
 }

@@ -67,6 +67,46 @@ fn what_cannot_be_served_is_refused_in_a_sentence() {
 }
 
 #[test]
+fn everything_that_is_wrong_is_reported_at_once_and_before_the_port_is_taken() {
+    let data = tempfile::tempdir().unwrap();
+    let path = |name: &str| data.path().join(name).to_str().unwrap().to_owned();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    std::fs::create_dir(path("protocols")).unwrap();
+    std::fs::write(path("protocols/a.toml"), "name = 3\n").unwrap();
+    std::fs::create_dir(path("weights")).unwrap();
+    std::fs::write(path("calibration.toml"), "nonsense").unwrap();
+
+    let folder = data.path().join("new");
+    let (code, said) = refused(
+        &folder,
+        &[
+            ["--bind", &address, "--camera", "footage:/no/such.mp4", "--lens", "emulated?temperature=nan"].as_slice(),
+            &["--weights", &path("weights"), "--protocols", &path("protocols")],
+            &["--calibration", &path("calibration.toml"), "--lens-dynamics", "/no/such.toml"],
+            &["--tls", "--tls-certificate", "/no/such.crt", "--tls-key", "/no/such.key"],
+        ]
+        .concat(),
+    );
+    assert_eq!(code, Some(1));
+    for words in [
+        "8 reasons",
+        "there are no weights in",
+        "a.toml, line 1",
+        "temperature=",
+        "/no/such.mp4",
+        "calibration.toml",
+        "/no/such.toml",
+        "/no/such.crt",
+        &format!("{address} is in use"),
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert_eq!(said.lines().count(), 9, "{said}");
+    assert!(!folder.exists(), "a start that fails makes no data folder");
+}
+
+#[test]
 fn one_data_folder_has_one_server() {
     let server = Server::start();
     let (code, said) = refused(server.data.path(), &["--bind", "127.0.0.1:0"]);

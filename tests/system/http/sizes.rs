@@ -4,6 +4,8 @@
 #[path = "../../../benches/stream/link.rs"]
 mod link;
 
+use std::time::Duration;
+
 use serde_json::json;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
@@ -108,6 +110,41 @@ async fn a_slow_link_keeps_the_small_pictures_that_it_carries() {
         slow.drawn(&frame).await;
         assert_eq!(frame.header["per_cell"], 1);
     }
+}
+
+/// At 1 Mbit/s, 300 ms away there and back, one picture under way at a time gives two or three a second, and half of
+/// the link is idle.
+#[tokio::test]
+async fn a_distant_page_gets_what_its_link_carries_and_is_told_how_long_the_way_takes() {
+    const WAY: Duration = Duration::from_millis(150);
+    const BITS: u64 = 1_000_000;
+    let server = server();
+    let address = link::distant(server.address, BITS, WAY).await;
+    let mut page = Page::through(address, &server, "surgeon").await;
+    page.watch(25).await;
+
+    let begin = tokio::time::Instant::now();
+    let mut bytes = 0;
+    let mut travels = Vec::new();
+    for _ in 0..25 {
+        let frame = page.frame().await;
+        page.drawn(&frame).await;
+        bytes += frame.jpeg.len();
+        travels.push(frame.header["travel"].as_f64().unwrap());
+        assert_eq!(frame.header["reduced"], false, "the page has not said that it wants more");
+    }
+    let seconds = begin.elapsed().as_secs_f64();
+    let picture = Duration::from_secs_f64(bytes as f64 / 25.0 * 8.0 / BITS as f64);
+    let alone = 1.0 / (2 * WAY + picture).as_secs_f64();
+    let rate = 25.0 / seconds;
+    println!("{rate:.1} pictures a second of {picture:?} each; one at a time {alone:.1}; told {travels:?} ms");
+    assert!(rate > 1.4 * alone, "{rate} pictures a second, {alone} with one under way");
+
+    // Half of the round trip, the picture itself, and at most as much again where pictures queue.
+    travels.sort_by(f64::total_cmp);
+    let told = travels[12];
+    let way = (WAY + picture).as_secs_f64() * 1e3;
+    assert!((0.8 * way..1.2 * way + picture.as_secs_f64() * 1e3).contains(&told), "{told} ms told of {way} ms");
 }
 
 #[tokio::test]

@@ -87,7 +87,7 @@ pub async fn take_session_link(server: &mut Server) {
 pub async fn open(server: &Server) -> Value {
     let plan = json!({"definition": definition(), "reason": "ethics approved it"});
     post(server, "researcher", "/api/researcher/studies", plan).await;
-    let opening = json!({"change": "open", "reason": "the first surgeon comes"});
+    let opening = json!({"change": "open", "despite_concerns": true, "reason": "the first surgeon comes"});
     post(server, "researcher", "/api/researcher/studies/scope-2026/changes", opening).await
 }
 
@@ -289,6 +289,9 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     assert!(!done && said.contains("make accounts first, with `parfocal account add NAME --role lead`"), "{said}");
     server.add_account("lead", "lead", "Dr Lead");
     let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(!done && said.contains("Nobody here could unblind the study"), "{said}");
+    let confirmed = ["open", "scope-2026", "--despite-concerns"];
+    let (done, said) = study(&[&confirmed[..], &signature].concat(), data.path());
     assert!(done && said.contains("parfocal study scope-2026 definition") && said.contains("chain "), "{said}");
     let line = said.lines().nth(1).unwrap().to_owned();
     let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());

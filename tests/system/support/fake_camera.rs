@@ -1,6 +1,7 @@
 //! Aravis's fake GigE Vision camera, a separate program on the loopback (Debian's package `aravis-tools`).
 
 use std::fs::File;
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -21,17 +22,24 @@ pub struct Fake {
 impl Fake {
     /// Starts it; `None` if the program is not installed.
     pub fn start(options: &[&str]) -> Option<Self> {
-        let turn = File::create(std::env::temp_dir().join("parfocal-fake-camera.lock")).unwrap();
-        turn.lock().unwrap();
-        let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
-        let Ok(process) = Self::spawn(&options) else {
+        let Some(program) = Self::program() else {
             println!("skipped: {PROGRAM} is not installed (Debian package aravis-tools)");
             return None;
         };
+        // The program's own file is locked: whoever runs tests on this machine, in whatever folder, finds the same one.
+        let turn = File::open(program).unwrap();
+        turn.lock().unwrap();
 
+        let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
+        let process = Self::spawn(&options).unwrap();
         let fake = Self { process, options, _turn: turn };
         Self::wait_until_it_answers();
         Some(fake)
+    }
+
+    fn program() -> Option<PathBuf> {
+        let folders = std::env::var_os("PATH")?;
+        std::env::split_paths(&folders).map(|folder| folder.join(PROGRAM)).find(|program| program.is_file())
     }
 
     fn spawn(options: &[String]) -> std::io::Result<Child> {

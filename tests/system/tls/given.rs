@@ -1,12 +1,13 @@
 //! A certificate that the site provides: used, renewed while the server runs, and refused with a sentence.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_dashboard::tls::{Certificates, Names};
-use rcgen::{CertificateParams, KeyPair};
+use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
 use serde_json::Value;
 use time::OffsetDateTime;
 
@@ -39,6 +40,15 @@ impl Site {
         let key = KeyPair::generate().unwrap();
         std::fs::write(self.certificate(), params.self_signed(&key).unwrap().pem()).unwrap();
         std::fs::write(self.key(), key.serialize_pem()).unwrap();
+    }
+
+    /// Lets OpenSSL make a self-signed certificate, with these further arguments.
+    fn openssl(&self, arguments: &[&str]) {
+        let mut command = Command::new("openssl");
+        command.args(["req", "-x509", "-nodes", "-days", "9", "-subj", "/CN=server"]).args(arguments);
+        command.args(["-addext", "subjectAltName=DNS:localhost"]);
+        let output = command.arg("-keyout").arg(self.key()).arg("-out").arg(self.certificate()).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
 
     fn certificate(&self) -> PathBuf {
@@ -170,6 +180,81 @@ fn each_bad_file_is_refused_in_a_sentence() {
     refuses("holds no certificate");
     std::fs::remove_file(site.certificate()).unwrap();
     refuses("server.crt: No such file");
+}
+
+#[test]
+fn a_key_that_cannot_be_used_and_a_purpose_that_is_not_a_servers_are_named() {
+    let site = Site::new();
+    let refuses = |arguments: &[&str], words: &[&str]| {
+        site.openssl(arguments);
+        let said = site.refusal();
+        assert!(words.iter().all(|word| said.contains(word)), "{words:?}: {said}");
+    };
+
+    refuses(&["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-521"], &["on the curve P-521", "P-256 or P-384"]);
+    refuses(&["-newkey", "rsa:1024"], &["its RSA key has 1024 bits", "2048 to 8192 bits"]);
+    let p256 = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-addext"];
+    refuses(&[&p256[..], &["extendedKeyUsage=clientAuth"]].concat(), &["for clients", "server authentication"]);
+
+    for good in ["extendedKeyUsage=clientAuth,serverAuth", "extendedKeyUsage=anyExtendedKeyUsage", "nsComment=none"] {
+        site.openssl(&[&p256[..], &[good]].concat());
+        assert!(Certificates::given(site.certificate(), site.key(), SystemClock.wall()).is_ok(), "{good}");
+    }
+    site.openssl(&["-newkey", "rsa:2048"]);
+    assert!(Certificates::given(site.certificate(), site.key(), SystemClock.wall()).is_ok());
+}
+
+#[test]
+fn a_chain_is_taken_in_its_order_only() {
+    let authority = |name: &str| {
+        let mut params = CertificateParams::default();
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        params.distinguished_name.push(DnType::CommonName, name);
+        params
+    };
+    let [root_key, middle_key, key] = std::array::from_fn(|_| KeyPair::generate().unwrap());
+    let root = authority("root").self_signed(&root_key).unwrap().pem();
+    let root_issuer = Issuer::new(authority("root"), root_key);
+    let middle = authority("middle").signed_by(&middle_key, &root_issuer).unwrap().pem();
+    let leaf = CertificateParams::new(["localhost".to_owned()]).unwrap();
+    let leaf = leaf.signed_by(&key, &Issuer::new(authority("middle"), middle_key)).unwrap().pem();
+
+    let site = Site::new();
+    std::fs::write(site.key(), key.serialize_pem()).unwrap();
+    let given = |chain: &[&str]| {
+        std::fs::write(site.certificate(), chain.concat()).unwrap();
+        Certificates::given(site.certificate(), site.key(), SystemClock.wall())
+            .map(drop)
+            .map_err(|error| error.to_string())
+    };
+    for good in [&[&*leaf][..], &[&leaf, &middle], &[&leaf, &middle, &root]] {
+        assert_eq!(given(good), Ok(()));
+    }
+
+    let said = given(&[&root, &middle, &leaf]).unwrap_err();
+    assert!(said.contains("in the wrong order: the server's own, to which the key belongs, is number 3"), "{said}");
+    let said = given(&[&leaf, &root, &middle]).unwrap_err();
+    assert!(said.contains("in the wrong order: number 2 did not sign number 1"), "{said}");
+    assert!(site.refusal().contains("in the wrong order"));
+}
+
+#[test]
+fn a_byte_order_mark_is_named() {
+    let site = Site::new();
+    for (file, others) in [(site.certificate(), site.key()), (site.key(), site.certificate())] {
+        site.renew(&["localhost"], -DAY, DAY);
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, format!("\u{feff}{text}")).unwrap();
+        let said = site.refusal();
+        assert!(said.contains(file.to_str().unwrap()) && said.contains("byte order mark (BOM)"), "{said}");
+        assert!(!said.contains(others.to_str().unwrap()), "{said}");
+    }
+
+    site.renew(&["localhost"], -DAY, DAY);
+    let text = std::fs::read_to_string(site.certificate()).unwrap();
+    let wide: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    std::fs::write(site.certificate(), wide).unwrap();
+    assert!(site.refusal().contains("UTF-16"));
 }
 
 #[test]

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::export::{ExportError, export};
-use parfocal_records::store::{Reader, StoreError};
 use parfocal_session::conductor::{ConductError, Studies, StudySite};
 use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
@@ -37,7 +36,7 @@ async fn a_study_goes_from_plan_to_unblinding_and_each_step_is_an_event_with_a_r
 
     let first = whole(&mut trial, PARTICIPANT, "leeds").await;
     change(&trial, Change::Close).await.unwrap();
-    change(&trial, Change::Open).await.unwrap();
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
     assert_eq!(detail(&trial).await.commitment_line.unwrap(), commitment, "the orders are drawn once");
     let second = whole(&mut trial, "S-02", "london").await;
     to_the_end(&trial).await;
@@ -72,7 +71,8 @@ async fn changes_that_the_studys_stage_does_not_allow_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let trial = a_trial(folder.path()).await;
     assert!(
-        refusal(change(&trial, Change::Open).await).contains("there is no study 'scope-2026'; there are: none yet")
+        refusal(change(&trial, Change::Open { despite_concerns: true }).await)
+            .contains("there is no study 'scope-2026'; there are: none yet")
     );
 
     plan(&trial, definition()).await.unwrap();
@@ -84,15 +84,17 @@ async fn changes_that_the_studys_stage_does_not_allow_are_refused() {
     let early = refusal(prepare(&trial, PARTICIPANT, "leeds").await);
     assert!(early.contains("the study is planned; sessions can be made only while it is open"), "{early}");
 
-    change(&trial, Change::Open).await.unwrap();
-    assert!(refusal(change(&trial, Change::Open).await).contains("the study is open already"));
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
+    assert!(
+        refusal(change(&trial, Change::Open { despite_concerns: true }).await).contains("the study is open already")
+    );
     assert!(refusal(change(&trial, LOCK).await).contains("the study is open; close it first"));
     change(&trial, Change::Close).await.unwrap();
     assert!(refusal(change(&trial, Change::Close).await).contains("the study is closed already"));
     assert!(refusal(prepare(&trial, PARTICIPANT, "leeds").await).contains("the study is closed"));
 
     change(&trial, LOCK).await.unwrap();
-    for change in [Change::Open, Change::Close, LOCK] {
+    for change in [Change::Open { despite_concerns: true }, Change::Close, LOCK] {
         assert!(refusal(super::change(&trial, change).await).contains("the study is locked"), "{change:?}");
     }
     assert_eq!(detail(&trial).await.log.len(), 4, "planned, opened, closed, locked");
@@ -189,7 +191,12 @@ async fn missing_parts_of_a_study_are_named() {
     let text = definition().replace(STUDY, "one-site");
     let sites = vec!["london".to_owned()];
     trial.conductor.plan_study(Role::Researcher, text, sites, signed("for London alone")).await.unwrap();
-    let open = trial.conductor.change_study(Role::Researcher, "one-site".to_owned(), Change::Open, signed("go"));
+    let open = trial.conductor.change_study(
+        Role::Researcher,
+        "one-site".to_owned(),
+        Change::Open { despite_concerns: true },
+        signed("go"),
+    );
     open.await.unwrap();
     assert!(ask("one-site", "leeds", "pair").await.contains("no site 'leeds' here; there are: london"));
 
@@ -298,72 +305,6 @@ async fn a_command_changes_studies_while_no_server_runs() {
     let nowhere = folder.path().join("elsewhere");
     let missing = Studies::open(&nowhere, &library, Arc::new(a_clock()));
     assert!(missing.await.map(|_| ()).unwrap_err().to_string().contains("there is no database"));
-}
-
-#[tokio::test]
-async fn sessions_of_an_earlier_version_are_outside_any_study() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut trial = Trial::start(folder.path()).await;
-    let session = trial.whole_session("practice").await;
-    trial.store.close().await;
-    drop(trial);
-
-    // The database as the version before studies left it.
-    let pool = crate::storage::raw(folder.path()).await;
-    parfocal_records::store::MIGRATOR.undo(&pool, 8).await.unwrap();
-    let commitment = "SELECT commitment FROM sessions";
-    let before: String = sqlx::query_scalar(commitment).fetch_one(&pool).await.unwrap();
-    pool.close().await;
-    assert!(matches!(Reader::open(folder.path()).await, Err(StoreError::Outdated)));
-
-    let trial = Trial::start(folder.path()).await;
-    let lines = trial.conductor.sessions(true).await.unwrap();
-    assert_eq!((lines[0].session, lines[0].study.as_deref()), (session, None));
-    let detail = trial.conductor.session_detail(session).await.unwrap();
-    assert_eq!(detail.commitment, before);
-    assert!(trial.conductor.studies().lines().await.unwrap().is_empty());
-
-    let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
-    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
-}
-
-#[tokio::test]
-async fn an_open_study_of_the_version_before_accounts_keeps_its_orders_and_sessions() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
-    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 5).await;
-    plan(&trial, definition()).await.unwrap();
-    // That version opened studies without accounts. This account disappears below, with the tables of accounts.
-    let pool = crate::storage::raw(folder.path()).await;
-    let account = "INSERT INTO accounts VALUES ('nobody', 'Nobody', 'lead', 0, 64, 1, '', '')";
-    sqlx::query(account).execute(&pool).await.unwrap();
-    change(&trial, Change::Open).await.unwrap();
-    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
-    let line = detail(&trial).await.commitment_line;
-    let before = trial.conductor.session_detail(session).await.unwrap();
-    trial.store.close().await;
-    drop(trial);
-    parfocal_records::store::MIGRATOR.undo(&pool, 10).await.unwrap();
-    pool.close().await;
-
-    let mut trial = a_trial(folder.path()).await;
-    let study = detail(&trial).await;
-    assert_eq!((study.line.stage, study.commitment_line), (Stage::Open, line));
-    let after = trial.conductor.session_detail(session).await.unwrap();
-    assert_eq!((&after.commitment, &after.answers), (&before.commitment, &before.answers));
-    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 2);
-    whole(&mut trial, "S-02", "leeds").await;
-    let places: Vec<usize> = detail(&trial).await.study_sessions.iter().map(|session| session.place).collect();
-    assert_eq!(places, [1, 2]);
-
-    // Every order is still the committed one.
-    to_the_end(&trial).await;
-    let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
-    let checks = parfocal_records::store::export::verify::verify(&out, None);
-    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
-    let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
-    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }
 
 #[tokio::test]

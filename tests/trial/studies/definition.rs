@@ -3,7 +3,7 @@
 use parfocal_trial::study::definition::{Definition, Site};
 use sha2::{Digest, Sha256};
 
-use super::{PROTOCOL, definition, protocol};
+use super::{PROTOCOL, STUDY, a_trial, definition, detail, plan, protocol};
 
 /// The error from reading the definition with `from` replaced by `to`; empty if there is none.
 fn said(from: &str, to: &str) -> String {
@@ -23,6 +23,36 @@ fn a_definition_is_read_and_has_the_hash_of_its_file() {
     assert_eq!(read.sites.iter().map(Site::places).collect::<Vec<_>>(), [4, 3]);
     assert_eq!(read.sha256(), hex::encode(Sha256::digest(text.as_bytes())));
     assert_eq!(&*read.source, text);
+}
+
+#[tokio::test]
+async fn a_file_from_windows_keeps_its_bytes_and_has_the_same_hash_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = a_trial(folder.path()).await;
+    let text = format!("\u{feff}{}", definition().replace('\n', "\r\n"));
+    let on_page = plan(&trial, text.clone()).await;
+    assert_eq!(on_page.unwrap(), STUDY);
+    let expected = hex::encode(Sha256::digest(text.as_bytes()));
+    assert_eq!(detail(&trial).await.definition_sha256, expected);
+    trial.store.close().await;
+    drop(trial);
+
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::create_dir(&elsewhere).unwrap();
+    a_trial(&elsewhere).await.store.close().await;
+    let file = elsewhere.join("study.toml");
+    std::fs::write(&file, &text).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_parfocal"));
+        let output = command.args(arguments).arg("--data-dir").arg(&elsewhere).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let protocols = folder.path().to_str().unwrap();
+    let signed = ["--by", "Dr Lead", "--reason", "ethics approved it", "--protocols", protocols];
+    run(&[&["study", "new", file.to_str().unwrap()][..], &signed].concat());
+    let shown: serde_json::Value = serde_json::from_str(&run(&["study", "show", STUDY, "--json"])).unwrap();
+    assert_eq!(shown["definition_sha256"], expected);
 }
 
 #[test]

@@ -26,7 +26,7 @@ def plain(value):
     return value
 
 
-found = {"parquet": {}, "polars": {}, "spss": {}, "labels": {}, "values": {}}
+found = {"parquet": {}, "polars": {}, "spss": {}, "formats": {}, "labels": {}, "values": {}}
 for resource in description["resources"]:
     path = package / resource["path"]
     assert path.exists(), path
@@ -46,6 +46,7 @@ for resource in description["resources"]:
 for path in sorted((package / "spss").glob("*.sav")):
     columns, meta = pyreadstat.read_sav(str(path), output_format="dict")
     found["spss"][path.stem] = len(next(iter(columns.values()))) if columns else 0
+    found["formats"][path.stem] = meta.original_variable_types
     found["labels"][path.stem] = meta.column_names_to_labels
     found["values"][path.stem] = meta.variable_value_labels
     if path.stem == "comments":

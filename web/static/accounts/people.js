@@ -4,6 +4,7 @@ import { inWords, post } from "../shared/api.js";
 import { askIn } from "../shared/dialogs.js";
 import { byId, setText } from "../shared/dom.js";
 import "../shared/sign_in.js";
+import { offerBackup } from "./backup.js";
 
 const role = byId("change-role", HTMLSelectElement);
 const first = byId("change-first", HTMLInputElement);
@@ -99,6 +100,8 @@ for (const row of document.querySelectorAll("#people tbody tr")) {
     button.onclick = () => ask(/** @type {Change} */ (button.dataset.change), { account, display, role });
   }
 }
+
+offerBackup();
 
 const go = byId("make-go", HTMLButtonElement);
 byId("make", HTMLFormElement).addEventListener("submit", async (event) => {

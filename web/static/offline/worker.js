@@ -56,8 +56,11 @@ async function openPage(request) {
   const cache = await caches.open(CACHE);
   const kept = await cache.match(PAGE);
 
+  const controller = new AbortController();
+  const timer = kept && setTimeout(() => controller.abort(), PATIENCE_MS);
   try {
-    const answer = await fetch(request, kept ? { signal: AbortSignal.timeout(PATIENCE_MS) } : undefined);
+    const answer = await fetch(request, { signal: controller.signal });
+    if (timer) clearTimeout(timer);
     // A proxy answers with such a status while the server is down.
     if (kept && answer.status >= 500) return kept;
 

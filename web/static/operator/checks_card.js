@@ -8,7 +8,12 @@ import { heading, passed, shown, sorted, summary } from "./checks_words.js";
 
 /** @typedef {import("./checks_words.js").Finding} Finding */
 
+/** Several things often change at the same time, such as a tablet that comes and then shows its page. */
+const SETTLED_MS = 1000;
+
 const button = byId("check-again", HTMLButtonElement);
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let soon;
 
 /** Called after each check with whether something must be put right before a trial. @type {(wrong: boolean) => void} */
 let told = () => {};
@@ -56,8 +61,14 @@ async function check() {
   }
 }
 
+function checkSoon() {
+  clearTimeout(soon);
+  soon = setTimeout(check, SETTLED_MS);
+}
+
 /**
- * Runs the checks now, and whenever the operator presses the button.
+ * Runs the checks now, and whenever the operator presses the button. Returns a function that runs them soon, because
+ * something has changed.
  *
  * @param {(wrong: boolean) => void} found called with whether something must be put right before a trial
  */
@@ -65,4 +76,5 @@ export function followChecks(found) {
   told = found;
   button.addEventListener("click", check);
   check();
+  return checkSoon;
 }

@@ -5,7 +5,7 @@ import { askIn } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { BY_HAND, UNTOLD } from "./focus_card.js";
-import { protocolWords } from "./session_words.js";
+import { asCode, practiceFirst, protocolWords } from "./session_words.js";
 
 /** @typedef {{ value: string, label: string, disabled?: boolean, hidden?: boolean }} Option */
 
@@ -16,6 +16,9 @@ const studies = byId("study", HTMLSelectElement);
 
 /** The value in the list of studies for a session outside any study. */
 const OUTSIDE = "outside";
+
+/** Nothing is chosen beforehand: a wrong participant or protocol must not be one tap away. */
+const CHOOSE = { value: "", label: "Choose…" };
 
 /** @type {Api.Choices | null} */
 let choices = null;
@@ -38,11 +41,8 @@ function fill(list, options, chosen) {
  * @param {string} participant
  */
 function draw(now, participant) {
-  fill(
-    participants,
-    now.participants.map((code) => ({ value: code, label: code })),
-    participant,
-  );
+  const codes = now.participants.map((code) => ({ value: code, label: code }));
+  fill(participants, [CHOOSE, ...codes], participant);
   drawStudies(now);
   drawProtocols(now);
   const fixed = [
@@ -70,11 +70,7 @@ function drawStudies(now) {
   );
   byId("study-choice").hidden = open.length === 0;
   studies.required = open.length > 0;
-  fill(
-    studies,
-    [{ value: "", label: "Choose…" }, ...open, { value: OUTSIDE, label: "Outside any study" }],
-    studies.value,
-  );
+  fill(studies, [CHOOSE, ...open, { value: OUTSIDE, label: "Outside any study" }], studies.value);
 }
 
 /** The chosen study and site; undefined if none is chosen. */
@@ -96,11 +92,9 @@ function offeredProtocols(now) {
 
 /** @param {Api.Choices} now */
 function drawProtocols(now) {
-  fill(
-    protocols,
-    offeredProtocols(now).map(({ name, researcher_title: label }) => ({ value: name, label })),
-    protocols.value,
-  );
+  const offered = practiceFirst(offeredProtocols(now));
+  const named = offered.map(({ name, researcher_title: label }) => ({ value: name, label }));
+  fill(protocols, [CHOOSE, ...named], protocols.value);
 }
 
 function drawSummary() {
@@ -112,7 +106,7 @@ function drawSummary() {
 
 /**
  * Keeps the lists up to date with the server. Calls `drawn` after the lists were redrawn, and `prepare` with the answer
- * when a session is prepared. Returns a function that asks the server again.
+ * when a session is prepared. Returns functions that ask the server again, and that forget what was chosen.
  *
  * @param {() => void} drawn
  * @param {(answer: Promise<Api.OperatorView | null>) => Promise<void>} prepare
@@ -166,8 +160,22 @@ export function followChoices(drawn, prepare) {
   for (const way of ["pointerenter", "focus"]) participants.addEventListener(way, refresh);
   // A researcher may have opened or closed a study.
   for (const way of ["pointerenter", "focus"]) studies.addEventListener(way, refresh);
+  const typed = byId("code", HTMLInputElement);
+  typed.addEventListener("input", () => {
+    typed.value = asCode(typed.value);
+  });
   byId("add-participant").onclick = () => {
     askIn(byId("participant-dialog", HTMLDialogElement), byId("participant-trouble"), add);
   };
-  return refresh;
+
+  /** @param {boolean} participantToo whether another participant comes next */
+  function forget(participantToo) {
+    if (participantToo) participants.value = "";
+    protocols.value = "";
+    studies.value = "";
+    if (choices) drawProtocols(choices);
+    drawSummary();
+  }
+
+  return { refresh, forget };
 }

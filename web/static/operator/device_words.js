@@ -17,7 +17,7 @@ function milliseconds(micros) {
  */
 export function lamps(status) {
   const { camera, lens } = status;
-  const lost = camera.lost > 0 ? ` · ${camera.lost} lost` : "";
+  const lost = camera.lost > 0 ? ` · ${camera.lost} lost since the server’s start` : "";
   const isHeld = status.held !== null && status.held !== "paused";
 
   return [
@@ -39,7 +39,29 @@ export function lamps(status) {
       level: isHeld ? "bad" : "",
       title: status.message ?? "",
     },
+    tabletLamp(status.tablet),
   ];
+}
+
+/**
+ * @param {Stream.TabletSign} tablet
+ * @returns {Lamp}
+ */
+function tabletLamp({ presence, away_seconds: away, slow, size }) {
+  const name = "surgeon’s tablet";
+  const title = "The tablet that shows the surgeon’s page";
+  switch (presence) {
+    case "present": {
+      const figure = size === null ? "" : `${size.width}×${size.height}${slow ? ", reduced" : ""}`;
+      return { name, figure, level: slow ? "warn" : "", title };
+    }
+    case "hidden":
+      return { name, figure: "not on screen", level: "bad", title };
+    case "silent":
+      return { name, figure: `silent for ${away ?? 0} s`, level: "bad", title };
+    case "never-seen":
+      return { name, figure: "not open yet", level: "warn", title };
+  }
 }
 
 /**
@@ -62,15 +84,24 @@ function latencyWords({ latency_p50_micros: median, latency_p99_micros: p99 }) {
  * two.
  *
  * @param {Status} status
+ * @param {boolean} inSession whether a session has started and not ended
  * @returns {Warning[]}
  */
-export function warnings(status) {
-  const { camera, lens, held } = status;
+export function warnings(status, inSession) {
+  const { camera, lens, held, tablet } = status;
   const cameraHolds = held === "camera-failed";
   const lensHolds = held === "lens-failed" && !lens.working;
   /** @type {Warning[]} */
   const all = [];
 
+  if (inSession && tablet.presence === "silent") {
+    const text = `The surgeon’s tablet has not answered for ${tablet.away_seconds ?? 0} s. Look after it, or pause.`;
+    all.push({ text, level: "bad" });
+  }
+  if (inSession && tablet.presence === "hidden") {
+    const text = "The surgeon’s page is not on screen. Bring it to the front of the tablet, or pause.";
+    all.push({ text, level: "bad" });
+  }
   if (!camera.working) {
     all.push({ text: `Camera: ${cameraHolds ? status.message : camera.message}`, level: "bad" });
   }

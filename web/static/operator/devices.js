@@ -6,7 +6,7 @@ import { lamps, warnings } from "./device_words.js";
 /** @typedef {Stream.OperatorStatus} Status */
 
 /**
- * Draws a lamp for camera, lens and loop into `list`.
+ * Draws a lamp for camera, lens, loop and tablet into `list`.
  *
  * @param {HTMLElement} list
  * @param {Status} status
@@ -53,9 +53,10 @@ function deviceTerm(term, { name, message }) {
  *
  * @param {HTMLElement} box
  * @param {Status} status
+ * @param {boolean} inSession whether a session has started and not ended
  */
-export function drawWarnings(box, status) {
-  const lines = warnings(status).map(({ text, level }) =>
+export function drawWarnings(box, status, inSession) {
+  const lines = warnings(status, inSession).map(({ text, level }) =>
     make("p", { className: `notice-line ${level}` }, text),
   );
   redraw(box, lines);

@@ -21,19 +21,27 @@ let status = null;
 let dragging = false;
 
 /**
- * Draws the policy and the focal power of the loop's status. During a session (`blinded`) both are hidden.
+ * Draws the policy and the focal power of the loop's status. During a session both are hidden. While it is paused, and
+ * after an abort, the operator can still focus by hand.
  *
  * @param {Stream.OperatorStatus} next
- * @param {boolean} blinded
+ * @param {Api.OperatorView | null} session
  */
-export function drawFocus(next, blinded) {
+export function drawFocus(next, session) {
   status = next;
   const { focal_power: power } = next;
   // When a session is closed, the first status with a focal power arrives only after the message about it.
-  const untold = blinded || power === null;
+  const untold = session !== null || power === null;
   const wasUntold = policies.value === UNTOLD;
-  byId("focus-controls", HTMLFieldSetElement).disabled = untold;
+  const mayFocus = !untold || session?.may_focus_by_hand === true;
+  byId("focus-controls", HTMLFieldSetElement).disabled = !mayFocus;
+  byId("focus-card").classList.toggle("wanted", untold && mayFocus);
+  policies.disabled = untold;
   byId("traces-hidden").hidden = !untold;
+  if (untold && mayFocus) {
+    drawByHand(session?.by_hand ?? null);
+    return;
+  }
   if (untold) {
     drawUntold();
     return;
@@ -46,6 +54,19 @@ export function drawFocus(next, blinded) {
   if (next.policy === null && !wasUntold) return;
   slider.value = String(power);
   setText(byId("focal-power-value"), text);
+}
+
+/**
+ * In a session the slider shows only where the operator put it. Where the policy left the lens is not told.
+ *
+ * @param {number | null} byHand
+ */
+function drawByHand(byHand) {
+  setText(byId("focus-now"), "Move the slider to focus by hand.");
+  if (dragging || orders.busy) return;
+  policies.value = UNTOLD;
+  slider.value = String(byHand ?? MIDDLE);
+  setText(byId("focal-power-value"), byHand === null ? "" : byHand.toFixed(3));
 }
 
 /** Clears the values from before the session, which would look like present ones. */
@@ -70,7 +91,7 @@ slider.addEventListener("input", () => {
   dragging = true;
   const power = Number(slider.value);
   setText(byId("focal-power-value"), power.toFixed(3));
-  policies.value = BY_HAND;
+  if (!policies.disabled) policies.value = BY_HAND;
   orders.give({ focal_power: power });
 });
 slider.addEventListener("change", () => {

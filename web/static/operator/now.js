@@ -2,7 +2,7 @@
 // every policy.
 
 import { minuteText } from "../shared/text.js";
-import { isOver, lacksConsent } from "./session_words.js";
+import { isOver, isUnderWay, lacksConsent } from "./session_words.js";
 
 /** @typedef {Api.OperatorView} View */
 
@@ -17,10 +17,11 @@ import { isOver, lacksConsent } from "./session_words.js";
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} working whether camera and lens work, as far as is known
  * @property {boolean} wrong whether the checks found something to put right before a trial
+ * @property {boolean} [away] whether the surgeon's tablet was there and is not any more
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, refused, working, wrong }) {
+export function nowWords({ view, known, missed, heardAt, refused, working, wrong, away = false }) {
   if (missed) {
     const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
     return refused
@@ -29,17 +30,24 @@ export function nowWords({ view, known, missed, heardAt, refused, working, wrong
   }
   if (!known) return "Connecting to the server…";
   if (!working) return "Fix the camera or the lens first. The warning below says what is wrong.";
-  if (view !== null) return sessionWords(view);
+  if (view !== null) return sessionWords(view, away);
   return wrong
     ? "First fix what the card “Ready for a trial?” marks with a cross."
     : "Choose a participant and a protocol, then prepare the session.";
 }
 
-/** @param {View} view */
-function sessionWords(view) {
+/**
+ * @param {View} view
+ * @param {boolean} away
+ */
+function sessionWords(view, away) {
   if (view.unrecorded)
     return "Make room on the server’s disk. The session’s card says what is not recorded yet.";
-  if (view.paused && !isOver(view)) return "Press “Resume” when the surgeon is ready.";
+  if (view.paused && !isOver(view)) {
+    return "Paused: you can focus by hand. Press “Resume” when the surgeon is ready.";
+  }
+
+  if (away && isUnderWay(view)) return "The surgeon’s tablet is away: look after it, or press “Pause”.";
 
   switch (view.phase) {
     case "ready":
@@ -54,8 +62,9 @@ function sessionWords(view) {
       return `Wait for the surgeon’s answers about setting ${view.setting}.`;
     case "closing":
       return "Wait for the surgeon’s last answers.";
-    case "completed":
     case "aborted":
+      return "You can focus by hand. Press “Close and prepare the next” when the tablet has saved everything.";
+    case "completed":
       return "Press “Close and prepare the next” when the surgeon’s tablet says that everything is saved.";
   }
 }

@@ -14,8 +14,9 @@ import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
 import { nowWords } from "./now.js";
-import { followRecording } from "./recording_card.js";
+import { followRecording, forgetNotice } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
+import { isUnderWay } from "./session_words.js";
 import { followLink, offerLink } from "./surgeon_link.js";
 import { Traces } from "./traces.js";
 
@@ -29,26 +30,34 @@ let session = null;
 /** @type {Stream.OperatorStatus | null} */
 let status = null;
 let framesWithoutBelief = BELIEF_FRAMES;
+/** Runs the checks again soon, once they are there. */
+let checkAgain = () => {};
 
 /** Whether the checks found something to put right before a trial. */
 let wrong = false;
 /** Whether the server has said which session, if any, is under way. */
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
-const viewer = new Viewer(byId("view"), "operator");
+const viewer = new Viewer(byId("view"), "operator", byId("colour"));
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
-const refreshChoices = followChoices(redrawFocus, followAnswer);
+const choices = followChoices(redrawFocus, followAnswer);
 
 /** @param {Api.OperatorView | null} next */
 function followSession(next) {
-  if (session && !next) refreshChoices();
+  if (session && !next) {
+    choices.refresh();
+    // After practice the same participant comes next, after a real session another one.
+    choices.forget(!session.practice);
+  }
+  if (known && next && next.session !== session?.session) forgetNotice();
   session = next;
   known = true;
   sessionCard.follow(session);
   followLink(session);
   redrawFocus();
+  drawTheWarnings();
   drawNow();
 }
 
@@ -61,28 +70,44 @@ function drawNow() {
     refused: contact.isCertificateOver,
     working: status === null || (status.camera.working && status.lens.working),
     wrong,
+    away: status?.tablet.presence === "silent" || status?.tablet.presence === "hidden",
   };
   setText(byId("now"), nowWords(facts));
 }
 
 /** @param {Stream.OperatorStatus} next */
 function followStatus(next) {
+  const changed = status !== null && checked(status) !== checked(next);
   status = next;
+  if (changed) checkAgain();
   contact.certifiedUntil(status.certificate_until);
   drawLamps(byId("devices"), status);
   drawDeviceWords(byId("device-words"), status);
-  drawWarnings(byId("warnings"), status);
+  drawTheWarnings();
   drawCamera(status.camera_offer);
   redrawFocus();
 }
 
+/**
+ * What the checks look at and can change at any time.
+ *
+ * @param {Stream.OperatorStatus} status
+ */
+function checked({ camera, lens, tablet }) {
+  return JSON.stringify([camera.working, lens.working, tablet.presence, tablet.slow]);
+}
+
+function drawTheWarnings() {
+  if (status) drawWarnings(byId("warnings"), status, session !== null && isUnderWay(session));
+}
+
 function redrawFocus() {
-  if (status) drawFocus(status, session !== null);
+  if (status) drawFocus(status, session);
 }
 
 /** @param {Stream.Frame} frame */
 function followFrame({ header, receivedAt }) {
-  traces.add(header, receivedAt - header.age);
+  traces.add(header, receivedAt - header.age - header.travel);
   framesWithoutBelief = header.belief ? 0 : framesWithoutBelief + 1;
   byId("belief-choice").hidden = framesWithoutBelief >= BELIEF_FRAMES;
 }
@@ -101,7 +126,7 @@ viewer.live.listen({
     }
     contact.heard();
     serverAnswered();
-    refreshChoices();
+    choices.refresh();
   },
 });
 
@@ -112,7 +137,7 @@ followOverlayBoxes((name, on) => {
 
 offerLink();
 document.addEventListener("signed-in", () => followLink(session));
-followChecks((found) => {
+checkAgain = followChecks((found) => {
   wrong = found;
   drawNow();
 });
@@ -121,4 +146,4 @@ setInterval(() => {
   sessionCard.drawTime();
   drawNow();
 }, TICK_MS);
-refreshChoices();
+choices.refresh();

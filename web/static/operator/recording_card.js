@@ -11,6 +11,15 @@ const EVERY_MS = 2000;
 const button = byId("record", HTMLButtonElement);
 let recording = false;
 let busy = false;
+/** What was told about a recording before the session under way. */
+let told = "";
+let notice = "";
+
+/** Another session begins: what became of an earlier one's recording is no longer told. */
+export function forgetNotice() {
+  told = notice;
+  byId("recording-notice").hidden = true;
+}
 
 /** @param {Api.RecordingStatus} status */
 function draw(status) {
@@ -29,12 +38,16 @@ function draw(status) {
  *
  * @param {Api.RecordingStatus} status
  */
-function drawNotice({ notice, notice_warns: warns }) {
+function drawNotice({ notice: now, notice_warns: warns }) {
+  notice = now ?? "";
+  // The same words a second time would be told again after another recording.
+  if (recording) told = "";
   const line = byId("recording-notice");
   line.className = warns ? "notice-line warn" : "notice-line";
   line.setAttribute("role", warns ? "alert" : "status");
-  setText(line, (!recording && notice) || "");
-  line.hidden = recording || !notice;
+  const isNews = !recording && notice !== "" && notice !== told;
+  setText(line, isNews ? notice : "");
+  line.hidden = !isNews;
 }
 
 async function refresh() {

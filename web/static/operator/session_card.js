@@ -11,6 +11,7 @@ import {
   deeds,
   lacksConsent,
   phaseWords,
+  reasonWords,
   steps,
   timeLeft,
   unrecordedWords,
@@ -25,14 +26,23 @@ export class SessionCard {
   #session = null;
   /** When the setting's time ends, by the page's clock. @type {number | null} */
   #endsAt = null;
+  /** The pause whose reason is being written. @type {number | undefined} */
+  #reasonFor;
 
   /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */
   constructor(followAnswer) {
     this.#followAnswer = followAnswer;
+    byId("reason-wanted", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.#giveReason();
+    };
   }
 
   /** @param {View | null} session */
   follow(session) {
+    // The button that was pressed goes away, and would take the focus to the page's beginning.
+    const isHere = byId("session-card").contains(document.activeElement);
+    if (session?.session !== this.#session?.session) byId("pause-reason", HTMLInputElement).value = "";
     this.#session = session;
     const seconds = session?.remaining_seconds;
     this.#endsAt = seconds == null ? null : performance.now() + seconds * 1000;
@@ -42,6 +52,7 @@ export class SessionCard {
     byId("follow").hidden = session === null;
     this.#drawBadges();
     if (session) this.#draw(session);
+    if (isHere) focusNext();
   }
 
   /** @param {View} session */
@@ -54,6 +65,7 @@ export class SessionCard {
     byId("consent").hidden = consentWords(session) === "";
     byId("steps").replaceChildren(...steps(session).map((className) => make("li", { className })));
     this.#drawDeeds(session);
+    this.#drawReasonWanted(session);
     drawFeed(session);
     this.drawTime();
   }
@@ -86,6 +98,25 @@ export class SessionCard {
     redraw(byId("session-actions"), buttons);
   }
 
+  /**
+   * A reason that is being written stays in the box while the session moves on.
+   *
+   * @param {View} session
+   */
+  #drawReasonWanted({ reason_wanted: wanted }) {
+    byId("reason-wanted").hidden = !wanted;
+    if (wanted) setText(byId("pause-reason-label"), reasonWords(clockOf(wanted.at), wanted));
+    this.#reasonFor = byId("pause-reason", HTMLInputElement).value === "" ? wanted?.event : this.#reasonFor;
+  }
+
+  async #giveReason() {
+    const box = byId("pause-reason", HTMLInputElement);
+    const event = this.#reasonFor ?? this.#session?.reason_wanted?.event;
+    const reason = box.value.trim();
+    if (event === undefined || reason === "") return;
+    if (await this.#act({ action: "give-reason", event, reason })) box.value = "";
+  }
+
   /** @param {Deed} deed */
   #do(deed) {
     if (!this.#session) return;
@@ -97,7 +128,7 @@ export class SessionCard {
       case "end-setting":
         return this.#askEndSetting(this.#session);
       case "pause":
-        return this.#askPause(this.#session);
+        return this.#act({ action: "pause", reason: "" });
       case "abort":
         return this.#askAbort(this.#session);
       case "consent":
@@ -119,17 +150,6 @@ export class SessionCard {
         "This cannot be undone. All comments are kept.",
       go: `End setting ${setting}`,
       done: () => this.#send(session, { action: "finish-segment", segment }),
-    });
-  }
-
-  /** @param {View} view */
-  #askPause({ session }) {
-    askReason({
-      heading: "Pause the session",
-      consequence:
-        "The clock stops and the lens holds still. The surgeon sees that the session is paused and can still comment.",
-      go: "Pause",
-      done: (reason) => this.#send(session, { action: "pause", reason }),
     });
   }
 
@@ -185,16 +205,36 @@ export class SessionCard {
     await this.#followAnswer(post("/api/operator/actions", { session, ...action }));
   }
 
-  /** @param {Api.Action} action */
+  /**
+   * Returns whether it was done.
+   *
+   * @param {Api.Action} action
+   */
   async #act(action) {
-    if (!this.#session) return;
+    if (!this.#session) return false;
     try {
       await this.#send(this.#session.session, action);
       tell(byId("session-trouble"), "");
+      return true;
     } catch (error) {
       tellTrouble(byId("session-trouble"), error);
+      return false;
     }
   }
+}
+
+/** Gives the focus to what comes next in the card, if it was lost. */
+function focusNext() {
+  const active = document.activeElement;
+  const isLost = active === null || active === document.body || active.getClientRects().length === 0;
+  if (!isLost) return;
+  /** @type {HTMLElement | null} */
+  const next =
+    document.querySelector("#session-actions .primary") ??
+    document.querySelector("#session-actions button:not(.danger)") ??
+    document.querySelector("#session-actions button");
+  const inForm = byId("participant");
+  (byId("running").hidden ? inForm : next)?.focus();
 }
 
 /**
@@ -222,7 +262,12 @@ function drawFeed(session) {
 }
 
 /** @param {string} at */
+function clockOf(at) {
+  return new Date(at).toLocaleTimeString([], { hour12: false });
+}
+
+/** @param {string} at */
 function timeOf(at) {
-  const text = new Date(at).toLocaleTimeString([], { hour12: false });
+  const text = clockOf(at);
   return make("time", { dateTime: at, title: at }, text);
 }

@@ -10,12 +10,18 @@ export function isOver({ phase }) {
   return phase === "completed" || phase === "aborted";
 }
 
+/** @param {View} view whether the session has started and not ended */
+export function isUnderWay(view) {
+  return view.phase !== "ready" && !isOver(view);
+}
+
 /** @param {View} view */
-export function phaseWords({ phase, setting, settings }) {
+export function phaseWords(view) {
+  const { phase, setting, settings } = view;
   const which = `Setting ${setting} of ${settings}`;
   switch (phase) {
     case "ready":
-      return "Ready to start";
+      return lacksConsent(view) ? "Consent is missing" : "Ready to start";
     case "notice":
       return `${which}: waiting for the surgeon to tap`;
     case "inspecting":
@@ -83,7 +89,7 @@ export function consentWords(view) {
  * The buttons, in order.
  *
  * @param {View} view
- * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" }[]}
+ * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" | "danger filled" }[]}
  */
 export function deeds(view) {
   const { phase, paused, setting, withdrawn } = view;
@@ -97,19 +103,32 @@ export function deeds(view) {
     }
     if (!missing) all.push({ deed: "start", label: "Start", className: "primary" });
   }
+  // The pause comes first and asks nothing: in an emergency one tap has to do.
+  if (!paused && phase !== "ready" && !isOver(view)) {
+    all.push({ deed: "pause", label: "Pause", className: "danger filled" });
+  }
   if (paused) all.push({ deed: "resume", label: "Resume", className: "primary" });
   else if (phase === "inspecting") {
     all.push({ deed: "end-setting", label: `End setting ${setting} now…`, className: "" });
   }
 
-  if (!paused && phase !== "ready" && !isOver(view)) {
-    all.push({ deed: "pause", label: "Pause…", className: "" });
-  }
   if (isOver(view)) {
     all.push({ deed: "dismiss", label: "Close and prepare the next", className: "primary" });
     if (!withdrawn) all.push({ deed: "withdraw", label: "Participant withdraws…", className: "danger" });
   } else all.push({ deed: "abort", label: "Abort…", className: "danger" });
   return all;
+}
+
+/**
+ * Asks for the reason of a pause that has none yet.
+ *
+ * @param {string} clock when the session was paused, such as `14:03:20`
+ * @param {View["reason_wanted"]} wanted
+ */
+export function reasonWords(clock, wanted) {
+  if (!wanted) return "";
+  const who = wanted.by === "surgeon" ? "the surgeon" : "you";
+  return `Why ${who} paused at ${clock}, if it should be in the record`;
 }
 
 /**
@@ -137,4 +156,23 @@ export function commentWords(comment) {
 export function protocolWords({ researcher_title: title, settings, segment_seconds: seconds, practice }) {
   const length = `${title}: ${settings} settings of at most ${clockText(seconds)}`;
   return practice ? `${length}. This is practice, kept apart from real data.` : `${length}.`;
+}
+
+/**
+ * Protocols in the order in which they are offered: practice first, so that the real trial is never the nearest.
+ *
+ * @template {{ practice: boolean }} Protocol
+ * @param {Protocol[]} protocols
+ */
+export function practiceFirst(protocols) {
+  return [...protocols].sort((a, b) => Number(b.practice) - Number(a.practice));
+}
+
+/**
+ * A code as it was meant: `s01` is S01. What has no digit may be a name, which is never taken.
+ *
+ * @param {string} typed
+ */
+export function asCode(typed) {
+  return /\d/.test(typed) ? typed.toUpperCase() : typed;
 }

@@ -1,29 +1,18 @@
 // Shows the surgeon's link, to be copied. In a study the link opens only the session under way.
 
 import { get } from "../shared/api.js";
+import { copyOnPress } from "../shared/copy.js";
 import { byId, setText } from "../shared/dom.js";
 import { tellTrouble } from "../shared/trouble.js";
-
-const TOLD_MS = 2000;
 
 /** How often the link is asked for again. The server's address may change, for example with the network. */
 const ASK_AGAIN_MS = 60_000;
 
 export function offerLink() {
-  const button = byId("copy-link");
+  const button = byId("copy-link", HTMLButtonElement);
   const link = byId("surgeon-link", HTMLInputElement);
 
-  button.onclick = async () => {
-    link.select();
-    try {
-      await navigator.clipboard.writeText(link.value);
-    } catch {
-      // The clipboard interface is missing on plain http.
-      document.execCommand("copy");
-    }
-    setText(button, "Copied");
-    setTimeout(() => setText(button, "Copy link"), TOLD_MS);
-  };
+  copyOnPress(button, link);
   setInterval(askAgain, ASK_AGAIN_MS);
 }
 

@@ -3,6 +3,7 @@
 import { get, inWords, post } from "../shared/api.js";
 import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId, setText } from "../shared/dom.js";
+import { timeIn } from "../shared/text.js";
 import "../shared/sign_in.js";
 import {
   askErasure,
@@ -23,7 +24,7 @@ const study = page.study ?? "";
 
 /** @param {string} moment */
 function timeOfDay(moment) {
-  return new Date(moment).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+  return timeIn(moment, byId("zone").textContent ?? "");
 }
 
 /** Says what a surgeon's tablet may still hold; null if nothing is outstanding, or if the server does not answer. */
@@ -57,7 +58,7 @@ async function unblind() {
   const asked = {
     heading: isEmergency ? "Emergency unblinding" : "Unblind this session",
     consequence: study ? ofStudy : ended ? usual : emergency,
-    confirm: open ? "Unblind anyway" : undefined,
+    confirm: open ? "Unblind anyway, although a tablet may still hold comments or answers" : undefined,
     go: isEmergency ? "Unblind now" : "Unblind",
     danger: true,
   };

@@ -81,6 +81,7 @@ async function openPlayer(shown) {
       length: lengthOf(shown),
       moved: followPlayhead,
     });
+    byId("comment-list").classList.add("beside-player");
     byId("comments-play").hidden = shown.comments.length === 0;
     byId("timeline").addEventListener("click", seek);
   } catch (error) {
@@ -109,11 +110,14 @@ function seek(event) {
 
 /** @param {Api.TimelineComment[]} comments */
 function listComments(comments) {
+  setText(byId("comment-count"), comments.length === 0 ? "" : String(comments.length));
   lines = comments.map((comment, index) => {
     const words = commentWords(comment);
     const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);
-    const said = isSaid ? words : make("em", {}, words);
+    const kept = comment.withdrawn ? make("del", {}, words) : words;
+    const said = isSaid ? kept : make("em", {}, kept);
     const late = comment.late && make("span", { className: "badge warn" }, "late");
+    const back = comment.withdrawn && make("span", { className: "badge" }, "taken back at once");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make(
       "button",
@@ -124,7 +128,7 @@ function listComments(comments) {
       },
       make("span", { className: "when" }, clockText(comment.seconds)),
       make("span", { className: "muted" }, where),
-      make("span", { className: "said" }, said, late && " ", late),
+      make("span", { className: "said" }, said, late && " ", late, back && " ", back),
     );
   });
   const items = lines.map((line, index) => {
@@ -263,10 +267,12 @@ function hasMetric({ points }) {
 
 /** @param {Api.Timeline} shown */
 function showKey(shown) {
-  const { points, pauses } = shown;
+  const { points, pauses, absences, sights } = shown;
   byId("key-path").hidden = !withPath;
   byId("key-optimum").hidden = !(withPath && points.some(({ optimal }) => optimal != null));
   byId("key-pause").hidden = pauses.length === 0;
+  byId("key-absence").hidden = absences.length === 0;
+  byId("key-sight").hidden = sights.length === 0;
   byId("key-metric").hidden = !hasMetric(shown);
   byId("key-recorded").hidden = player === null;
 }

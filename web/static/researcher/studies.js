@@ -3,8 +3,10 @@
 import { inWords, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import "../shared/sign_in.js";
+import { Definition, exactText } from "./definition.js";
 
-const definition = byId("definition", HTMLTextAreaElement);
+const shown = byId("definition", HTMLTextAreaElement);
+const definition = new Definition();
 const go = byId("plan-go", HTMLButtonElement);
 
 /** The sites that were named. An empty list means all sites. */
@@ -15,7 +17,24 @@ function sites() {
 
 byId("file", HTMLInputElement).addEventListener("change", async (event) => {
   const chosen = /** @type {HTMLInputElement} */ (event.target).files?.[0];
-  if (chosen) definition.value = await chosen.text();
+  if (!chosen) return;
+  setText(byId("plan-trouble"), "");
+  try {
+    const text = exactText(await chosen.arrayBuffer());
+    shown.value = text;
+    definition.take(text, shown.value);
+  } catch {
+    setText(
+      byId("plan-trouble"),
+      `${chosen.name} is not a text in UTF-8: save it as UTF-8 and choose it again.`,
+    );
+  }
+});
+
+document.getElementById("template")?.addEventListener("click", (event) => {
+  const button = /** @type {HTMLButtonElement} */ (event.currentTarget);
+  shown.value = button.dataset.template ?? "";
+  shown.focus();
 });
 
 byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {
@@ -23,7 +42,7 @@ byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {
   go.disabled = true;
   try {
     const { study } = await post("/api/researcher/studies", {
-      definition: definition.value,
+      definition: definition.toSend(shown.value),
       sites: sites(),
       reason: byId("plan-reason", HTMLInputElement).value.trim(),
     });

@@ -1,6 +1,7 @@
 // The page of one study. Every change asks for a reason, and some changes for the passphrase again.
 
 import { get, post } from "../shared/api.js";
+import { copyOnPress } from "../shared/copy.js";
 import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId } from "../shared/dom.js";
 import "../shared/sign_in.js";
@@ -46,6 +47,7 @@ function confirmAndChange(ask, change) {
 
 function open() {
   const first = document.getElementById("commitment") === null;
+  const concerns = document.getElementById("concerns") !== null;
   askAndChange(
     {
       heading: first ? "Draw the orders and open the study" : "Open the study again",
@@ -53,9 +55,10 @@ function open() {
         ? "The orders of all places are drawn now, once. Then this page shows the line that commits to them. " +
           "Nobody is shown an order."
         : "Sessions can be made in it again. Its orders stay as they were drawn.",
+      confirm: concerns ? "Open it although this plan cannot work as it is meant" : undefined,
       go: first ? "Draw and open" : "Open",
     },
-    { change: "open" },
+    { change: "open", despite_concerns: concerns },
   );
 }
 
@@ -134,6 +137,9 @@ for (const [id, action] of Object.entries(actions)) {
 for (const button of document.querySelectorAll("button")) {
   if (button.dataset.withdraw) button.addEventListener("click", () => withdraw(button));
 }
+
+const copy = document.getElementById("copy-commitment");
+if (copy instanceof HTMLButtonElement) copyOnPress(copy, byId("commitment"));
 
 // A study without a session has nothing to export.
 if (document.getElementById("export")) showExport(study);

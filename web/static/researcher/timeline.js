@@ -22,8 +22,8 @@ const TICK_WIDTH = 90;
  *
  * @param {Timeline} timeline
  */
-export function lengthOf({ settings, pauses, points, comments, set_aside: setAside }) {
-  const spans = [...settings, ...pauses].map(({ from, to }) => to ?? from);
+export function lengthOf({ settings, pauses, absences, points, comments, set_aside: setAside }) {
+  const spans = [...settings, ...pauses, ...absences].map(({ from, to }) => to ?? from);
   const moments = [...points.slice(-1), ...comments, ...setAside].map(({ seconds }) => seconds);
   return Math.max(1, ...spans, ...moments);
 }

@@ -5,10 +5,14 @@ import { make } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
 import { movePlayhead, playheadLine, shape } from "./svg.js";
 import { HEIGHT, linePath, powerAt, powerOf, Scale } from "./timeline.js";
-import { commentWords, description, setAsideWords } from "./timeline_words.js";
+import { commentWords, description, setAsideWords, sightWords } from "./timeline_words.js";
 
 /** The height of the strip that marks what was recorded, in pixels. */
 const STRIP = 4;
+
+/** The height of the strip for the largest picture that a surgeon can see, in pixels, and the width of that picture. */
+const SIGHT = 8;
+const WIDEST = 2048;
 
 /** A setting narrower than this, in pixels, shows its number alone. */
 const ROOM_FOR_A_NAME = 70;
@@ -54,6 +58,8 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
   svg.append(
     ...timeline.settings.flatMap((setting) => settingShapes(setting, policies, scale)),
     ...pauseShapes(timeline.pauses, scale),
+    ...timeline.sights.map((sight) => sightShape(sight, scale)),
+    ...timeline.absences.map((absence) => absenceShape(absence, scale)),
     ...recorded.map((span) => recordedShape(span, scale)),
     ...axes(scale, withPath),
     shape("path", { class: "optimum", d: linePath(points, ({ optimal }) => optimal, scale) }),
@@ -80,6 +86,33 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
 function recordedShape(span, scale) {
   const { x, width } = scale.box(span, 1);
   return shape("rect", { class: "recorded", x, width, y: scale.y(0) - STRIP, height: STRIP });
+}
+
+/**
+ * A strip at the head of the plot that says in its title what size of picture the surgeon saw; the smaller, the lower.
+ *
+ * @param {Timeline["sights"][number]} sight
+ * @param {Scale} scale
+ */
+function sightShape(sight, scale) {
+  const { x, width } = scale.box(sight, 1);
+  const height = Math.max(2, (SIGHT * sight.width) / WIDEST);
+  const strip = shape("rect", { class: "sight", x, width, y: scale.y(1) + SIGHT - height, height });
+  strip.append(shape("title", {}, sightWords(sight)));
+  return strip;
+}
+
+/**
+ * A bar at the head of the plot for a span of time in which no tablet showed the surgeon's page.
+ *
+ * @param {Timeline["absences"][number]} absence
+ * @param {Scale} scale
+ */
+function absenceShape(absence, scale) {
+  const { x, width } = scale.box(absence, 2);
+  const bar = shape("rect", { class: "absence", x, width, y: scale.y(1), height: SIGHT });
+  bar.append(shape("title", {}, absence.reason));
+  return bar;
 }
 
 /**

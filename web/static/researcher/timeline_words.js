@@ -10,9 +10,10 @@ import { counted } from "../shared/text.js";
  * @param {Timeline} timeline
  * @param {boolean} withPath whether the focal path is drawn
  */
-export function description({ settings, pauses, comments, set_aside: setAside }, withPath) {
+export function description({ settings, pauses, absences, comments, set_aside: setAside }, withPath) {
   const parts = [counted(settings.length, "setting")];
   if (pauses.length > 0) parts.push(counted(pauses.length, "pause"));
+  if (absences.length > 0) parts.push(`${counted(absences.length, "time")} without the surgeon’s tablet`);
   if (setAside.length > 0) {
     parts.push(counted(setAside.length, "answer that does not count", "answers that do not count"));
   }
@@ -20,6 +21,11 @@ export function description({ settings, pauses, comments, set_aside: setAside },
 
   const what = withPath ? "Focal power over time" : "Timeline";
   return `${what}: ${parts.join(", ")}. The comments follow as a list.`;
+}
+
+/** @param {Timeline["sights"][number]} sight */
+export function sightWords({ width, height, per_second: rate }) {
+  return `The surgeon saw ${width}×${height}, ${rate.toFixed(1)} pictures a second`;
 }
 
 /** @param {Api.TimelineComment} comment */

@@ -9,6 +9,8 @@ export const LONGEST = 1;
 export class Track {
   /** @type {{ seconds: number, recording: Recording, frame: number }[]} */
   #frames;
+  /** For each frame, the first frame of what was recorded without a gap. @type {number[]} */
+  #begun = [];
 
   /** @param {Recording[]} recordings */
   constructor(recordings) {
@@ -16,6 +18,10 @@ export class Track {
       recording.times_ms.map((ms, frame) => ({ seconds: recording.from + ms / 1000, recording, frame })),
     );
     this.#frames = frames.sort((a, b) => a.seconds - b.seconds);
+    for (const [index, { seconds }] of this.#frames.entries()) {
+      const isNext = index > 0 && seconds - this.secondsOf(index - 1) <= LONGEST;
+      this.#begun.push(isNext ? this.begunAt(index - 1) : index);
+    }
   }
 
   get length() {
@@ -65,6 +71,15 @@ export class Track {
   at(seconds) {
     const index = this.before(seconds);
     return index >= 0 && seconds - this.secondsOf(index) <= LONGEST ? index : null;
+  }
+
+  /**
+   * The first frame of what was recorded without a gap up to frame `index`.
+   *
+   * @param {number} index
+   */
+  begunAt(index) {
+    return this.#begun[index] ?? index;
   }
 
   /** Frames per second, from the median time between frames; 0 if there are fewer than two frames. */

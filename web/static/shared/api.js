@@ -56,20 +56,39 @@ function request(method, path, body) {
 }
 
 /**
+ * Runs `request` with a signal that ends it after a while, or when `other` does. Tablets that are
+ * still in use lack the signals that could be combined for this.
+ *
+ * @template Answer
+ * @param {(signal: AbortSignal) => Promise<Answer>} request
+ * @param {AbortSignal} [other]
+ */
+async function withPatience(request, other) {
+  const controller = new AbortController();
+  const abort = () => controller.abort();
+  const timer = setTimeout(abort, PATIENCE_MS);
+  other?.addEventListener("abort", abort);
+  if (other?.aborted) abort();
+  try {
+    return await request(controller.signal);
+  } finally {
+    clearTimeout(timer);
+    other?.removeEventListener("abort", abort);
+  }
+}
+
+/**
  * @param {string} path
  * @param {RequestInit} asked
  * @returns {Promise<{ status: number, body: any }>}
  */
-async function ask(path, asked) {
-  const response = await fetch(path, {
-    ...asked,
-    signal: AbortSignal.timeout(PATIENCE_MS),
-    cache: "no-store",
+function ask(path, asked) {
+  return withPatience(async (signal) => {
+    const response = await fetch(path, { ...asked, signal, cache: "no-store" });
+    const text = await response.text();
+    if (!response.ok) throw refusal(text, response.status);
+    return { status: response.status, body: text ? JSON.parse(text) : null };
   });
-
-  const text = await response.text();
-  if (!response.ok) throw refusal(text, response.status);
-  return { status: response.status, body: text ? JSON.parse(text) : null };
 }
 
 /**
@@ -126,13 +145,13 @@ export async function get(path, names = {}) {
  * @param {Record<string, string>} query
  * @param {AbortSignal} signal ends the request when it is no longer needed
  */
-export async function getPicture(path, names, query, signal) {
-  const response = await fetch(`${fill(path, names)}?${new URLSearchParams(query)}`, {
-    signal: AbortSignal.any([signal, AbortSignal.timeout(PATIENCE_MS)]),
-    cache: "no-store",
-  });
-  if (!response.ok) throw refusal(await response.text(), response.status);
-  return response.blob();
+export function getPicture(path, names, query, signal) {
+  const address = `${fill(path, names)}?${new URLSearchParams(query)}`;
+  return withPatience(async (ending) => {
+    const response = await fetch(address, { signal: ending, cache: "no-store" });
+    if (!response.ok) throw refusal(await response.text(), response.status);
+    return response.blob();
+  }, signal);
 }
 
 /**

@@ -1,6 +1,6 @@
 // The live connection: one WebSocket per page, for pictures and state. It reconnects by itself.
 
-import { drawAndAcknowledge } from "./pacing.js";
+import { Pictures } from "./pacing.js";
 import { Reconnection } from "./reconnection.js";
 
 const LOOK_MS = 1000;
@@ -97,6 +97,7 @@ export class Live {
     const socket = new WebSocket(`${scheme}//${location.host}/live?role=${this.#role}`);
     socket.binaryType = "arraybuffer";
     this.#reconnection.heard(performance.now());
+    const pictures = this.#pictures(socket);
 
     socket.onopen = () => {
       if (socket !== this.#socket) return;
@@ -110,7 +111,7 @@ export class Live {
       this.#reconnection.heard(performance.now());
       for (const listener of this.#listeners) listener.heard?.();
       if (typeof data === "string") this.#hear(JSON.parse(data));
-      else this.#show(socket, data);
+      else pictures.take(data);
     };
     socket.onclose = ({ code }) => this.#lost(socket, code);
     this.#socket = socket;
@@ -139,20 +140,17 @@ export class Live {
     }
   }
 
-  /**
-   * @param {WebSocket} socket
-   * @param {ArrayBuffer} message
-   */
-  async #show(socket, message) {
-    const receivedAt = performance.now();
-    await drawAndAcknowledge(message, {
+  /** @param {WebSocket} socket */
+  #pictures(socket) {
+    return new Pictures({
       decode: (jpeg) => createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })),
-      draw: (header, bitmap) => {
+      draw: (header, bitmap, receivedAt) => {
         for (const listener of this.#listeners) listener.frame?.({ header, bitmap, receivedAt });
         bitmap.close();
       },
-      acknowledge: (frame) => send(socket, { type: "drawn", frame }),
+      acknowledge: (frame, held, shown) => send(socket, { type: "drawn", frame, held, shown }),
       complain: (error) => console.warn("a picture could not be shown", error),
+      now: () => performance.now(),
     });
   }
 

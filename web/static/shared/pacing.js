@@ -1,5 +1,5 @@
-// The page asks for the next picture by acknowledging the previous one, once that is on screen. So a slow tablet or a
-// poor network gets fewer pictures, but never old ones.
+// The page asks for further pictures by acknowledging each one, once it is on screen. So a slow tablet or a poor network
+// gets fewer pictures, but never old ones.
 
 /**
  * Length of a frame message's first field. The field holds the length of the header: u16, little-endian.
@@ -19,24 +19,64 @@ export function readFrame(message) {
 }
 
 /**
- * Decodes and draws the picture of `message`, then acknowledges it.
+ * @template Picture
+ * @typedef {object} Page
+ * @property {(jpeg: Uint8Array<ArrayBuffer>) => Promise<Picture>} decode
+ * @property {(header: Stream.Header, picture: Picture, receivedAt: number) => void} draw
+ * @property {(frame: number, held: number, shown: boolean) => void} acknowledge `held` is for how many milliseconds
+ *   the page had the picture
+ * @property {(error: unknown) => void} complain
+ * @property {() => number} now milliseconds
+ */
+
+/**
+ * Draws pictures in the order in which they arrive, and acknowledges each. Several may be under way at a time. If the
+ * page falls behind, it draws only the newest.
  *
  * @template Picture
- * @param {ArrayBuffer} message
- * @param {object} page
- * @param {(jpeg: Uint8Array<ArrayBuffer>) => Promise<Picture>} page.decode
- * @param {(header: Stream.Header, picture: Picture) => void} page.draw
- * @param {(frame: number) => void} page.acknowledge
- * @param {(error: unknown) => void} page.complain
  */
-export async function drawAndAcknowledge(message, { decode, draw, acknowledge, complain }) {
-  const { header, jpeg } = readFrame(message);
-  try {
-    draw(header, await decode(jpeg));
-  } catch (error) {
-    complain(error);
+export class Pictures {
+  #page;
+  /** @type {{ message: ArrayBuffer, receivedAt: number }[]} */
+  #waiting = [];
+  #isDrawing = false;
+
+  /** @param {Page<Picture>} page */
+  constructor(page) {
+    this.#page = page;
   }
 
-  // A picture that could not be shown is acknowledged too: the next one may be good.
-  acknowledge(header.frame);
+  /** @param {ArrayBuffer} message */
+  async take(message) {
+    this.#waiting.push({ message, receivedAt: this.#page.now() });
+    if (this.#isDrawing) return;
+
+    this.#isDrawing = true;
+    for (let next = this.#waiting.shift(); next; next = this.#waiting.shift()) {
+      await this.#draw(next.message, next.receivedAt, this.#waiting.length > 0);
+    }
+    this.#isDrawing = false;
+  }
+
+  /**
+   * @param {ArrayBuffer} message
+   * @param {number} receivedAt
+   * @param {boolean} isOld whether a newer picture waits
+   */
+  async #draw(message, receivedAt, isOld) {
+    const { decode, draw, acknowledge, complain, now } = this.#page;
+    const { header, jpeg } = readFrame(message);
+    let shown = false;
+    try {
+      if (!isOld) {
+        draw(header, await decode(jpeg), receivedAt);
+        shown = true;
+      }
+    } catch (error) {
+      complain(error);
+    }
+
+    // A picture that could not be shown is acknowledged too: the next one may be good.
+    acknowledge(header.frame, now() - receivedAt, shown);
+  }
 }

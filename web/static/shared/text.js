@@ -21,6 +21,23 @@ export function minuteText(millis) {
 }
 
 /**
+ * The time of day in `zone`, as `14:02`. If this browser does not know the zone, its own is used and named.
+ *
+ * @param {string} moment
+ * @param {string} zone such as `Europe/London`
+ */
+export function timeIn(moment, zone) {
+  const date = new Date(moment);
+  /** @type {Intl.DateTimeFormatOptions} */
+  const minute = { hour: "2-digit", minute: "2-digit", hour12: false };
+  try {
+    return date.toLocaleTimeString("en-GB", { ...minute, timeZone: zone });
+  } catch {
+    return date.toLocaleTimeString("en-GB", { ...minute, timeZoneName: "short" });
+  }
+}
+
+/**
  * `1 comment`, `2 comments`.
  *
  * @param {number} count

@@ -24,11 +24,8 @@ export class Viewer {
   #overlay = makeCanvas("viewer-overlay");
   #stale = make("p", { className: "viewer-stale", "aria-hidden": "true" });
   #heard = make("p", { className: "viewer-heard visually-hidden", role: "status" });
-  #colour = make(
-    "p",
-    { className: "viewer-colour", hidden: true },
-    "Estimated colours: the camera measures no red light.",
-  );
+  /** Says that the colours are estimated. It stands beside the view, because over it lies tissue. */
+  #colour;
   #unzoom = make("button", { type: "button", className: "viewer-unzoom", hidden: true });
   #fit = new Fit({ glides: !matchMedia("(prefers-reduced-motion: reduce)").matches });
   #framing = new Framing();
@@ -40,23 +37,19 @@ export class Viewer {
   /** @type {{ header: Stream.Header, receivedAt: number } | null} */
   #last = null;
   #connected = false;
+  #ended = false;
 
   /**
    * @param {HTMLElement} element
    * @param {"surgeon" | "operator" | "researcher"} role
+   * @param {HTMLElement} colour shown while the colours are estimated
    */
-  constructor(element, role) {
+  constructor(element, role, colour) {
     this.#element = element;
+    this.#colour = colour;
     this.#picture.canvas.setAttribute("role", "img");
     this.#picture.canvas.setAttribute("aria-label", "Live view");
-    element.append(
-      this.#picture.canvas,
-      this.#overlay.canvas,
-      this.#colour,
-      this.#unzoom,
-      this.#stale,
-      this.#heard,
-    );
+    element.append(this.#picture.canvas, this.#overlay.canvas, this.#unzoom, this.#stale, this.#heard);
     element.tabIndex = 0;
     element.setAttribute("role", "group");
     element.setAttribute("aria-label", "Live view. Plus and minus zoom, zero shows everything.");
@@ -96,9 +89,11 @@ export class Viewer {
     return this.#last?.header.run ?? null;
   }
 
-  /** Milliseconds since the picture on screen was exposed; null before the first. */
+  /** Milliseconds since the picture on screen was exposed, its way to this page included; null before the first. */
   get age() {
-    return this.#last && this.#last.header.age + performance.now() - this.#last.receivedAt;
+    if (!this.#last) return null;
+    const { header, receivedAt } = this.#last;
+    return header.age + header.travel + performance.now() - receivedAt;
   }
 
   /**
@@ -111,6 +106,14 @@ export class Viewer {
     if (on) this.#shown.add(name);
     else this.#shown.delete(name);
     this.#drawOverlays();
+  }
+
+  /** Shows no picture any more, and says nothing of one: the page's link is over. */
+  end() {
+    this.#ended = true;
+    this.#element.hidden = true;
+    setText(this.#heard, "");
+    this.#colour.hidden = true;
   }
 
   /** @param {Stream.Frame} frame */
@@ -181,6 +184,7 @@ export class Viewer {
   }
 
   #tellAge() {
+    if (this.#ended) return;
     const { age } = this;
     const isStale = age === null || age > STALE_MS;
     this.#element.classList.toggle("viewer-is-stale", isStale);

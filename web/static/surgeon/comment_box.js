@@ -2,9 +2,13 @@
 
 import { byId, make, setText } from "../shared/dom.js";
 import { followDrafts } from "./device.js";
+import { isKeyboardUp } from "./room.js";
 
 /** A second tap on the same button within this time is ignored. */
-const SAME_TAP_MS = 700;
+const SAME_TAP_MS = 1000;
+
+/** For this long a comment can be taken back. */
+const UNDO_MS = 5000;
 
 /** A text longer than this gets a taller box. */
 const TALL_LETTERS = 90;
@@ -14,13 +18,17 @@ const TALL_LETTERS = 90;
  *
  * @param {import("./comments.js").Comments} comments
  * @param {import("./outbox.js").Outbox} outbox
+ * @param {import("./voice_outbox.js").VoiceOutbox} voice
  */
-export function commentBox(comments, outbox) {
+export function commentBox(comments, outbox, voice) {
   const box = byId("comment", HTMLTextAreaElement);
   const mark = byId("mark", HTMLButtonElement);
   const send = byId("send", HTMLButtonElement);
   const elsewhere = byId("elsewhere");
   const quick = byId("quick");
+  const undo = byId("undo", HTMLButtonElement);
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let undoTimer;
   /** Buttons tapped a moment ago. @type {Set<HTMLElement>} */
   const tapped = new Set();
   let quickDrawn = "[]";
@@ -30,9 +38,11 @@ export function commentBox(comments, outbox) {
     comments.follow(state);
     box.disabled = comments.disabled;
     byId("compose").hidden = comments.disabled && state !== null;
-    box.placeholder = state ? "Write what you see" : "Comments are kept once a trial begins";
-
+    if (!state) endUndo();
     const looking = state?.phase === "inspecting";
+    const invitation = looking ? "Write what you see" : "Write a comment";
+    box.placeholder = state ? invitation : "Comments are kept once a trial begins";
+
     mark.hidden = !looking;
     drawQuick(looking ? state.quick_comments : []);
     draw();
@@ -82,7 +92,9 @@ export function commentBox(comments, outbox) {
    * @param {import("./comments.js").Said} what
    */
   function tap(button, what) {
-    if (tapped.has(button) || !comments.say(what)) return;
+    const entry = tapped.has(button) ? null : comments.say(what);
+    if (!entry) return;
+    offerUndo(entry);
     tapped.add(button);
     button.classList.add("taken");
     setTimeout(() => {
@@ -92,9 +104,32 @@ export function commentBox(comments, outbox) {
   }
 
   function submit() {
-    if (!comments.submit()) return;
+    const entry = comments.submit();
+    if (!entry) return;
+    offerUndo(entry);
     draw();
-    box.focus();
+    // A box that takes the focus by itself would keep a tablet's keyboard up, over the picture.
+    if (isKeyboardUp()) box.blur();
+    else box.focus();
+  }
+
+  /** @param {import("./outbox.js").Entry} entry */
+  function offerUndo(entry) {
+    clearTimeout(undoTimer);
+    undo.hidden = false;
+    undo.setAttribute("aria-label", `Undo: ${entry.body.text ?? "the mark"}`);
+    undo.onclick = () => {
+      endUndo();
+      comments.withdraw(entry);
+    };
+    undoTimer = setTimeout(endUndo, UNDO_MS);
+  }
+
+  function endUndo() {
+    clearTimeout(undoTimer);
+    // The focus goes back to where one writes on, unless that would open a keyboard.
+    if (document.activeElement === undo) undo.blur();
+    undo.hidden = true;
   }
 
   /** @param {string | null} [taken] */
@@ -107,6 +142,7 @@ export function commentBox(comments, outbox) {
     comments.hear(change);
     draw();
   });
+  voice.subscribe(draw);
   followDrafts(followOtherTabs);
   // A page that was asleep may have missed an event.
   document.addEventListener("visibilitychange", () => followOtherTabs());

@@ -19,10 +19,12 @@ const OFFERED_LETTERS = 16;
  * @property {number} setting
  * @property {number | null} frame
  * @property {number | null} run
+ * @property {number | null} [picture_width] width of the picture, in pixels
+ * @property {number | null} [pictures_per_second]
  */
 
 /** @typedef {Omit<Place, "session">} Begun where a comment was begun */
-/** @typedef {{ kind: "text" | "quick", text: string } | { kind: "mark" }} Said */
+/** @typedef {{ kind: "text" | "quick" | "withdrawal", text: string } | { kind: "mark" }} Said */
 
 /**
  * A comment in the form that the server expects.
@@ -30,8 +32,10 @@ const OFFERED_LETTERS = 16;
  * @param {Said} what
  * @param {Partial<Place>} place
  */
-function comment(what, { session, segment = null, frame = null, run = null }) {
-  return { session, segment, frame, run, ...what };
+function comment(what, place) {
+  const { session, segment = null, frame = null, run = null } = place;
+  const { picture_width = null, pictures_per_second = null } = place;
+  return { session, segment, frame, run, picture_width, pictures_per_second, ...what };
 }
 
 /** @param {import("./drafts.js").Found} draft */
@@ -49,6 +53,7 @@ export class Comments {
   #outbox;
   #drafts;
   #here;
+  #voice;
   /** The number of each setting that was on screen, by its segment. @type {Map<string, number>} */
   #numbers = new Map();
   /** @type {import("./drafts.js").Draft | null} */
@@ -64,11 +69,13 @@ export class Comments {
    * @param {import("./outbox.js").Outbox} outbox
    * @param {import("./drafts.js").Drafts} drafts
    * @param {() => Place | null} here null outside a session
+   * @param {Pick<import("./voice_outbox.js").VoiceOutbox, "heldUp" | "durable" | "trouble">} voice
    */
-  constructor(outbox, drafts, here) {
+  constructor(outbox, drafts, here, voice) {
     this.#outbox = outbox;
     this.#drafts = drafts;
     this.#here = here;
+    this.#voice = voice;
   }
 
   /** @param {Api.SurgeonView | null} state */
@@ -178,30 +185,46 @@ export class Comments {
     this.#draft?.write(text === "" ? null : { text, begun: this.#begun });
   }
 
-  /** Sends the text in the box. Returns whether there was anything to send. */
+  /** Sends the text in the box. Returns the entry; null if there was nothing to send. */
   submit() {
     const here = this.#here();
     const text = this.text.trim();
-    if (!here || text === "") return false;
+    if (!here || text === "") return null;
 
     // The comment counts as made now, no matter when it was begun.
     const { key } = this.#draft?.take() ?? {};
-    this.#outbox.add(PATH, comment({ kind: "text", text }, { ...here, ...this.#begun }), null, { key });
+    const said = comment({ kind: "text", text }, { ...here, ...this.#begun });
+    const entry = this.#outbox.add(PATH, said, null, { key });
     this.write("");
     this.trouble = "";
-    return true;
+    return entry;
   }
 
   /**
-   * Sends a quick comment or a mark. Returns false if there is no session to which it could belong.
+   * Sends a quick comment or a mark. Returns the entry; null if there is no session to which it could belong.
    *
    * @param {Said} what
    */
   say(what) {
     const here = this.#here();
-    if (!here) return false;
-    this.#outbox.add(PATH, comment(what, here));
-    return true;
+    return here && this.#outbox.add(PATH, comment(what, here));
+  }
+
+  /**
+   * Takes back a comment. It stays in the record, marked as taken back.
+   *
+   * @param {import("./outbox.js").Entry} entry
+   */
+  withdraw({ body }) {
+    const { key, session, segment, frame, run } = body;
+    this.#outbox.add(PATH, comment({ kind: "withdrawal", text: key }, { session, segment, frame, run }));
+  }
+
+  /** How many comments wait. One that was taken back is no longer told. */
+  get #waiting() {
+    const bodies = this.#outbox.waiting.filter(({ path }) => path === PATH).map(({ body }) => body);
+    const withdrawn = new Set(bodies.filter(({ kind }) => kind === "withdrawal").map(({ text }) => text));
+    return bodies.filter(({ kind, key }) => kind !== "withdrawal" && !withdrawn.has(key)).length;
   }
 
   /**
@@ -223,8 +246,9 @@ export class Comments {
 
     if (body.kind === "text") {
       this.#outbox.forget(entry);
-      const setting = this.#numbers.get(body.segment) ?? 0;
-      this.#begun ??= { segment: body.segment, setting, frame: body.frame, run: body.run };
+      const { segment, frame, run, picture_width, pictures_per_second } = body;
+      const setting = this.#numbers.get(segment) ?? 0;
+      this.#begun ??= begunAt({ segment, setting, frame, run, picture_width, pictures_per_second });
       this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
     }
     this.trouble = `${refusedWords(body)}: ${reason}`;
@@ -240,33 +264,36 @@ export class Comments {
   }
 
   /**
-   * Whether all comments are saved, with the text to show.
+   * Whether all comments are saved, with the text to show. Recordings that wait with them are told on the same line.
    *
    * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
    */
   get status() {
-    const waiting = this.#outbox.waiting.filter((entry) => entry.path === PATH).length;
-    if (waiting === 0) {
+    const waiting = this.#waiting;
+    const recordings = this.#voice.heldUp;
+    if (waiting === 0 && recordings === 0) {
       return { kind: "saved", text: this.#saved === 0 ? "" : `${counted(this.#saved, "comment")} saved` };
     }
 
-    const { trouble, durable } = this.#outbox;
-    if (trouble === null) return { kind: "saving", text: "Saving…" };
-    return { kind: "unsaved", text: `${heldWords(counted(waiting, "comment"), durable)} ${trouble}` };
+    const trouble = this.#outbox.trouble ?? this.#voice.trouble;
+    if (trouble === null && recordings === 0) return { kind: "saving", text: "Saving…" };
+    const durable = this.#outbox.durable && this.#voice.durable;
+    return { kind: "unsaved", text: heldWords({ comments: waiting, recordings, durable, trouble }) };
   }
 }
 
 /**
- * @param {Place} place
+ * @param {Begun} place
  * @returns {Begun}
  */
-function begunAt({ segment, setting, frame, run }) {
-  return { segment, setting, frame, run };
+function begunAt({ segment, setting, frame, run, picture_width = null, pictures_per_second = null }) {
+  return { segment, setting, frame, run, picture_width, pictures_per_second };
 }
 
 /** @param {Record<string, any>} body */
 function refusedWords({ kind, text }) {
   if (kind === "text") return "The comment was not saved and is back in the box";
   if (kind === "mark") return "The mark was not saved";
+  if (kind === "withdrawal") return "The comment was not taken back";
   return `“${text}” was not saved`;
 }

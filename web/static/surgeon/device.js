@@ -13,7 +13,7 @@ import { VoiceOutbox } from "./voice_outbox.js";
 
 const TAB = "parfocal.tab";
 
-const store = storeOn(() => localStorage);
+export const store = storeOn(() => localStorage);
 const tabStore = storeOn(() => sessionStorage);
 export const clock = { page: () => performance.now(), wall: () => Date.now() };
 const tab = tabStore.read(TAB) ?? uuid();

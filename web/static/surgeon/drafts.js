@@ -63,16 +63,14 @@ export class Drafts {
   }
 
   /**
-   * The draft in `slot`; null if there is none. Older versions of the page stored the value alone.
+   * The draft in `slot`; null if there is none.
    *
    * @param {string} slot
    * @returns {Kept | null}
    */
   #read(slot) {
     try {
-      const kept = JSON.parse(this.#store.read(slot) ?? "null");
-      if (kept === null) return null;
-      return kept.given ? kept : { key: this.#newId(), given: this.#origins.stamp(), value: kept };
+      return JSON.parse(this.#store.read(slot) ?? "null");
     } catch {
       return null;
     }

@@ -51,29 +51,65 @@ function recordedType() {
  */
 
 /**
- * Opens the microphone and records until it is stopped.
+ * The microphone, open for as long as a session may use it: a browser may ask again at each opening, and takes a moment
+ * each time. Between the recordings nothing listens to it.
+ *
+ * @type {{ stream: MediaStream, meter: Meter } | null}
+ */
+let opened = null;
+
+/**
+ * Opens the microphone, unless it is open. Called in a tap, it also wakes the meter, which browsers keep silent until
+ * then.
+ */
+export async function openMicrophone() {
+  const isOpen = opened?.stream.getTracks().every(({ readyState }) => readyState === "live");
+  if (opened && isOpen) {
+    opened.meter.wake();
+    return opened;
+  }
+  closeMicrophone();
+  // Made in the tap itself, before anything is awaited: later the browser would no longer let it sound.
+  const meter = makeMeter();
+  const stream = await askForMicrophone();
+  meter.listen(stream);
+  opened = { stream, meter };
+  return opened;
+}
+
+/** Closes the microphone, because the session is over. */
+export function closeMicrophone() {
+  for (const track of opened?.stream.getTracks() ?? []) track.stop();
+  opened?.meter.close();
+  opened = null;
+}
+
+/** Whether the browser lets this page use the microphone without asking. */
+export async function mayOpenMicrophone() {
+  try {
+    const name = /** @type {PermissionName} */ ("microphone");
+    return (await navigator.permissions.query({ name })).state === "granted";
+  } catch {
+    return false;
+  }
+}
+
+/**
+ * Records from the microphone until it is stopped.
  *
  * @param {Heard} heard
  * @returns {Promise<Recording>}
  */
 export async function record(heard) {
-  const stream = await openMicrophone();
+  const { stream, meter } = await openMicrophone();
   const type = recordedType() ?? "";
-  const meter = levelOf(stream);
-  const release = () => {
-    for (const track of stream.getTracks()) track.stop();
-    meter.close();
-  };
 
   try {
     const recorder = new MediaRecorder(stream, { mimeType: type, audioBitsPerSecond: BITS_PER_SECOND });
     recorder.onstart = heard.started;
     recorder.ondataavailable = ({ data }) => data.size > 0 && heard.piece(data);
     recorder.onerror = heard.lost;
-    recorder.onstop = () => {
-      release();
-      heard.stopped();
-    };
+    recorder.onstop = heard.stopped;
     for (const track of stream.getTracks()) track.onended = heard.lost;
 
     recorder.start(PIECE_MS);
@@ -85,12 +121,12 @@ export async function record(heard) {
       },
     };
   } catch {
-    release();
+    closeMicrophone();
     throw new MicrophoneTrouble("This browser could not begin to record. Type your comment.");
   }
 }
 
-async function openMicrophone() {
+async function askForMicrophone() {
   try {
     return await navigator.mediaDevices.getUserMedia({ audio: true });
   } catch (error) {
@@ -119,26 +155,32 @@ export function refusalWords(name) {
   }
 }
 
+/** @typedef {{ listen: (stream: MediaStream) => void, wake: () => void, level: () => number, close: () => void }} Meter */
+
 /**
  * Measures how loud a stream is. If that is impossible, the level is 0 and the recording continues.
  *
- * @param {MediaStream} stream
+ * @returns {Meter}
  */
-function levelOf(stream) {
+function makeMeter() {
   try {
     const context = new AudioContext();
     const analyser = context.createAnalyser();
-    context.createMediaStreamSource(stream).connect(analyser);
     const samples = new Float32Array(analyser.fftSize);
+    // Browsers begin with a context that stands still, unless it is woken in a tap.
+    const wake = () => void context.resume().catch(() => {});
+    wake();
     return {
+      listen: (stream) => context.createMediaStreamSource(stream).connect(analyser),
+      wake,
       level: () => {
         analyser.getFloatTimeDomainData(samples);
         return loudness(samples);
       },
-      close: () => void context.close(),
+      close: () => void context.close().catch(() => {}),
     };
   } catch {
-    return { level: () => 0, close: () => {} };
+    return { listen: () => {}, wake: () => {}, level: () => 0, close: () => {} };
   }
 }
 

@@ -1,8 +1,7 @@
 // Decides whether a tap or a key is meant for the full-screen notice at a change of setting. A tap that began before
 // the notice appeared is not, nor is the second half of a double tap, nor are keys of a comment that is being typed.
 
-/** A tap this soon after the notice appeared was meant for what was there before. */
-const NOT_MEANT_MS = 600;
+import { NOT_MEANT_MS } from "./tap_guard.js";
 
 /** A key this soon after another one belongs to a text that is being typed. */
 const TYPING_MS = 600;

@@ -54,7 +54,7 @@ export function noticeDialog(box, accept) {
     setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
     setText(
       byId("change-what"),
-      `${change} Look around as you would in surgery, and say or write what you notice.`,
+      `${change} Look around as you would in surgery, and ${state.voice ? "say or write" : "write"} what you notice.`,
     );
     byId("change-practice").hidden = !state.practice;
     ask(TAP);
@@ -69,7 +69,12 @@ export function noticeDialog(box, accept) {
     if (!dialog.open) return;
     segment = null;
     dialog.close();
-    if (focusBefore instanceof HTMLElement && focusBefore.isConnected) focusBefore.focus();
+    // What had the focus may be gone. A box that nobody was writing in would open the tablet's keyboard.
+    const isWriting = focusBefore === box && box.value !== "";
+    const before = focusBefore instanceof HTMLElement && focusBefore !== document.body ? focusBefore : null;
+    const isThere = before !== null && before.getClientRects().length > 0;
+    if (isThere && (before !== box || isWriting)) before.focus();
+    else byId("view").focus({ preventScroll: true });
   }
 
   /** @param {string} text */

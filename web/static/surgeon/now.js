@@ -16,14 +16,18 @@ import { minuteText } from "../shared/text.js";
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} unsent whether there is a comment in the box
  * @property {boolean} unsaved whether any comment or answer is not saved yet
+ * @property {boolean} soon whether the setting's time ends in a moment
+ * @property {boolean} over whether this tablet's link has ended; `view` is then the end of its session, or null
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved }) {
+export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved, soon, over }) {
+  if (over && view !== null) return endWords(view, unsent, unsaved);
+  if (over) return unsaved ? KEEP_OPEN : "Scan the operator’s code to open the next session.";
   if (missed) return unreachableWords(view, heardAt, refused);
   if (!known) return "Connecting to the server…";
   if (view === null) return "Nothing to do yet: wait for the operator to start a trial.";
-  if (view.phase === "completed" || view.phase === "aborted") return endWords(unsent, unsaved);
+  if (view.phase === "completed" || view.phase === "aborted") return endWords(view, unsent, unsaved);
   if (view.paused) {
     return view.may_resume
       ? "Press “Continue” when you are ready."
@@ -36,7 +40,8 @@ export function nowWords({ view, known, missed, heardAt, refused, unsent, unsave
     case "notice":
       return `Tap to begin setting ${view.setting}.`;
     case "inspecting":
-      return "Look around and say what you notice. Then finish the setting.";
+      if (soon) return "This setting ends in a moment. What you are writing stays.";
+      return `Look around and ${view.voice ? "say or write" : "write"} what you notice. Then finish the setting.`;
     case "questions":
       return "Answer the questions, then press “Continue”.";
     case "closing":
@@ -44,13 +49,19 @@ export function nowWords({ view, known, missed, heardAt, refused, unsent, unsave
   }
 }
 
+const KEEP_OPEN = "Keep this page open until everything is saved.";
+
 /**
+ * @param {View} view
  * @param {boolean} unsent
  * @param {boolean} unsaved
  */
-function endWords(unsent, unsaved) {
+function endWords(view, unsent, unsaved) {
   if (unsent) return "Save or delete the comment in the box.";
-  return unsaved ? "Keep this page open until everything is saved." : "You are done. Give the tablet back.";
+  if (unsaved) return KEEP_OPEN;
+  return view.practice
+    ? "Practice is over. Keep the tablet: the trial comes next."
+    : "You are done. Give the tablet back.";
 }
 
 /**

@@ -23,13 +23,13 @@ const DRIFT_MS = 1000;
  */
 
 /**
- * Kept with everything that is said. `clock` is missing in entries of older versions of the page.
+ * Kept with everything that is said.
  *
  * @typedef {object} Stamp
- * @property {string} [device]
- * @property {number} [sequence]
+ * @property {string} device
+ * @property {number} sequence
  * @property {number} client_millis
- * @property {{ page: string, at: number, slept: number }} [clock]
+ * @property {{ page: string, at: number, slept: number }} clock
  */
 
 export class Origins {
@@ -116,7 +116,7 @@ export class Origins {
    * @returns {Api.Origin}
    */
   tell({ clock, ...told }) {
-    const onThisPage = clock?.page === this.#page ? clock : null;
+    const onThisPage = clock.page === this.#page ? clock : null;
     const waited = onThisPage
       ? this.#clock.page() - onThisPage.at + this.#slept - onThisPage.slept
       : this.#clock.wall() - told.client_millis;

@@ -6,6 +6,7 @@
 // next opened.
 
 import { inWords, Refused } from "../shared/api.js";
+import { NO_CONNECTION } from "./words.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
@@ -21,7 +22,7 @@ const LONGEST_WAIT_MS = 8000;
  * @property {string} id sorts in the order in which things were said
  * @property {string} path
  * @property {string | null} slot
- * @property {Stamp} [given]
+ * @property {Stamp} given
  * @property {boolean} drafted
  * @property {Record<string, any>} body
  * @property {boolean} [stored]
@@ -262,7 +263,7 @@ export class Outbox {
   async #send(entry) {
     entry.sending = true;
     try {
-      await this.#around.send(entry.path, { ...entry.body, ...this.#origin(entry) });
+      await this.#around.send(entry.path, { ...entry.body, ...this.#around.origins.tell(entry.given) });
       this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");
@@ -294,7 +295,7 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, "No connection. This page keeps trying.");
+    this.trouble = inWords(error, NO_CONNECTION);
     const heard = error instanceof Refused;
     this.#tell(entry, "waiting", this.trouble, heard);
     return heard;
@@ -323,18 +324,6 @@ export class Outbox {
     this.#done.add(entry.id);
     this.#around.store.remove(PREFIX + entry.id);
     this.#around.spare.remove(entry.id);
-  }
-
-  /**
-   * Where and when `entry` was said. Comments from older versions of the page have only the wall clock's time. Answers
-   * from those versions have no time at all.
-   *
-   * @param {Entry} entry
-   */
-  #origin({ given, body }) {
-    if (given) return this.#around.origins.tell(given);
-    if (body.client_millis === undefined) return {};
-    return this.#around.origins.tell({ client_millis: body.client_millis });
   }
 
   /** @param {Entry} entry */

@@ -1,10 +1,11 @@
 // The surgeon's page: follows the session's state as the server sends it. It looks the same for every policy.
 
-import { get, post, Refused } from "../shared/api.js";
+import { get, inWords, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
+import { Sight } from "../shared/sight.js";
 import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { PATH as ANSWERS, placeOf, sendLeftAnswers, slotOf } from "./answers.js";
@@ -22,19 +23,32 @@ import {
   origins,
   reloadForMicrophone,
   storage,
+  store,
 } from "./device.js";
+import { followDimmer } from "./dimmer.js";
 import { Holding } from "./holding.js";
-import { record } from "./microphone.js";
+import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { nowWords } from "./now.js";
 import { forgetPage, keepPage } from "./offline.js";
-import { card, showPanel } from "./panel.js";
+import { card, guardPanel, showPanel } from "./panel.js";
 import { QuestionPanel } from "./question_panel.js";
 import { onTopOf } from "./questions.js";
+import { keepRoom } from "./room.js";
 import { keepStorage } from "./storage_words.js";
 import { Talk } from "./talk.js";
 import { talkButton } from "./talk_button.js";
-import { headline, isEnded, readyWords, savedWords, simulatedWords, steps, timeLeft } from "./words.js";
+import {
+  endsSoon,
+  headline,
+  isEnded,
+  pausedWords,
+  readyWords,
+  savedWords,
+  simulatedWords,
+  steps,
+  timeLeft,
+} from "./words.js";
 
 const TICK_MS = 250;
 
@@ -49,13 +63,17 @@ let endsAt = null;
 /** @type {QuestionPanel | null} */
 let questionPanel = null;
 let panelDrawn = "";
+/** Whether this tablet's link has ended, and why if its session had not. */
+let over = false;
+let overBecause = "";
 
 const outbox = openOutbox();
 const contact = new Contact(clock, lastView.read());
-const viewer = new Viewer(byId("view"), "surgeon");
-const comments = new Comments(outbox, drafts, here);
-const box = commentBox(comments, outbox);
+const viewer = new Viewer(byId("view"), "surgeon", byId("colour"));
+const sight = new Sight();
 const voice = openVoiceOutbox();
+const comments = new Comments(outbox, drafts, here, voice);
+const box = commentBox(comments, outbox, voice);
 const mayRecord = byId("talk").dataset.microphone === "true";
 const talk = new Talk({
   outbox: voice,
@@ -92,7 +110,8 @@ const forgetFirstPress = askForSecondPress(byId("finish"), byId("finish-heard"),
 function here() {
   if (!state) return null;
   const { session, segment = null, setting } = state;
-  return { session, segment, setting, frame: viewer.frame, run: viewer.run };
+  const seen = sight.at(performance.now());
+  return { session, segment, setting, frame: viewer.frame, run: viewer.run, ...seen };
 }
 
 /* State in */
@@ -125,6 +144,7 @@ function follow(next) {
   drawBar();
   box.follow(state);
   talking.follow(state);
+  followMicrophone();
   drawPanel();
   // Only after the form was removed, because removing it hands over the text that was in it.
   sendLeftAnswers(outbox, drafts, state);
@@ -178,6 +198,42 @@ function isStillMeant(action) {
   return !("segment" in action) || action.segment === (state.segment ?? null);
 }
 
+/* Microphone */
+
+/** Whether the microphone was opened for this session, or why it could not be; empty while it is not known. */
+let microphone = "";
+
+/** Opens the microphone before the trial if the browser lets it, and closes it when no session can use it any more. */
+async function followMicrophone() {
+  if (!state?.voice || isEnded(state)) {
+    closeMicrophone();
+    microphone = "";
+    return;
+  }
+  const isAsked = microphone === "" && state.phase === "ready" && whyNoMicrophone(mayRecord) === "";
+  if (isAsked && (await mayOpenMicrophone())) await tryMicrophone();
+}
+
+async function tryMicrophone() {
+  try {
+    await openMicrophone();
+    microphone = "The microphone is ready.";
+  } catch (error) {
+    microphone = error instanceof Error ? error.message : "The microphone could not be opened.";
+  }
+  drawPanel();
+}
+
+/** The button that asks for the microphone before the trial; null where it need not. */
+function microphoneButton() {
+  if (!state?.voice || microphone !== "" || whyNoMicrophone(mayRecord) !== "") return null;
+  return make(
+    "button",
+    { type: "button", className: "primary", onclick: tryMicrophone },
+    "Try the microphone",
+  );
+}
+
 /* Bar */
 
 function drawBar() {
@@ -191,6 +247,7 @@ function drawBar() {
   finish.hidden = !inspecting;
   finish.disabled = !looking;
   if (finish.disabled) forgetFirstPress();
+  byId("pause").hidden = !state?.may_pause;
 
   const unrecorded =
     "This step is not recorded yet because the server cannot write to its disk. Tell the operator.";
@@ -199,9 +256,16 @@ function drawBar() {
   drawTime();
 }
 
+/** Seconds left of the setting's time; null if it has no limit or is not known. */
+function secondsLeft() {
+  return endsAt === null ? null : (endsAt - performance.now()) / 1000;
+}
+
 function drawTime() {
-  const left = endsAt === null ? null : (endsAt - performance.now()) / 1000;
-  setText(byId("remaining"), timeLeft(state, left));
+  const left = secondsLeft();
+  const remaining = byId("remaining");
+  setText(remaining, timeLeft(state, left));
+  remaining.classList.toggle("soon", endsSoon(state, left));
 }
 
 function drawNow() {
@@ -213,6 +277,8 @@ function drawNow() {
     refused: contact.isCertificateOver,
     unsent: comments.unsent,
     unsaved: outbox.waiting.length + voice.waiting > 0,
+    soon: endsSoon(state, secondsLeft()),
+    over,
   };
   setText(byId("now"), nowWords(facts));
 }
@@ -230,8 +296,20 @@ function followStatus(status) {
 
 function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
-  const words = isEnded(state) ? kept() : mayResume ? saved() : "";
-  const key = JSON.stringify([known, session, phase, paused, segment, questions, mayResume, words, advice()]);
+  const words = over || isEnded(state) ? kept() : mayResume ? saved() : "";
+  const key = JSON.stringify([
+    known,
+    over,
+    overBecause,
+    session,
+    phase,
+    paused,
+    segment,
+    questions,
+    mayResume,
+    words,
+    advice(),
+  ]);
   if (key === panelDrawn) return;
   panelDrawn = key;
   questionPanel = null;
@@ -240,23 +318,27 @@ function drawPanel() {
 
 function panelContent() {
   if (!known) return null;
+  if (over && !isEnded(state)) {
+    return card("centred", "Not open to this tablet", overBecause);
+  }
   if (!state) {
-    const text = "You can look around. When the operator starts a trial, it begins here.";
-    return card("aside", "No trial is under way", text);
+    return card("aside idle", "No trial is under way. You can look around.", "");
   }
   if (state.paused && !isEnded(state)) return pausedCard(state);
 
   switch (state.phase) {
     case "ready":
-      return card("aside", state.title, [readyWords(state), ...advice()].join(" "));
+      return card("aside", state.title, [readyWords(state), ...advice()].join(" "), microphoneButton());
     case "questions":
       return questions(state, `Setting ${state.setting}: a few questions`);
     case "closing":
       return questions(state, "Final questions");
     case "completed":
-      return card("centred", "Thank you", `The trial is complete. ${kept()}`);
+      return state.practice
+        ? card("centred", "Practice is over", `That was practice; it does not count. ${kept()}`)
+        : card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
-      return card("centred", "The session was ended", `There is nothing more to do. ${kept()}`);
+      return card("aside sign", "The session was ended", `There is nothing more to do. ${kept()}`);
     default:
       return null;
   }
@@ -264,7 +346,7 @@ function panelContent() {
 
 /** What people have to do before the trial starts, because the browser does not do it. */
 function advice() {
-  return [awake.advice, storage].filter((words) => words !== "");
+  return [awake.advice, storage, microphone].filter((words) => words !== "");
 }
 
 function kept() {
@@ -276,19 +358,17 @@ function saved() {
   return savedWords(refused, outbox.waiting.length + voice.waiting);
 }
 
-/** @param {View} view */
-function pausedCard({ may_resume: mayResume }) {
-  const text = "The operator has paused the session. You can still comment.";
-  if (!mayResume) return card("centred clear", "Paused", text);
+/**
+ * A small sign, because the picture may be needed while the session is paused.
+ *
+ * @param {View} view
+ */
+function pausedCard(view) {
+  if (!view.may_resume) return card("aside sign", "Paused", pausedWords(view, saved()));
 
   const resume = make("button", { type: "button", className: "primary" }, "Continue");
   resume.onclick = () => act({ action: "resume" });
-  return card(
-    "centred clear",
-    "Paused",
-    `The server was restarted. ${saved()} Continue where you were.`,
-    resume,
-  );
+  return card("aside sign", "Paused", pausedWords(view, saved()), resume);
 }
 
 /**
@@ -319,7 +399,31 @@ voice.subscribe(() => {
   if (state) drawPanel();
 });
 
+/**
+ * The tablet's link has ended. If its session has, too, the last words on the page stay as they were. What the tablet
+ * holds is still sent.
+ */
+async function leave() {
+  over = true;
+  forgetPage();
+  lastView.forget();
+  viewer.end();
+  if (!isEnded(state)) followServer(null);
+  drawPanel();
+  drawNow();
+  if (isEnded(state)) return;
+
+  // The server's answer says why.
+  overBecause = await get("/api/surgeon/session").then(
+    () => "",
+    (error) => inWords(error),
+  );
+  drawPanel();
+}
+
 /* Wiring */
+
+byId("pause").onclick = () => act({ action: "pause", reason: "" });
 
 byId("comment").addEventListener("input", () => {
   if (!isEnded(state)) return;
@@ -329,14 +433,10 @@ byId("comment").addEventListener("input", () => {
 
 viewer.live.listen({
   heard: () => contact.heard(),
+  frame: ({ header }) => sight.see(header, performance.now()),
   session: followServer,
   status: followStatus,
-  // The session is over for this tablet. What the tablet holds is still sent. The server's answer says the rest.
-  over: () => {
-    forgetPage();
-    followServer(null);
-    refresh();
-  },
+  over: leave,
   connection: (open) => {
     if (!open) {
       contact.lost();
@@ -361,6 +461,7 @@ document.addEventListener("pointerdown", (event) => {
 
 function tick() {
   drawTime();
+  byId("reduced").hidden = !sight.isReduced(performance.now());
   if (contact.isMissed) followLastView();
   drawNow();
 }
@@ -372,6 +473,9 @@ addEventListener("pagehide", () => {
   if (heardAt !== null) lastView.touch({ heardAt, certificateEnd });
 });
 
+guardPanel();
+keepRoom();
+followDimmer(byId("brightness", HTMLInputElement), store);
 setInterval(tick, TICK_MS);
 keepPage();
 refresh();

@@ -3,15 +3,8 @@
 import { make, setText } from "../shared/dom.js";
 import { drawScale, drawWords } from "./choices.js";
 import { drawPlaces, drawWorkload } from "./instrument_form.js";
-import {
-  ordinal,
-  PlacesAnswer,
-  RankingAnswer,
-  ScaleAnswer,
-  SusAnswer,
-  TextAnswer,
-  WorkloadAnswer,
-} from "./questions.js";
+import { PlacesAnswer, ScaleAnswer, SusAnswer, TextAnswer, WorkloadAnswer } from "./questions.js";
+import { drawRanking } from "./ranking.js";
 import { drawTrack } from "./track.js";
 
 /** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
@@ -91,7 +84,7 @@ function drawKind(answer, changed) {
   if (answer instanceof SusAnswer) return drawSus(answer, changed);
   if (answer instanceof WorkloadAnswer) return drawWorkload(answer, heading(answer.question), changed);
   if (answer instanceof PlacesAnswer) return drawPlaces(answer, heading(answer.question), changed);
-  return drawRanking(answer, changed);
+  return drawRanking(answer, heading(answer.question), changed);
 }
 
 /** @param {Api.Question} question */
@@ -192,68 +185,4 @@ function drawSus(answer, changed) {
     },
     wantedPart: () => items.find((_, item) => answer.wantedParts[item]),
   };
-}
-
-/**
- * @param {RankingAnswer} answer
- * @param {() => void} changed
- * @returns {Drawn}
- */
-function drawRanking(answer, changed) {
-  const list = make("ol", { className: "ranking" });
-  const heard = make("p", { className: "visually-hidden", "aria-live": "polite" });
-  const confirm = make("button", { type: "button", className: "confirm" }, "This order is right");
-  confirm.onclick = () => {
-    answer.confirm();
-    changed();
-  };
-  let drawnOrder = "";
-
-  /**
-   * @param {number} from
-   * @param {number} to
-   */
-  function move(from, to) {
-    const setting = answer.move(from, to);
-    changed();
-    const [up, down] = list.children[to]?.querySelectorAll("button") ?? [];
-    const wanted = to < from ? up : down;
-    (wanted?.disabled ? (wanted === up ? down : up) : wanted)?.focus();
-    setText(heard, `Setting ${setting} is now in place ${to + 1} of ${answer.order.length}`);
-  }
-
-  /**
-   * @param {string} label
-   * @param {string} sign
-   * @param {number} from
-   * @param {number} to
-   */
-  function mover(label, sign, from, to) {
-    const disabled = to < 0 || to >= answer.order.length;
-    const button = make("button", { type: "button", "aria-label": label, disabled }, sign);
-    button.onclick = () => move(from, to);
-    return button;
-  }
-
-  function draw() {
-    confirm.hidden = answer.confirmed;
-    const order = JSON.stringify(answer.order);
-    if (order === drawnOrder) return;
-    drawnOrder = order;
-
-    const lines = answer.order.map((setting, index) => {
-      const place = `${ordinal(index + 1)}${index === 0 ? ", best" : ""}`;
-      return make(
-        "li",
-        {},
-        make("span", { className: "place" }, place),
-        make("span", {}, `Setting ${setting}`),
-        mover(`Move setting ${setting} up`, "↑", index, index - 1),
-        mover(`Move setting ${setting} down`, "↓", index, index + 1),
-      );
-    });
-    list.replaceChildren(...lines);
-  }
-
-  return { nodes: [heading(answer.question), list, heard, confirm], draw };
 }

@@ -1,6 +1,6 @@
 // The questions on screen: draws them, sends the answers, and says which questions are still open.
 
-import { make } from "../shared/dom.js";
+import { make, setText } from "../shared/dom.js";
 import { tell, tellUntilAnswered } from "../shared/trouble.js";
 import { PATH, placeOf, slotOf } from "./answers.js";
 import { drafts, later } from "./device.js";
@@ -17,6 +17,7 @@ export class QuestionPanel {
   #questionnaire;
   /** @type {QuestionBox[]} */
   #boxes;
+  #progress = make("p", { className: "progress number" });
   #missing = make("p", { id: "missing", className: "message", role: "alert" });
 
   /**
@@ -50,6 +51,8 @@ export class QuestionPanel {
 
     return answerTo(question, answered, {
       settings: state.settings,
+      said: state.said ?? [],
+      lot: state.session,
       later,
       draft: () => drafts.open(`answer.${slot}`),
       give: (_, value, part, from) => {
@@ -71,9 +74,10 @@ export class QuestionPanel {
       { className: "questions" },
       make("h2", { tabIndex: -1 }, heading),
       ...this.#boxes.map(({ element }) => element),
-      make("div", { className: "done" }, this.#missing, done),
+      make("div", { className: "done" }, this.#progress, this.#missing, done),
     );
-    return { className: "", nodes: [form] };
+    this.#drawProgress();
+    return { className: "asking", nodes: [form] };
   }
 
   async #done() {
@@ -114,6 +118,7 @@ export class QuestionPanel {
   /** The surgeon has changed an answer. Clears the message about open questions once none is marked as open. */
   #settled() {
     if (!this.#questionnaire.marked) tell(this.#missing, "");
+    this.#drawProgress();
   }
 
   /**
@@ -153,5 +158,10 @@ export class QuestionPanel {
 
   #draw() {
     for (const box of this.#boxes) box.draw();
+    this.#drawProgress();
+  }
+
+  #drawProgress() {
+    setText(this.#progress, this.#questionnaire.progressWords);
   }
 }

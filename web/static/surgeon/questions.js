@@ -23,6 +23,8 @@
  * @property {(question: Api.Question) => Draft} draft
  * @property {(run: () => void, ms: number) => () => void} later
  * @property {number} settings how many settings there are
+ * @property {string[][]} said what the surgeon has said of each setting, to recall it
+ * @property {string} lot the same on every device of the session; a starting order is drawn from it
  */
 
 const SUS_ITEMS = [
@@ -37,6 +39,9 @@ const SUS_ITEMS = [
   "I felt very confident using the system.",
   "I needed to learn a lot of things before I could get going with this system.",
 ];
+
+/** Up to this many answers one sees without being told how many are given. */
+const AT_A_GLANCE = 3;
 
 const TYPING_PAUSE_MS = 900;
 export const NOT_ANSWERED = "Not answered yet";
@@ -70,6 +75,27 @@ export function ordinal(number) {
   const isTeen = number % 100 >= 11 && number % 100 <= 13;
   const ending = ["th", "st", "nd", "rd"][number % 10] ?? "th";
   return `${number}${isTeen ? "th" : ending}`;
+}
+
+/**
+ * The numbers from 1 to `count` in an order drawn from `lot`, which knows nothing of the settings. Whoever leaves the
+ * starting order as it is would otherwise always prefer the first setting.
+ *
+ * @param {number} count
+ * @param {string} lot
+ */
+export function drawnOrder(count, lot) {
+  // FNV-1a and a linear congruential generator: enough for an order that no setting gains from.
+  let state = 2166136261;
+  for (const letter of lot) state = Math.imul(state ^ (letter.codePointAt(0) ?? 0), 16777619);
+
+  const order = Array.from({ length: count }, (_, index) => index + 1);
+  for (let last = count - 1; last > 0; last -= 1) {
+    state = (Math.imul(state, 1664525) + 1013904223) | 0;
+    const other = (state >>> 8) % (last + 1);
+    [order[last], order[other]] = [order[other] ?? 0, order[last] ?? 0];
+  }
+  return order;
 }
 
 /** One question, and whether its answer is saved. */
@@ -119,6 +145,16 @@ class Answer {
    */
   get wantedParts() {
     return [];
+  }
+
+  /**
+   * How many parts of the question were answered, and how many it has.
+   *
+   * @returns {{ answered: number, total: number }}
+   */
+  get progress() {
+    const answered = ["saving", "saved", "waiting"].includes(this.reached);
+    return { answered: answered ? 1 : 0, total: 1 };
   }
 
   /** Whether the surgeon must still do something here. */
@@ -322,6 +358,11 @@ class ItemsAnswer extends Answer {
     if (answered !== undefined) this.show("saved");
   }
 
+  /** @override */
+  get progress() {
+    return { answered: this.points.filter((point) => point > 0).length, total: this.points.length };
+  }
+
   /** @override @returns {string | null} */
   get open() {
     const given = this.points.filter((point) => point > 0).length;
@@ -438,9 +479,7 @@ export class RankingAnswer extends Answer {
     /** @type {number[] | null} */
     const arranged = this.#draft.read();
     const given = Array.isArray(answered) ? answered : null;
-    this.order = [
-      ...(arranged ?? given ?? Array.from({ length: context.settings }, (_, index) => index + 1)),
-    ];
+    this.order = [...(arranged ?? given ?? drawnOrder(context.settings, `${context.lot}/${question.id}`))];
     this.confirmed = given !== null && arranged === null;
     if (answered !== undefined || this.begun !== null) this.show("saved");
   }
@@ -449,6 +488,16 @@ export class RankingAnswer extends Answer {
   get begun() {
     const isArranged = !this.confirmed && this.#draft.read() !== null;
     return isArranged ? "Kept on this device until you tap “This order is right”" : null;
+  }
+
+  /**
+   * What the surgeon has said of a setting, on one line.
+   *
+   * @param {number} setting
+   */
+  saidOf(setting) {
+    const words = this.context.said[setting - 1] ?? [];
+    return words.map((text) => `“${text}”`).join(" ");
   }
 
   confirm() {
@@ -540,6 +589,14 @@ export class Questionnaire {
     for (const answer of this.answers) answer.unwant();
     for (const answer of unanswered) answer.want();
     return unanswered;
+  }
+
+  /** Says how far the surgeon is; empty where that is seen at a glance. */
+  get progressWords() {
+    const all = this.answers.map(({ progress }) => progress);
+    const answered = all.reduce((sum, one) => sum + one.answered, 0);
+    const total = all.reduce((sum, one) => sum + one.total, 0);
+    return total < AT_A_GLANCE ? "" : `${answered} of ${total} answered`;
   }
 
   /** Whether anything is marked as still to be answered. */

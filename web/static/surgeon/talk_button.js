@@ -53,8 +53,9 @@ export function talkButton(talk, outbox, allowed) {
     const { kind, text } = outbox.status;
     const status = byId("voice-state");
     // A piece is sent every second, so the text would flicker.
-    const speaking = talk.state === "recording" && kind !== "unsaved";
+    const speaking = talk.state === "recording" && kind !== "unsaved" && outbox.heldUp === 0;
     setText(status, speaking ? "Saved as you speak." : text);
+    status.classList.toggle("saved", kind === "saved" && !speaking);
     status.classList.toggle("unsaved", kind === "unsaved");
   }
 

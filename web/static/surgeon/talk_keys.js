@@ -30,6 +30,8 @@ export function isTalkKey({ key, ctrlKey, altKey, metaKey }, focus) {
  */
 export function focusOn(element) {
   if (element === null) return "page";
+  // Nothing is written yet in an empty box, so a pedal that sends a space is meant for the pedal's work.
+  if (element instanceof HTMLTextAreaElement && element.value === "") return "page";
   if (element.matches("textarea, select, input:not([type=checkbox], [type=radio]), [contenteditable]")) {
     return "field";
   }

@@ -4,9 +4,8 @@
 // device, and is tried again when the page is next opened.
 
 import { inWords, Refused } from "../shared/api.js";
-import { counted } from "../shared/text.js";
 import { PATH as COMMENTS } from "./comments.js";
-import { heldWords } from "./words.js";
+import { NO_CONNECTION } from "./words.js";
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
@@ -74,6 +73,8 @@ export class VoiceOutbox {
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
+  /** Whether the last step that was sent ended a recording. */
+  #hasSaved = false;
 
   /** @param {Surroundings} around */
   constructor(around) {
@@ -140,12 +141,13 @@ export class VoiceOutbox {
   /**
    * Begins a recording. Returns its comment's key.
    *
-   * @param {{ session: string, segment: string | null, frame: number | null, run: number | null }} place
+   * @param {import("./comments.js").Place} place
    * @param {Stamp} given when the surgeon began to speak
    */
-  begin({ session, segment, frame, run }, given) {
+  begin({ session, segment, frame, run, picture_width = null, pictures_per_second = null }, given) {
     const comment = this.#around.newId();
-    const body = { key: comment, session, segment, frame, run, kind: "voice" };
+    const seen = { picture_width, pictures_per_second };
+    const body = { key: comment, session, segment, frame, run, ...seen, kind: "voice" };
     this.#add({ kind: "begin", id: this.#nextId(), comment, session, body, given });
     return comment;
   }
@@ -166,10 +168,15 @@ export class VoiceOutbox {
     this.#flush();
   }
 
+  /** How many recordings wait because they could not be sent, or because this device cannot keep them. */
+  get heldUp() {
+    return this.trouble === null && this.durable ? 0 : this.waiting;
+  }
+
   /**
-   * Whether all recordings are saved, with the text to show.
+   * Whether all recordings are saved, with the text to show. What is held up is told together with the comments.
    *
-   * @returns {{ kind: "" | "saving" | "unsaved", text: string }}
+   * @returns {{ kind: "" | "saving" | "saved" | "unsaved", text: string }}
    */
   get status() {
     const refusal = [...this.#refused.values()].at(-1);
@@ -182,12 +189,9 @@ export class VoiceOutbox {
       return { kind: "unsaved", text };
     }
 
-    const { waiting } = this;
-    if (waiting === 0) return { kind: "", text: "" };
-    if (this.trouble === null && this.durable) return { kind: "saving", text: "Saving the recording…" };
-
-    const held = heldWords(counted(waiting, "recording"), this.durable);
-    return { kind: "unsaved", text: `${held} ${this.trouble ?? ""}`.trim() };
+    if (this.heldUp > 0) return { kind: "", text: "" };
+    if (this.waiting > 0) return { kind: "saving", text: "Saving the recording…" };
+    return this.#hasSaved ? { kind: "saved", text: "Recording saved" } : { kind: "", text: "" };
   }
 
   #nextId() {
@@ -250,6 +254,7 @@ export class VoiceOutbox {
 
     this.trouble = null;
     this.#wait = FIRST_WAIT_MS;
+    this.#hasSaved = step.kind === "piece" && step.ended !== null;
     this.#steps.delete(step.id);
     this.#unkept.delete(step.id);
     await this.#around.store.remove(step.id);
@@ -278,7 +283,7 @@ export class VoiceOutbox {
       this.#tell();
       return true;
     }
-    this.trouble = inWords(error, "No connection. This page keeps trying.");
+    this.trouble = inWords(error, NO_CONNECTION);
     this.#tell();
     return false;
   }

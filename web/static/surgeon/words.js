@@ -31,6 +31,19 @@ export function steps(state) {
   });
 }
 
+/** The end of a setting is told this many seconds before. */
+const SOON_SECONDS = 10;
+
+/**
+ * Whether the setting's time ends in a moment.
+ *
+ * @param {View | null} state
+ * @param {number | null} seconds left of the setting's time; null if it has no limit
+ */
+export function endsSoon(state, seconds) {
+  return state?.phase === "inspecting" && !state.paused && seconds !== null && seconds <= SOON_SECONDS;
+}
+
 /**
  * @param {View | null} state
  * @param {number | null} seconds left of the setting's time; null if it has no limit
@@ -38,6 +51,27 @@ export function steps(state) {
 export function timeLeft(state, seconds) {
   if (state?.phase !== "inspecting" || seconds === null) return "";
   return state.paused ? "Paused" : `${clockText(seconds, Math.ceil)} left`;
+}
+
+/**
+ * Says what paused the session, and what the surgeon can do.
+ *
+ * @param {View} state
+ * @param {string} saved says what is saved
+ */
+export function pausedWords({ paused_by: by }, saved) {
+  switch (by) {
+    case "surgeon":
+      return "You have paused the session. You can still comment.";
+    case "restart":
+      return `The server was restarted. ${saved} Continue where you were.`;
+    case "tablet-away":
+      return `This tablet was away, so the session was paused. ${saved} Continue where you were.`;
+    case "small-picture":
+      return "The picture was too small for this trial, so it was paused. Continue once it is better.";
+    default:
+      return "The operator has paused the session. You can still comment.";
+  }
 }
 
 /** @param {Stream.SurgeonStatus} status */
@@ -68,14 +102,24 @@ export function savedWords(refused, waiting) {
   return kept.trim() || "Everything you said is saved.";
 }
 
+/** Why something was not sent, if no server answered. */
+export const NO_CONNECTION = "No connection. This page keeps trying.";
+
 /**
- * Says where something is kept that the server does not have yet.
+ * One line about what the server does not have yet: where it is kept, and what will become of it.
  *
- * @param {string} what such as `2 comments`
- * @param {boolean} durable whether this device keeps it over a reload
+ * @param {object} held
+ * @param {number} held.comments
+ * @param {number} held.recordings
+ * @param {boolean} held.durable whether this device keeps all of it over a reload
+ * @param {string | null} held.trouble why the last attempt to send failed
  */
-export function heldWords(what, durable) {
-  return durable
-    ? `Saved here, not sent yet: ${what}.`
-    : `Kept on this page only, so do not close it: ${what}.`;
+export function heldWords({ comments, recordings, durable, trouble }) {
+  const what = [
+    comments > 0 && counted(comments, "comment"),
+    recordings > 0 && counted(recordings, "recording"),
+  ];
+  const where = durable ? "Saved here" : "Kept on this page only, so do not close it";
+  const then = trouble === NO_CONNECTION ? "Sent when the network is back." : (trouble ?? "");
+  return `${where}: ${what.filter(Boolean).join(", ")}. ${then}`.trim();
 }

@@ -22,7 +22,7 @@ pub use finding::{Finding, Verdict};
 pub use folder::LEAST_ROOM;
 pub use lens::lens;
 pub use network::outward;
-pub use tablet::{Tablet, tablets};
+pub use tablet::{Tablet, TabletPart, TriedTablet, tablets, tried};
 
 use parfocal_base::clock::Clock;
 

@@ -1,5 +1,10 @@
 //! Checks the surgeon's tablet by what its page reports to the server anyway.
 
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use super::finding::Finding;
 
 const TABLET: &str = "tablet";
@@ -15,6 +20,74 @@ pub struct Tablet {
     pub visible: bool,
     /// Whether its connection is fast enough for the size of pictures that its screen can show.
     pub carries_all: bool,
+}
+
+/// Something that a trial needs of a tablet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TabletPart {
+    /// An encrypted connection, without which browsers give neither microphone nor service worker.
+    Encrypted,
+    /// Storage for comments and answers.
+    Storage,
+    /// Storage for voice.
+    Disk,
+    /// The live connection.
+    Stream,
+    /// Drawing pictures.
+    Picture,
+    /// The microphone.
+    Microphone,
+    /// Keeping the screen on.
+    ScreenOn,
+}
+
+impl TabletPart {
+    /// What it is called, and whether a trial cannot do without it.
+    const fn about(self) -> (&'static str, bool) {
+        match self {
+            Self::Encrypted => ("an encrypted connection", false),
+            Self::Storage => ("storage for comments", true),
+            Self::Disk => ("storage for voice", false),
+            Self::Stream => ("the live connection", true),
+            Self::Picture => ("drawing pictures", true),
+            Self::Microphone => ("the microphone", false),
+            Self::ScreenOn => ("keeping the screen on", false),
+        }
+    }
+}
+
+/// A tablet that tried itself on the page for this.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TriedTablet {
+    /// The browser's user agent string.
+    pub user_agent: String,
+    /// When it was tried.
+    pub at: Timestamp,
+    /// What does not work on it.
+    pub failing: Vec<TabletPart>,
+}
+
+/// One finding for each tablet that was tried.
+#[must_use]
+pub fn tried(tablets: &[TriedTablet], zone: &TimeZone) -> Vec<Finding> {
+    tablets.iter().map(|tablet| tried_one(tablet, zone)).collect()
+}
+
+fn tried_one(tablet: &TriedTablet, zone: &TimeZone) -> Finding {
+    let at = tablet.at.to_zoned(zone.clone()).strftime("%H:%M");
+    let found = format!("{} was tried at {at}", browser(&tablet.user_agent));
+    if tablet.failing.is_empty() {
+        return Finding::well(TABLET, format!("{found}: everything works."));
+    }
+
+    let names: Vec<_> = tablet.failing.iter().map(|part| part.about().0).collect();
+    let found = format!("{found}. Does not work: {}.", names.join(", "));
+    let advice = "The page /tablet on the tablet says what to do. Then try it again.";
+    if tablet.failing.iter().any(|part| part.about().1) {
+        return Finding::wrong(TABLET, found, advice);
+    }
+    Finding::advice(TABLET, found, advice)
 }
 
 /// One finding for each open surgeon's page, or one that says that none is open.
@@ -94,6 +167,22 @@ mod tests {
         assert_eq!(browser(IPAD), "Safari on an iPad or a Mac");
         assert_eq!(browser(ANDROID), "Chrome on Android");
         assert_eq!(browser("curl/8.5.0"), "a browser");
+    }
+
+    #[test]
+    fn a_tablet_that_was_tried_tells_what_does_not_work_on_it() {
+        let with = |failing: &[TabletPart]| {
+            let at = Timestamp::from_second(50_520).unwrap();
+            let tablet = TriedTablet { user_agent: IPAD.into(), at, failing: failing.to_vec() };
+            tried(&[tablet], &TimeZone::UTC).remove(0)
+        };
+        let well = with(&[]);
+        assert_eq!(well.verdict, Verdict::Well);
+        assert_eq!(well.found, "Safari on an iPad or a Mac was tried at 14:02: everything works.");
+        let silent = with(&[TabletPart::Microphone, TabletPart::ScreenOn]);
+        assert_eq!(silent.verdict, Verdict::Advice);
+        assert!(silent.found.ends_with("Does not work: the microphone, keeping the screen on."), "{}", silent.found);
+        assert_eq!(with(&[TabletPart::Storage]).verdict, Verdict::Wrong);
     }
 
     #[test]

@@ -17,8 +17,8 @@ use super::roles::Researcher;
 use parfocal_records::store::Access;
 use parfocal_records::store::export::ZipStream;
 use parfocal_results::analysis::{
-    Analysis, AnalysisError, Comparison, ProtocolAnalysis, SettingWords, SurgeonWords, analyse, check, decimals,
-    p_words,
+    Analysis, AnalysisError, Comparison, PolicySummary, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords,
+    analyse, check, decimals, p_words,
 };
 use parfocal_session::conductor::ConductError;
 
@@ -27,7 +27,10 @@ impl From<AnalysisError> for Error {
         let text = error.to_string();
         match error {
             AnalysisError::NoStudy { .. } => Self::NotFound(text),
-            AnalysisError::StillBlinded { .. } => Self::Conflict(text),
+            AnalysisError::StillBlinded { .. }
+            | AnalysisError::BlindedPackage(_)
+            | AnalysisError::ExportedBefore { .. }
+            | AnalysisError::Package(_) => Self::Conflict(text),
             AnalysisError::Export(error) => error.into(),
             AnalysisError::Store(_) => Self::Storage(text),
         }
@@ -95,6 +98,12 @@ fn p_of_all(compared: &Comparison) -> String {
 fn w_of(compared: &Comparison) -> String {
     let w = compared.difference.friedman.as_ref().map(|friedman| friedman.kendalls_w);
     w.map_or_else(|| "–".to_owned(), |w| decimals(w, 2))
+}
+
+/// The summaries of each policy at `site` for the outcome of `compared`.
+fn at_site<'a>(site: &'a SiteAnalysis, compared: &Comparison) -> &'a [PolicySummary] {
+    let own = site.outcomes.iter().find(|own| own.outcome.outcome == compared.outcome.outcome);
+    own.map_or(&[], |own| &own.policies)
 }
 
 /// The sessions of a protocol that have a remark, for example why they do not count.

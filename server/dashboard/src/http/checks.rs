@@ -64,6 +64,7 @@ fn devices(app: &App) -> Vec<Finding> {
         doctor::calibration(calibration, *mosaics, status.camera.simulated, today),
     ];
     findings.extend(doctor::tablets(&app.tablets.open()));
+    findings.extend(doctor::tried(&app.tablet_trials.all(), &TimeZone::system()));
     findings
 }
 

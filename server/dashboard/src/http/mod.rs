@@ -1,8 +1,10 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
+mod about;
 mod accounts;
 mod analysis;
 pub mod assets;
+mod backup;
 mod camera;
 mod checks;
 mod connections;
@@ -39,6 +41,8 @@ mod state;
 mod studies;
 mod study_export;
 mod surgeon;
+mod tablet_trial;
+mod tablet_trials;
 mod tablets;
 mod trust;
 mod voice;
@@ -47,6 +51,7 @@ pub use equipment::Equipment;
 pub use live::OpenTablets;
 pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
+pub use tablet_trials::TabletTrials;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -80,6 +85,7 @@ pub fn router(app: AppState) -> Router {
         .merge(sign_in::routes())
         .merge(accounts::routes())
         .merge(surgeon::routes())
+        .merge(tablet_trial::routes())
         .merge(offline::routes())
         .merge(voice::routes())
         .merge(operator::routes())
@@ -93,6 +99,7 @@ pub fn router(app: AppState) -> Router {
         .merge(analysis::routes())
         .merge(export::routes())
         .merge(study_export::routes())
+        .merge(backup::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())
         .merge(health::routes())
@@ -127,9 +134,11 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
 /// this call: each holds a clone of `app.shutdown` until its requests under way are answered.
 pub async fn run(listener: TcpListener, app: AppState, tls: Option<Arc<ServerConfig>>) {
     let shutdown = app.shutdown.clone();
+    let reporting = tokio::spawn(live::report_tablets(Arc::clone(&app)));
     let door = match tls {
         Some(tls) => Door::Encrypted { tls: tls.into(), pages: router(Arc::clone(&app)), plain: plain::router(app) },
         None => Door::Plain { pages: router(app) },
     };
     connections::serve(listener, door, shutdown).await;
+    reporting.abort();
 }

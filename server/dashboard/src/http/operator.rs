@@ -156,17 +156,18 @@ async fn codes(app: &App) -> Result<Vec<String>, Error> {
     Ok(participants.into_iter().map(|participant| participant.code).collect())
 }
 
-/// Puts a policy in charge of the focus, or sets the focal power by hand. Not while a session is under way.
+/// Puts a policy in charge of the focus, or sets the focal power by hand. While a session is under way only the latter,
+/// and only while it is paused or after an abort; that is recorded in the session.
 #[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
     (status = 204, description = "Done"),
     (status = 404, description = "No such policy", body = ErrorBody),
     (status = 409, description = "A session is under way, or the policy cannot run", body = ErrorBody)))]
 async fn focus(
-    _: Operator,
+    by: Operator,
     State(app): State<AppState>,
     JsonBody(focus): JsonBody<Focus>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.focus(Role::Operator, &focus)?;
+    app.conductor.focus(by.actor(), &focus).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -10,6 +10,7 @@ use super::equipment::Equipment;
 use super::keys::Keys;
 use super::live::OpenTablets;
 use super::reach::Reach;
+use super::tablet_trials::TabletTrials;
 use crate::health::HealthWatch;
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
@@ -17,7 +18,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::ControlObserver;
 use parfocal_pipeline::live::LiveHandle;
 use parfocal_records::accounts::Accounts;
-use parfocal_records::store::Store;
+use parfocal_records::store::{Backups, Store};
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::Conductor;
 use parfocal_session::playback::Player;
@@ -52,6 +53,8 @@ pub struct App {
     pub registry: Registry,
     /// The exports of whole studies.
     pub study_exports: StudyExports,
+    /// The backups that leads download.
+    pub backups: Backups,
     /// Personal accounts.
     pub accounts: Accounts,
     /// Keys of the three roles.
@@ -62,6 +65,8 @@ pub struct App {
     pub equipment: Equipment,
     /// The surgeon's pages that are open.
     pub tablets: OpenTablets,
+    /// What works on the tablets that were tried.
+    pub tablet_trials: TabletTrials,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server must shut down; streams then close by themselves.

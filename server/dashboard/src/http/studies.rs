@@ -20,7 +20,7 @@ use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::role::Role;
 use parfocal_trial::study::definition::{Repetition, Replacement};
-use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::stage::Stage;
 use parfocal_trial::study::state::Change;
 
@@ -32,6 +32,8 @@ struct ListPage {
     person: Option<Account>,
     has_accounts: bool,
     studies: Vec<StudyLine>,
+    /// A definition to start from; none without a protocol for studies.
+    template: Option<String>,
 }
 
 impl ListPage {
@@ -57,7 +59,9 @@ async fn studies_page(
     let studies = app.conductor.studies().lines().await?;
     let person = person.map(|person| person.account);
     let has_accounts = !app.accounts.all().await?.is_empty();
-    ListPage { nonce, person, has_accounts, studies }.render().map(Html).map_err(|_| Error::Internal)
+    let lead = person.as_ref().map_or("Dr Lead", |account| account.display.as_str());
+    let template = app.conductor.study_template(lead);
+    ListPage { nonce, person, has_accounts, studies, template }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 #[derive(Template)]
@@ -137,6 +141,11 @@ pub(super) const fn repetition(rule: Repetition) -> &'static str {
         Repetition::Refuse => "refused",
         Repetition::NextSpare => "takes the next place; a spare place opens",
     }
+}
+
+/// Where a change of a study was made. Whoever made it is named beside, and may be a lead, an operator or a researcher.
+pub(super) fn channel(by: &str) -> &'static str {
+    if by == Channel::CommandLine.name() { "by a command" } else { "on a page" }
 }
 
 /// The state of a session, in words.
@@ -251,7 +260,7 @@ async fn change_study(
 ) -> Result<Json<StudyDetail>, Error> {
     let account = match wanted.change {
         Change::Lock { .. } | Change::Unblind => confirmed_lead(&app, &by, wanted.passphrase.as_deref(), peer).await?,
-        Change::Open | Change::Close | Change::Withdraw { .. } => by.personally()?,
+        Change::Open { .. } | Change::Close | Change::Withdraw { .. } => by.personally()?,
     };
     let signature = signed(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;

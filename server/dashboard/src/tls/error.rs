@@ -47,9 +47,33 @@ pub enum TlsError {
         /// File with the certificate.
         certificate: PathBuf,
     },
+    /// A file begins with a mark that editors add.
+    #[error("{} begins with {mark}, and so cannot be read; save it again as plain text without it", path.display())]
+    Marked {
+        /// File that begins with the mark.
+        path: PathBuf,
+        /// Description of the mark.
+        mark: &'static str,
+    },
+    /// The certificates are not in the order in which they sign one another.
+    #[error("the certificates in {} are in the wrong order: {problem}; put the server's certificate first, then each \
+             one that signed the one before it", path.display())]
+    WrongOrder {
+        /// File with the certificates.
+        path: PathBuf,
+        /// What is out of order.
+        problem: String,
+    },
+    /// The certificate may not stand for a server.
+    #[error("the certificate in {} is for clients or other purposes, so every browser refuses it; ask for one whose \
+             extended key usage has server authentication", path.display())]
+    NotForServers {
+        /// File with the certificate.
+        path: PathBuf,
+    },
     /// The certificate or the key is of a kind that cannot be used.
-    #[error("the certificate in {} cannot be used: {reason}; ask for one with an RSA, ECDSA or Ed25519 key",
-            path.display())]
+    #[error("the certificate in {} cannot be used: {reason}; ask for one with an RSA key of 2048 to 8192 bits, an \
+             ECDSA key on P-256 or P-384, or an Ed25519 key", path.display())]
     Unusable {
         /// File with the certificate.
         path: PathBuf,

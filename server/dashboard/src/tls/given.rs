@@ -12,6 +12,7 @@ use tokio_rustls::rustls::{Error as RustlsError, InconsistentKeys};
 
 use super::error::TlsError;
 use super::facts::Facts;
+use super::fitness;
 
 /// The two files of a given certificate.
 #[derive(Debug, Clone)]
@@ -43,6 +44,8 @@ impl Files {
         now: Timestamp,
     ) -> Result<(Arc<CertifiedKey>, Facts), TlsError> {
         let path = || self.certificate.clone();
+        check_marks(&self.certificate, &contents.certificate)?;
+        check_marks(&self.key, &contents.key)?;
         let chain: Vec<_> = CertificateDer::pem_slice_iter(&contents.certificate)
             .collect::<Result<_, _>>()
             .map_err(|_| TlsError::NoCertificate { path: path() })?;
@@ -50,7 +53,15 @@ impl Files {
 
         let unreadable = || TlsError::Unusable { path: path(), reason: "it cannot be read".into() };
         let facts = Facts::read(first).ok_or_else(unreadable)?;
+        let private = self.private_key(&contents.key)?;
+        self.check_order(&chain, &private, provider)?;
 
+        if let Some(reason) = fitness::unusable_key(first) {
+            return Err(TlsError::Unusable { path: path(), reason });
+        }
+        if !fitness::is_for_servers(first) {
+            return Err(TlsError::NotForServers { path: path() });
+        }
         if now >= facts.until {
             return Err(TlsError::Expired { path: path(), until: facts.until });
         }
@@ -61,9 +72,31 @@ impl Files {
             return Err(TlsError::NoNames { path: path() });
         }
 
-        let key = CertifiedKey::from_der(chain, self.private_key(&contents.key)?, provider);
+        let key = CertifiedKey::from_der(chain, private, provider);
         let key = key.map_err(|error| self.not_usable(&error))?;
         Ok((Arc::new(key), facts))
+    }
+
+    /// Checks that the server's certificate comes first, and each other one signed the one before it.
+    fn check_order(
+        &self,
+        chain: &[CertificateDer<'static>],
+        private: &PrivateKeyDer<'static>,
+        provider: &CryptoProvider,
+    ) -> Result<(), TlsError> {
+        let belongs = |certificate: &CertificateDer<'static>| {
+            CertifiedKey::from_der(vec![certificate.clone()], private.clone_key(), provider).is_ok()
+        };
+        let wrong = |problem: String| TlsError::WrongOrder { path: self.certificate.clone(), problem };
+
+        // If the key belongs to none, that is said later, or why it cannot be used.
+        if let Some(own) = chain.iter().position(belongs).filter(|&own| own > 0) {
+            return Err(wrong(format!("the server's own, to which the key belongs, is number {}", own + 1)));
+        }
+        match fitness::out_of_order(chain) {
+            Some(place) => Err(wrong(format!("number {place} did not sign number {}", place - 1))),
+            None => Ok(()),
+        }
     }
 
     fn private_key(&self, pem: &[u8]) -> Result<PrivateKeyDer<'static>, TlsError> {
@@ -83,6 +116,16 @@ impl Files {
             error => TlsError::Unusable { path: self.certificate.clone(), reason: error.to_string() },
         }
     }
+}
+
+/// Refuses a text that begins with a byte order mark: PEM knows none, and its first line would be missed.
+fn check_marks(path: &Path, contents: &[u8]) -> Result<(), TlsError> {
+    let mark = match contents {
+        [0xef, 0xbb, 0xbf, ..] => "a byte order mark (BOM)",
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the byte order mark (BOM) of UTF-16",
+        _ => return Ok(()),
+    };
+    Err(TlsError::Marked { path: path.to_owned(), mark })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, TlsError> {

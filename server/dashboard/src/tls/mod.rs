@@ -9,6 +9,7 @@ mod authority;
 mod certificates;
 mod error;
 mod facts;
+mod fitness;
 mod given;
 mod names;
 

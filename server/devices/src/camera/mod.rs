@@ -18,7 +18,7 @@ pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
 pub use pace::Pace;
 pub use pool::MosaicPool;
 pub use settings::CameraSettings;
-pub use spec::{open, own_calibration};
+pub use spec::{open, open_or_await, own_calibration};
 
 use std::sync::Arc;
 use std::time::Duration;

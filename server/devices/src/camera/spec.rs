@@ -47,6 +47,19 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
     }
 }
 
+/// The same, except that a GigE Vision or USB3 Vision camera that does not answer is treated like one that was lost: it
+/// is looked for until it is there. For a server, which may be switched on before its camera.
+///
+/// # Errors
+/// [`CameraError::BadSource`] if the camera is unknown, or its source cannot be used.
+pub fn open_or_await(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
+    #[cfg(feature = "aravis")]
+    if let Some(source) = spec.strip_prefix("gige:") {
+        return Ok(Box::new(super::gige::GigeCamera::open_or_await(source, settings)?));
+    }
+    open(spec, settings)
+}
+
 /// The calibration that comes with the camera `spec`: a recording's own. `None` for all other cameras.
 #[must_use]
 pub fn own_calibration(spec: &str) -> Option<PathBuf> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
 use super::optotune::{OptotuneLens, Settings};
-use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
+use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, MILLIS, Optics};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
@@ -26,14 +26,14 @@ impl EmulatedLens {
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let usual = Model::default();
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
-        let latency = millis(options.take("latency")?, usual.latency);
+        let latency = millis(options.take_within("latency", MILLIS, " ms")?, usual.latency);
         let glass = LensDynamics {
-            delay: millis(options.take("delay")?, usual.glass.delay),
-            settling: millis(options.take("settling")?, usual.glass.settling),
+            delay: millis(options.take_within("delay", MILLIS, " ms")?, usual.glass.delay),
+            settling: millis(options.take_within("settling", MILLIS, " ms")?, usual.glass.settling),
         };
 
         let play = options.take("hysteresis")?.map_or(Ok(usual.play), play)?;
-        let temperature: Option<f64> = options.take("temperature")?;
+        let temperature = options.take_within("temperature", CELSIUS, " °C")?;
         let fault: Option<Fault> = options.take("fault")?;
         options.finish()?;
 

@@ -12,7 +12,7 @@ pub use dynamics::MeasuredDynamics;
 pub use optotune::let_go_of_all;
 pub use response::Response;
 pub use simulated::{SimulatedFault, SimulatedFaults, SimulatedLens};
-pub use spec::{open, open_to_stay};
+pub use spec::{open, open_or_await, open_to_stay};
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -114,6 +114,11 @@ pub struct LensInfo {
     /// Errors on the serial line since the lens was opened: damaged, late or missing replies, and noise.
     pub line_errors: u64,
 }
+
+/// Milliseconds that a specification may give for a delay, a settling time or a latency.
+const MILLIS: std::ops::RangeInclusive<u32> = 0..=10_000;
+/// Temperatures of a lens that a specification may give, °C.
+const CELSIUS: std::ops::RangeInclusive<f64> = -100.0..=200.0;
 
 /// How a lens responds to a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

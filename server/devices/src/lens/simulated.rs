@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::response::Response;
-use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
+use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, MILLIS, Optics};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
@@ -124,8 +124,8 @@ impl SimulatedLens {
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
 
         let dynamics = LensDynamics {
-            delay: millis(options.take("delay")?, DYNAMICS.delay),
-            settling: millis(options.take("settling")?, DYNAMICS.settling),
+            delay: millis(options.take_within("delay", MILLIS, " ms")?, DYNAMICS.delay),
+            settling: millis(options.take_within("settling", MILLIS, " ms")?, DYNAMICS.settling),
         };
         options.finish()?;
 

@@ -12,7 +12,7 @@ use std::sync::{Arc, LazyLock};
 use multiversion::multiversion;
 
 use super::calibration::{BANDS, Calibration};
-use super::colour::{Encoder, linear_srgb_from_bands};
+use super::colour::Encoder;
 use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
 use super::geometry::{PATCH_SIDE, Patch, PatchArea};
 use super::view::{Square, View};
@@ -171,14 +171,8 @@ impl Reconstructor {
 
 /// The weights of [`Mixes::picture`] for white-balanced samples.
 pub(super) fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
-    let corrected = |colour: [f32; BANDS]| {
-        std::array::from_fn(|band| {
-            let through = calibration.correction.iter().zip(colour).map(|(from, weight)| weight * from[band]);
-            Encoder::SCALE * through.sum::<f32>()
-        })
-    };
-
-    let [red, green, blue] = linear_srgb_from_bands(&calibration.bands).map(corrected);
+    let scaled = |colour: [f32; BANDS]| colour.map(|weight| Encoder::SCALE * weight);
+    let [red, green, blue] = calibration.linear_srgb().map(scaled);
     [red, green, blue, [255.0 / 16.0; BANDS]]
 }
 

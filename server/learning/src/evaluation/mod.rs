@@ -1,5 +1,6 @@
 //! Evaluation: every policy on the same focal-time scans, figures over all of them, and tests between any two.
 
+pub mod delay;
 pub mod report;
 pub mod rollout;
 pub mod shard;
@@ -8,12 +9,13 @@ pub mod stacks;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::delay::{delay_of, late_error};
 use crate::scans::ScanSet;
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{PolicyError, Registry};
 use parfocal_base::PolicyName;
 use parfocal_base::statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, wilcoxon};
-use rollout::{NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
+use rollout::{NoTarget, Path, PathFigures, Sureness, roll_out, roll_out_oracle, sharpest};
 
 /// Name of the policy that knows the next optimum.
 pub const ORACLE: &str = "oracle";
@@ -52,6 +54,39 @@ pub struct Row {
     pub in_focus_interval: (f64, f64),
     /// Each scan's, or part's, mean absolute error.
     pub scan_mae: Vec<f64>,
+    /// Mean gradient magnitude of the patch, divided by that at the optimum; mean over all frames. An optimum that
+    /// flickers between two places of equal sharpness does not spoil it.
+    pub sharpness_kept: f64,
+    /// How many frames late somebody would have the same error who knows every optimum exactly and moves by at most 0.1
+    /// a frame; interpolated. `None` if that is more than 50.
+    pub delay: Option<f64>,
+    /// How far its belief can be relied on; `None` if it has none.
+    pub belief: Option<Reliance>,
+}
+
+/// How far a policy's belief can be relied on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Reliance {
+    /// Share of frames in which it is sure of being in focus: at least 85 %.
+    pub sure: f64,
+    /// Share of those in which it was right; `None` if it was never sure.
+    pub right: Option<f64>,
+}
+
+impl Reliance {
+    /// The reliance of several paths together; `None` if they have no claims.
+    #[must_use]
+    pub fn of(paths: &[Path]) -> Option<Self> {
+        let mut all = Sureness::default();
+        for Sureness { claims, sure, right } in paths.iter().map(Path::sureness) {
+            all.claims += claims;
+            all.sure += sure;
+            all.right += right;
+        }
+
+        let right = (all.sure > 0).then(|| all.right as f64 / all.sure as f64);
+        (all.claims > 0).then(|| Self { sure: all.sure as f64 / all.claims as f64, right })
+    }
 }
 
 /// A paired test between two policies, over scans.
@@ -103,19 +138,22 @@ pub fn evaluate(
     let count = scans.count();
     let parts = scans.parts();
 
-    let perfect = |index| {
+    // A scan's course does not depend on what is looked at, so it can be gone through once for all policies.
+    let look = |index| {
         let (mut scan, frames) = scans.scan(index);
-        roll_out_oracle(scan.as_mut(), frames)
+        sharpest(scan.as_mut(), frames)
     };
+    let sharpest: Vec<Vec<f64>> = (0..count).into_par_iter().map(look).collect();
 
+    let perfect = |index: usize| roll_out_oracle(scans.scan(index).0.as_mut(), &sharpest[index]);
     let paths = (0..count).into_par_iter().map(perfect).collect();
     let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths, parts }];
 
     for name in policies {
-        let run = |index| {
+        let run = |index: usize| {
             compute_on_this_thread();
-            let (mut scan, frames) = scans.scan(index);
-            let path = roll_out(registry.build(name)?.as_mut(), scan.as_mut(), frames);
+            let mut scan = scans.scan(index).0;
+            let path = roll_out(registry.build(name)?.as_mut(), scan.as_mut(), &sharpest[index]);
             progress(name.as_str());
             path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
         };
@@ -142,11 +180,13 @@ impl Outcome {
         let column = |of: &[PathFigures], value: fn(&PathFigures) -> f64| of.iter().map(value).collect::<Vec<_>>();
         let errors: Vec<f64> = self.paths.iter().flat_map(Path::errors).collect();
         let scan_mae = column(&parts, |f| f.mae);
+        let mae = mean(&errors);
+        let kept: Vec<f64> = self.paths.iter().flat_map(|path| path.sharpness_kept.iter().copied()).collect();
 
         Row {
             policy: self.policy.clone(),
             frames: errors.len(),
-            mae: mean(&errors),
+            mae,
             sd: deviation(&errors),
             in_focus: mean(&column(&whole, |f| f.in_focus)),
             travel: mean(&column(&whole, |f| f.travel)),
@@ -154,7 +194,19 @@ impl Outcome {
             mae_interval: bootstrap_interval(&scan_mae, 1),
             in_focus_interval: bootstrap_interval(&column(&parts, |f| f.in_focus), 2),
             scan_mae,
+            sharpness_kept: mean(&kept),
+            delay: delay_of(mae, |late| self.late_error(late)),
+            belief: Reliance::of(&self.paths),
         }
+    }
+
+    /// Mean absolute error on these scans of an observer who knows every optimum `late` frames late; see
+    /// [`late_error`].
+    #[must_use]
+    pub fn late_error(&self, late: usize) -> f64 {
+        let frames: usize = self.paths.iter().map(|path| path.optimum.len()).sum();
+        let sum = self.paths.iter().map(|path| path.optimum.len() as f64 * late_error(&path.optimum, late));
+        sum.sum::<f64>() / frames.max(1) as f64
     }
 }
 

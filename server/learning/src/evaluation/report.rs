@@ -7,8 +7,9 @@ use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
+use super::delay::MOST_DELAY;
 use super::rollout::Path;
-use super::{Comparison, ORACLE, Outcome, Row};
+use super::{Comparison, ORACLE, Outcome, Reliance, Row};
 use crate::scans::detail::warning;
 use crate::scans::recorded::Interpolation;
 use parfocal_base::files::replace;
@@ -97,9 +98,9 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
-            "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s \
+            "| policy | MAE ± sd | 95 % CI | in focus | sharpness kept | delay | travel / frame | reversals / s \
              | paper: MAE ± sd | in focus |\n\
-             |---|---|---|---|---|---|---|---|\n",
+             |---|---|---|---|---|---|---|---|---|---|\n",
         );
 
         let paper = if self.subject.between.is_some() { ROBOTIC } else { SIMULATED };
@@ -111,18 +112,21 @@ impl Report {
             };
             let _ = writeln!(
                 text,
-                "| {} | {:.3} ± {:.3} | {:.3}–{:.3} | {:.1} % | {:.4} | {:.2} | {paper} |",
+                "| {} | {:.3} ± {:.3} | {:.3}–{:.3} | {:.1} % | {:.3} | {} | {:.4} | {:.2} | {paper} |",
                 row.policy,
                 row.mae,
                 row.sd,
                 row.mae_interval.0,
                 row.mae_interval.1,
                 100.0 * row.in_focus,
+                row.sharpness_kept,
+                frames_late(row.delay),
                 row.travel,
                 row.reversals,
             );
         }
 
+        text.push_str(&reliances(&self.rows));
         text.push_str(&self.tests());
         let _ = writeln!(text, "\n{}", self.about());
         text
@@ -215,6 +219,10 @@ impl Report {
             record.extend(numbers);
             record.extend([self.subject.scans.clone(), self.subject.seed.to_string(), self.subject.footage.join("; ")]);
             record.push(weights.cloned().unwrap_or_default());
+
+            let belief = row.belief.map(|belief| (Some(belief.sure), belief.right)).unwrap_or_default();
+            let numbers = [Some(row.sharpness_kept), row.delay, belief.0, belief.1];
+            record.extend(numbers.map(|number| number.map_or_else(String::new, |number| number.to_string())));
             table.write_record(record)?;
         }
 
@@ -237,7 +245,7 @@ impl Report {
 }
 
 /// Columns of the table as CSV. New ones are added at the end.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 19] = [
     "policy",
     "frames",
     "mae",
@@ -253,14 +261,36 @@ const COLUMNS: [&str; 15] = [
     "seed",
     "footage",
     "weights",
+    "sharpness_kept",
+    "delay",
+    "sure",
+    "sure_and_right",
 ];
+
+/// A delay for people: frames, or what it is more than.
+pub(super) fn frames_late(delay: Option<f64>) -> String {
+    delay.map_or_else(|| format!("> {MOST_DELAY}"), |frames| format!("{frames:.1}"))
+}
+
+/// What each policy with a belief knows of how sure it may be, as a sentence; empty if there is none.
+fn reliances(rows: &[Row]) -> String {
+    let sentence = |row: &Row| {
+        let Reliance { sure, right } = row.belief?;
+        let right =
+            right.map_or_else(|| "never right".to_owned(), |right| format!("right in {:.1} % of them", 100.0 * right));
+        Some(format!("{} in {:.1} % of the frames, {right}", row.policy, 100.0 * sure))
+    };
+    let all: Vec<String> = rows.iter().filter_map(sentence).collect();
+    if all.is_empty() { all.concat() } else { format!("\nSure of being in focus (85 %): {}.\n", all.join("; ")) }
+}
 
 /// A p for people: `0.030`, or `4e-11` if it is below a thousandth.
 fn probability(p: f64) -> String {
     if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
 
-const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#6a3d9a"];
+const COLOURS: [&str; 9] =
+    ["#999999", "#0072b2", "#56b4e9", "#009e73", "#8c564b", "#e69f00", "#d55e00", "#cc79a7", "#6a3d9a"];
 
 /// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`,
 /// the optimum in black.
@@ -304,7 +334,7 @@ mod tests {
     use super::*;
 
     fn path(errors: [f64; 4]) -> Vec<Path> {
-        errors.map(|error| Path { focal_power: vec![0.5], optimum: vec![0.5 + error] }).to_vec()
+        errors.map(|error| Path { focal_power: vec![0.5], optimum: vec![0.5 + error], ..Path::default() }).to_vec()
     }
 
     fn report() -> Report {

@@ -274,7 +274,7 @@ mod tests {
         let shard = |text: &str, seed: u64| {
             let part = part(text);
             let subject = Subject { scans: "simulated".to_owned(), seed, count: 3, ..Subject::default() };
-            let path = Path { focal_power: vec![0.5], optimum: vec![0.6] };
+            let path = Path { focal_power: vec![0.5], optimum: vec![0.6], ..Path::default() };
             let paths = vec![path; part.scans(3).len()];
             let outcome = Outcome { policy: "fixed".to_owned(), paths, parts: 1 };
             (format!("{text} of seed {seed}"), Shard::new(part, subject, 0, vec![outcome]))

@@ -8,8 +8,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::report::figure;
-use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
+use super::delay::delay_of;
+use super::report::{figure, frames_late};
+use super::{EvaluateError, ORACLE, Outcome, Reliance, Row, evaluate};
 use crate::scans::stack::drift::{StackCourse, StackScans};
 use crate::scans::stack::source::{ScaledStack, StackSource, UnfitStack};
 use parfocal_autofocus::Registry;
@@ -20,6 +21,8 @@ use parfocal_base::{BlurRate, PolicyName};
 
 /// The policy that all others are compared with.
 pub const BASELINE: &str = "mgm-hill-climber";
+/// The strongest policy without training, with which all others are compared too.
+pub const STRONG_BASELINE: &str = "mgm-bisection";
 /// Seeds of the courses, one scan each.
 pub const SEEDS: usize = 3;
 /// First of the seeds by default.
@@ -102,6 +105,14 @@ pub struct Standing {
     pub turns: f64,
     /// The stack and scale where it does worst compared with the hill-climber.
     pub worst: String,
+    /// Geometric mean of its mean absolute error divided by that of `mgm-bisection`.
+    pub beside_bisection: f64,
+    /// Mean of the rows' sharpness kept.
+    pub sharpness_kept: f64,
+    /// How many frames late somebody would have the same `ratio` who knows every optimum exactly; see [`Row::delay`].
+    pub delay: Option<f64>,
+    /// How far its belief can be relied on, over all frames; `None` if it has none.
+    pub belief: Option<Reliance>,
 }
 
 /// The benchmark's figures.
@@ -129,9 +140,10 @@ pub fn evaluate_stacks(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
-    let baseline = PolicyName::new(BASELINE);
-    if !policies.contains(&baseline) {
-        policies.insert(0, baseline);
+    for baseline in [STRONG_BASELINE, BASELINE].map(PolicyName::new) {
+        if !policies.contains(&baseline) {
+            policies.insert(0, baseline);
+        }
     }
 
     let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, told)).collect::<Result<_, _>>()?;
@@ -148,7 +160,7 @@ pub fn evaluate_stacks(
         all.push(outcomes);
     }
 
-    let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks)).collect();
+    let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks, &all)).collect();
     Ok((StackReport { seed, stacks, standings }, all))
 }
 
@@ -163,25 +175,42 @@ pub enum StackReportError {
     Evaluate(#[from] EvaluateError),
 }
 
-/// The standing of `policy`; `None` if a row is missing.
-fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
+/// The standing of `policy` over `stacks`, with each stack's `outcomes`; `None` if a row is missing.
+fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> Option<Standing> {
     let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
-    let pairs: Vec<(Row, Row)> =
-        stacks.iter().map(|result| Some((row(result, policy)?, row(result, BASELINE)?))).collect::<Option<_>>()?;
+    let rows = |name| stacks.iter().map(|result| row(result, name)).collect::<Option<Vec<Row>>>();
+    let own = rows(policy)?;
+    let strong = rows(STRONG_BASELINE)?;
+    let pairs: Vec<(Row, Row)> = own.iter().cloned().zip(rows(BASELINE)?).collect();
 
     let logs: Vec<f64> = pairs.iter().map(|(own, base)| (own.mae / base.mae).ln()).collect();
     let count = logs.len().max(1) as f64;
+    let ratio = (logs.iter().sum::<f64>() / count).exp();
+
+    let beside_strong: f64 = own.iter().zip(&strong).map(|(own, strong)| (own.mae / strong.mae).ln()).sum();
+    let late_ratio = |late: usize| {
+        let errors = outcomes.iter().filter_map(|outcomes| outcomes.first()).map(|outcome| outcome.late_error(late));
+        let logs = errors.zip(&pairs).map(|(error, (_, base))| (error / base.mae).ln());
+        (logs.sum::<f64>() / count).exp()
+    };
+    let paths = outcomes.iter().flatten().filter(|outcome| outcome.policy == policy);
+    let paths: Vec<_> = paths.flat_map(|outcome| outcome.paths.iter().cloned()).collect();
+
     let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
     let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
 
     Some(Standing {
         policy: policy.to_owned(),
-        ratio: (logs.iter().sum::<f64>() / count).exp(),
+        ratio,
         ratio_interval: ratio_interval(stacks, &logs),
         worse_on: logs.iter().filter(|log| **log > 0.0).count(),
         in_focus: pairs.iter().map(|(own, _)| own.in_focus).sum::<f64>() / count,
         turns: turns(|pair| pair.0.reversals) / turns(|pair| pair.1.reversals).max(1e-9),
         worst: format!("{}-{}", stacks[worst].stack, stacks[worst].scale),
+        beside_bisection: (beside_strong / count).exp(),
+        sharpness_kept: own.iter().map(|row| row.sharpness_kept).sum::<f64>() / count,
+        delay: delay_of(ratio, late_ratio),
+        belief: Reliance::of(&paths),
     })
 }
 
@@ -239,14 +268,14 @@ impl StackReport {
         let _ = write!(
             text,
             "\n| compared with {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | \
-             in focus, mean | turns |\n\
-             |---|---|---|---|---|---|---|\n"
+             beside {STRONG_BASELINE} | in focus, mean | sharpness kept | delay | turns | sure: right |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|\n"
         );
 
         for standing in self.standings.iter().filter(|standing| standing.policy != ORACLE) {
             let _ = writeln!(
                 text,
-                "| {} | {:.2} | {:.2}–{:.2} | {} of {} | {} | {:.1} % | {:.2} |",
+                "| {} | {:.2} | {:.2}–{:.2} | {} of {} | {} | {:.2} | {:.1} % | {:.3} | {} | {:.2} | {} |",
                 standing.policy,
                 standing.ratio,
                 standing.ratio_interval.0,
@@ -254,15 +283,20 @@ impl StackReport {
                 standing.worse_on,
                 self.stacks.len(),
                 standing.worst,
+                standing.beside_bisection,
                 100.0 * standing.in_focus,
+                standing.sharpness_kept,
+                frames_late(standing.delay),
                 standing.turns,
+                standing.belief.map_or_else(|| "–".to_owned(), sure_and_right),
             );
         }
 
         let _ = writeln!(
             text,
             "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; \
-             pictures between two planes are mixed.",
+             pictures between two planes are mixed. Sure: the share of frames in which the belief says that it is in \
+             focus with 85 % or more, and how often that was right.",
             self.seed,
             self.seed.wrapping_add(SEEDS as u64 - 1)
         );
@@ -270,9 +304,16 @@ impl StackReport {
     }
 }
 
+/// How often a policy was sure, and how often it was right then, in percent.
+fn sure_and_right(Reliance { sure, right }: Reliance) -> String {
+    let right = right.map_or_else(|| "–".to_owned(), |right| format!("{:.0} %", 100.0 * right));
+    format!("{:.0} %: {right}", 100.0 * sure)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::rollout::Path as Course;
 
     fn result(stack: &str, scale: &'static str, maes: [f64; 2]) -> StackResult {
         let row = |policy: &str, mae: f64| Row {
@@ -286,13 +327,16 @@ mod tests {
             mae_interval: (mae, mae),
             in_focus_interval: (0.5, 0.5),
             scan_mae: vec![mae],
+            sharpness_kept: 0.9,
+            delay: None,
+            belief: None,
         };
         StackResult {
             stack: stack.to_owned(),
             scale,
             planes: 9,
             blur: None,
-            rows: vec![row(BASELINE, maes[0]), row("own", maes[1])],
+            rows: vec![row(BASELINE, maes[0]), row("own", maes[1]), row(STRONG_BASELINE, 0.8 * maes[0])],
         }
     }
 
@@ -304,7 +348,15 @@ mod tests {
             result("b", "s", [0.2, 0.1]),
             result("b", "l", [0.2, 0.1]),
         ];
-        let own = standing("own", &stacks).unwrap();
+        // The optimum is 0.02 further each frame, so who is n frames late is 0.02 n behind once it has gone so far. Over
+        // 25 frames that is (0.02 (0 + 1 + 2 + 3 + 4) + 20 * 0.1) / 25 = 0.088 for five, and 0.1032 for six.
+        let optimum: Vec<f64> = (0..25).map(|frame| 0.5 + 0.02 * f64::from(frame)).collect();
+        let path = Course { focal_power: optimum.clone(), optimum, ..Course::default() };
+        let outcome = Outcome { policy: ORACLE.to_owned(), paths: vec![path], parts: 1 };
+        let own = standing("own", &stacks, &vec![vec![outcome]; 4]).unwrap();
+        // The baseline's errors have the geometric mean sqrt(0.1 * 0.2), and 0.1 is sqrt(0.5) of it.
+        assert!((own.delay.unwrap() - (5.0 + 0.012 / 0.0152)).abs() < 1e-9, "{:?}", own.delay);
+        assert!((own.beside_bisection - 0.5f64.sqrt() / 0.8).abs() < 1e-12 && (own.sharpness_kept - 0.9).abs() < 1e-12);
         // Ratios 1/2, 2, 1/2, 1/2.
         assert!((own.ratio - 0.5f64.sqrt()).abs() < 1e-12);
         assert_eq!((own.worse_on, own.worst.as_str()), (1, "a-l"));

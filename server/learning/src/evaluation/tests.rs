@@ -12,7 +12,8 @@ use parfocal_base::FocalPower;
 use parfocal_devices::simulation::texture::texture;
 
 fn row(focal_power: Vec<f64>, optimum: Vec<f64>) -> Row {
-    Outcome { policy: "a".to_owned(), paths: vec![Path { focal_power, optimum }], parts: PARTS }.row()
+    Outcome { policy: "a".to_owned(), paths: vec![Path { focal_power, optimum, ..Path::default() }], parts: PARTS }
+        .row()
 }
 
 #[test]

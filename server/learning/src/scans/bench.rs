@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::planes::PlaneStack;
-use super::recorded::RecordedScan;
+use super::recorded::{Kept, RecordedScan};
 use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
 use super::stack::source::{ScaledStack, StackSource, UnfitStack};
@@ -37,7 +37,7 @@ pub struct BenchScenes {
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// There is no such folder.
-    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or of focal stacks (pictures)")]
+    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or focal stacks (pictures, or a TIFF)")]
     NoFolder(String),
     /// A recorded scan cannot be read.
     #[error(transparent)]
@@ -80,7 +80,7 @@ impl BenchScenes {
 /// The scenes of one folder.
 fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Result<Vec<Scene>, BenchError> {
     if Path::new(folder).join(HEADER).exists() {
-        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, &|| ())?;
+        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Patches, &|| ())?;
         if scan.poses().len() < 2 {
             return Err(BenchError::OnePose(folder.to_owned()));
         }
@@ -89,7 +89,7 @@ fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Resul
     }
 
     let source = StackSource::parse(folder);
-    if !source.folder.is_dir() {
+    if !source.folder.exists() {
         return Err(BenchError::NoFolder(folder.to_owned()));
     }
 

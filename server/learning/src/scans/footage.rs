@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::footage::{self, ffmpeg, is_picture};
-use parfocal_imaging::{ContentArea, GrayImage, Reconstructor, content_area, decode, reduced};
+use parfocal_devices::camera::footage::{self, SQUARE_PIXELS, cut_off, ffmpeg, is_picture, read_picture};
+use parfocal_imaging::{ContentArea, GrayImage, Reconstructor, content_area, reduced};
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: usize = 480;
@@ -58,7 +58,7 @@ fn unreadable(path: &Path, reason: &str) -> FootageError {
 
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
-    let picture = decode(&bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
+    let picture = read_picture(path, &bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
     let gray = picture.into_gray(&mut Reconstructor::default());
 
     if gray.height <= LINES {
@@ -74,9 +74,10 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         return Err(unreadable(path, "there is no such file"));
     }
 
+    let filters = format!("{SQUARE_PIXELS},scale=-2:'min({LINES},ih)'");
     let output = ffmpeg(path)
         // One frame more than is used, to know whether the video is longer.
-        .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
+        .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &filters])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
         .map_err(footage::FootageError::NoDecoder)?;
@@ -92,12 +93,12 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         return Err(unreadable(path, "it holds no frames"));
     }
 
-    if let Some(told) = told {
-        tell(format_args!(
-            "note: {} is damaged (ffmpeg: {told}); {} frames of it could be read",
-            path.display(),
-            frames.len()
-        ));
+    let cut = if frames.len() > FRAMES { None } else { cut_off(path) };
+    let cut = cut.map_or_else(String::new, |cut| format!("; {cut}"));
+    if told.is_some() || !cut.is_empty() {
+        let why = told.map_or_else(|| "cut off".to_owned(), |told| format!("damaged (ffmpeg: {told})"));
+        let count = frames.len();
+        tell(format_args!("note: {} is {why}; {count} frames of it could be read{cut}", path.display()));
     }
 
     if frames.len() > FRAMES {

@@ -19,12 +19,17 @@ pub mod stack;
 pub mod variety;
 
 use parfocal_base::FocalPower;
-use parfocal_imaging::View;
+use parfocal_imaging::{Patch, View};
 
 /// A focal-time scan that a policy can be run on, frame by frame.
 pub trait FocalTimeScan {
     /// What the camera sees at this frame through a lens at `focal_power`; the patch has whole gray levels, 0..=255.
     fn observe(&mut self, focal_power: FocalPower) -> View;
+
+    /// The patch of what [`FocalTimeScan::observe`] shows, without what lies around it.
+    fn patch(&mut self, focal_power: FocalPower) -> Patch {
+        self.observe(focal_power).patch
+    }
 
     /// The optimal focal power at this frame.
     fn optimum(&self) -> FocalPower;

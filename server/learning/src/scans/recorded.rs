@@ -16,7 +16,9 @@ use parfocal_autofocus::mgm;
 use parfocal_base::FocalPower;
 use parfocal_devices::camera::recorded::{Pose, ScanError, ScanFolder};
 use parfocal_devices::simulation::phantom::{Haste, SENSOR_HEIGHT, SENSOR_WIDTH, Still, Trajectory};
-use parfocal_imaging::{GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, Square, View, WIDER};
+use parfocal_imaging::{
+    GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, Square, Surroundings, View, WIDER,
+};
 
 /// Poses of the paper's robotic scan.
 pub const POSES: usize = 1184;
@@ -40,6 +42,15 @@ pub enum Interpolation {
     Interpolated,
 }
 
+/// What is kept in memory of each picture of a recorded scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kept {
+    /// The patch and the wider ones: 5 KB.
+    Patches,
+    /// The patch's surroundings as well: 21 KB, which makes 0.5 GB of a scan of [`POSES`] poses.
+    Surroundings,
+}
+
 /// A recorded scan's patches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedScan {
@@ -56,6 +67,32 @@ pub struct Stack {
     pub patches: Vec<Box<[u8; PIXELS]>>,
     /// The wider patches for each focal power; empty if only patches are known.
     wider: Vec<[Option<Coarse>; WIDER.len()]>,
+    /// The surroundings for each focal power; empty if they are not kept.
+    surroundings: Vec<Option<Around>>,
+}
+
+/// A patch's [`Surroundings`], in whole gray levels.
+#[derive(Debug, Clone, PartialEq)]
+struct Around {
+    levels: Box<[u8]>,
+    patch: (usize, usize),
+}
+
+impl Around {
+    fn of(surroundings: &Surroundings) -> Self {
+        let levels = surroundings.levels.iter().map(|value| value.round() as u8).collect();
+        Self { levels, patch: surroundings.patch }
+    }
+
+    fn surroundings(&self) -> Surroundings {
+        Surroundings { levels: self.levels.iter().copied().map(f32::from).collect(), patch: self.patch }
+    }
+
+    fn mixed(&self, high: &Self, part: f64) -> Surroundings {
+        let pairs = self.levels.iter().zip(&high.levels);
+        let levels = pairs.map(|(low, high)| mixed_level(*low, *high, part as f32)).collect();
+        Surroundings { levels, patch: self.patch }
+    }
 }
 
 /// A wider patch, in steps of 1/256 of a gray level. Its values are means, so they are finer than whole levels.
@@ -86,13 +123,17 @@ impl Stack {
     pub fn new(powers: &[FocalPower], patches: Vec<Box<[u8; PIXELS]>>) -> Self {
         let metrics = powers.iter().zip(&patches).map(|(&power, patch)| (power, mgm(&as_patch(patch))));
         let best = metrics.max_by(|a, b| a.1.total_cmp(&b.1));
-        Self { optimum: best.map_or(FocalPower::MIDDLE, |(power, _)| power), patches, wider: Vec::new() }
+        let optimum = best.map_or(FocalPower::MIDDLE, |(power, _)| power);
+        Self { optimum, patches, wider: Vec::new(), surroundings: Vec::new() }
     }
 
-    /// This stack with the wider patches of `views`, one for each focal power.
-    fn with_wider_of<'a>(mut self, views: impl IntoIterator<Item = &'a View>) -> Self {
+    /// This stack with what `views`, one for each focal power, show beyond the patch.
+    fn with_rest_of(mut self, views: &[View], kept: Kept) -> Self {
         let coarse = |view: &View| view.wider.each_ref().map(|patch| patch.as_ref().map(Coarse::of));
-        self.wider = views.into_iter().map(coarse).collect();
+        self.wider = views.iter().map(coarse).collect();
+        if kept == Kept::Surroundings {
+            self.surroundings = views.iter().map(|view| view.surroundings.as_ref().map(Around::of)).collect();
+        }
         self
     }
 }
@@ -122,12 +163,12 @@ impl RecordedScan {
         Self { powers, poses }
     }
 
-    /// Reads a scan's patches from its folder, checking every picture. `progress` is called after each
+    /// Reads what is `kept` of a scan from its folder, checking every picture. `progress` is called after each
     /// pose.
     ///
     /// # Errors
     /// If poses are missing, or a picture is damaged.
-    pub fn read(folder: &ScanFolder, progress: &(dyn Fn() + Sync)) -> Result<Self, ScanError> {
+    pub fn read(folder: &ScanFolder, kept: Kept, progress: &(dyn Fn() + Sync)) -> Result<Self, ScanError> {
         let powers = folder.header().focal_powers.clone();
         let poses: Vec<_> = folder.clone().whole()?.poses().values().cloned().collect();
 
@@ -139,23 +180,31 @@ impl RecordedScan {
             let views = images.iter().map(view).collect::<Result<Vec<_>, _>>()?;
             let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
             progress();
-            Ok(Stack { optimum: pose.optimum, patches, wider: Vec::new() }.with_wider_of(&views))
+            let stack = Stack { optimum: pose.optimum, patches, wider: Vec::new(), surroundings: Vec::new() };
+            Ok(stack.with_rest_of(&views, kept))
         };
 
         let poses = poses.into_par_iter().map(read).collect::<Result<_, ScanError>>()?;
         Ok(Self { powers, poses })
     }
 
-    /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it. Makes only the
-    /// patches. `progress` is called after each pose.
+    /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it. Makes only
+    /// what is `kept`. `progress` is called after each pose.
     #[must_use]
-    pub fn phantom(trajectory: &Trajectory, seed: u64, powers: usize, progress: &(dyn Fn() + Sync)) -> Self {
+    pub fn phantom(
+        trajectory: &Trajectory,
+        seed: u64,
+        powers: usize,
+        kept: Kept,
+        progress: &(dyn Fn() + Sync),
+    ) -> Self {
         let powers = evenly_spread(powers);
         let reconstructor = Reconstructor::default();
 
         let still = |samples: &mut Vec<u16>, pose| {
             let still = trajectory.still(pose)?;
-            let stack = frozen(&still, &reconstructor, samples, (&powers, &capture_order(seed, pose, powers.len())));
+            let order = capture_order(seed, pose, powers.len());
+            let stack = frozen(&still, &reconstructor, samples, (&powers, &order), kept);
             progress();
             Some(stack)
         };
@@ -215,7 +264,15 @@ impl RecordedScan {
             Interpolation::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
         };
 
-        View { patch, wider: std::array::from_fn(wider) }
+        let around = |position: usize| pose.surroundings.get(position)?.as_ref();
+        let surroundings = match between {
+            Interpolation::Nearest => around(nearest).map(Around::surroundings),
+            Interpolation::Interpolated => {
+                around(above - 1).zip(around(above)).map(|(low, high)| low.mixed(high, part))
+            }
+        };
+
+        View { patch, wider: std::array::from_fn(wider), surroundings }
     }
 }
 
@@ -225,6 +282,7 @@ fn frozen(
     reconstructor: &Reconstructor,
     samples: &mut Vec<u16>,
     (powers, order): (&[FocalPower], &[usize]),
+    kept: Kept,
 ) -> Stack {
     let mut views = vec![View::from(Patch([0.0; PIXELS])); powers.len()];
 
@@ -244,7 +302,7 @@ fn frozen(
     }
 
     let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
-    Stack::new(powers, patches).with_wider_of(&views)
+    Stack::new(powers, patches).with_rest_of(&views, kept)
 }
 
 /// Writes `levels` into `square`, which must lie within `picture`.
@@ -287,8 +345,12 @@ fn as_levels(patch: &Patch) -> [u8; PIXELS] {
 }
 
 fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
-    let part = part as f32;
-    Patch(std::array::from_fn(|i| (f32::from(low[i]) + part * (f32::from(high[i]) - f32::from(low[i]))).round()))
+    Patch(std::array::from_fn(|i| mixed_level(low[i], high[i], part as f32)))
+}
+
+fn mixed_level(low: u8, high: u8, part: f32) -> f32 {
+    let low = f32::from(low);
+    (low + part * (f32::from(high) - low)).round()
 }
 
 /// A replay of a recorded scan, one pose a frame. It stays at the last pose.
@@ -347,7 +409,7 @@ mod tests {
     /// One pose at focal powers 0, 0.5 and 1 whose patches are even: 0, 100 and 200.
     fn ramp() -> RecordedScan {
         let patches = [0, 100, 200].map(|level| Box::new([level; PIXELS])).to_vec();
-        RecordedScan::new(evenly_spread(3), vec![Stack { optimum: FocalPower::MIDDLE, patches, wider: Vec::new() }])
+        RecordedScan::new(evenly_spread(3), vec![Stack::new(&evenly_spread(3), patches)])
     }
 
     #[test]
@@ -373,7 +435,7 @@ mod tests {
         let area = PatchArea { x: 48, y: 48, width: 32, height: 32 };
         let views = [1, 2].map(|seed| gray_view(&picture(seed), area));
         let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
-        let stack = Stack::new(&evenly_spread(2), patches).with_wider_of(&views);
+        let stack = Stack::new(&evenly_spread(2), patches).with_rest_of(&views, Kept::Surroundings);
         let scan = RecordedScan::new(evenly_spread(2), vec![stack]);
 
         let expected = [1, 2].map(|seed| {
@@ -388,6 +450,14 @@ mod tests {
                     let mixed = low.0[i] + share * (high.0[i] - low.0[i]);
                     assert!((found - mixed).abs() < 0.01, "{index}, {i}: {found} {mixed}");
                 }
+            }
+
+            let around = seen.surroundings.unwrap();
+            let levels = [1, 2].map(|seed| picture(seed).data.iter().map(|value| value.round()).collect::<Vec<_>>());
+            assert_eq!(around.patch, (48, 48));
+            for (i, found) in around.levels.iter().enumerate() {
+                let mixed = levels[0][i] + share * (levels[1][i] - levels[0][i]);
+                assert!((found - mixed).abs() <= 0.5, "{i}: {found} {mixed}");
             }
         }
     }

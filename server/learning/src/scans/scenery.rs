@@ -21,6 +21,15 @@ struct Group {
 }
 
 impl Scenery {
+    /// Each of `groups` with the same share of the scans; empty ones are left out. `None` if all are empty.
+    #[must_use]
+    pub fn evenly(groups: Vec<Vec<Scene>>) -> Option<Self> {
+        let groups: Vec<Vec<Scene>> = groups.into_iter().filter(|scenes| !scenes.is_empty()).collect();
+        let share = 1.0 / groups.len() as f64;
+        let groups: Vec<Group> = groups.into_iter().map(|scenes| Group { share, scenes }).collect();
+        (!groups.is_empty()).then_some(Self { groups })
+    }
+
     /// This scenery with `share` of all scans over `scenes`; the other groups keep their proportions in the rest.
     /// Nothing changes if `scenes` is empty or `share` is 0.
     #[must_use]

@@ -19,7 +19,7 @@ use parfocal_devices::simulation::normal::{cheap_normal, standard_normal};
 use parfocal_devices::simulation::patch_defocus::{Defocus, Spot};
 use parfocal_devices::simulation::unrest::{Restlessness, Unrest};
 use parfocal_devices::simulation::walk::{Motion, Walk};
-use parfocal_imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
+use parfocal_imaging::{PATCH_SIDE, Patch, Square, Surroundings, View, WIDER};
 
 /// How a scan moves, blurs and is exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,6 +133,8 @@ pub struct Scan {
     /// Noise of the wider patches. It has its own stream, so that the patch's noise is the same whether the wider
     /// patches are observed or not.
     wider_noise: ChaCha8Rng,
+    /// Noise of the surroundings, likewise.
+    surrounding_noise: ChaCha8Rng,
     defocus: Defocus,
 }
 
@@ -213,6 +215,7 @@ impl Scan {
             unrest_course,
             noise,
             wider_noise,
+            surrounding_noise: ChaCha8Rng::seed_from_u64(seed ^ 0x6172_6f75_6e64),
             defocus,
         }
     }
@@ -254,7 +257,7 @@ impl Scan {
         let gain = self.settings.exposure.0 as f32;
         let offset = self.settings.exposure.1 as f32;
         let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
-        expose(&mut patch, gain, (detail * self.contrast) as f32, offset);
+        expose(&mut patch.0, gain, (detail * self.contrast) as f32, offset);
 
         if self.settings.noise > 0.0 {
             for value in &mut patch.0 {
@@ -266,23 +269,37 @@ impl Scan {
             *value += pattern;
         }
 
-        digitise(&mut patch);
+        digitise(&mut patch.0);
         patch
     }
 
-    /// The patch of [`Scan::observe`], and the wider ones around it.
+    /// The patch of [`Scan::observe`], and the wider ones around it; without surroundings.
     pub fn view(&mut self, focal_power: FocalPower) -> View {
+        View { surroundings: None, ..self.view_of_light(focal_power) }
+    }
+
+    /// As [`Scan::view`], with surroundings. They cost as much again, mostly for their noise.
+    pub fn whole_view(&mut self, focal_power: FocalPower) -> View {
+        let mut view = self.view_of_light(focal_power);
+        if let Some(surroundings) = view.surroundings.take() {
+            view.surroundings = Some(self.take_surroundings(&surroundings, &view.patch));
+        }
+        view
+    }
+
+    /// [`Scan::view`] with surroundings as the light has them: without exposure, noise and rounding.
+    fn view_of_light(&mut self, focal_power: FocalPower) -> View {
         let patch = self.observe(focal_power);
-        let wider = match self.scene.clone() {
-            Scene::Flat(clip) => self.look_widely(&clip, &patch, focal_power).wider,
+        let around = match self.scene.clone() {
+            Scene::Flat(clip) => self.look_widely(&clip, &patch, focal_power),
             Scene::Stack(stack) => {
                 let (corner, position) = self.place_in_stack(&stack, focal_power);
-                stack.planes.view(corner, position).wider
+                stack.planes.view(corner, position)
             }
-            Scene::Recorded(scan) => self.look_at_recorded(&scan, focal_power).wider,
+            Scene::Recorded(scan) => self.look_at_recorded(&scan, focal_power),
         };
 
-        let mut view = View { patch, wider };
+        let mut view = View { patch, ..around };
         for (index, patch) in view.wider.iter_mut().enumerate() {
             if let Some(patch) = patch {
                 self.take_wider(patch, index);
@@ -298,7 +315,7 @@ impl Scan {
         let gain = self.settings.exposure.0 as f32;
         let offset = self.settings.exposure.1 as f32;
         let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
-        expose(patch, gain, (detail * self.contrast) as f32, offset);
+        expose(&mut patch.0, gain, (detail * self.contrast) as f32, offset);
 
         if self.settings.noise > 0.0 {
             let noise = self.settings.noise as f32 / WIDER[index].pixels() as f32;
@@ -312,6 +329,34 @@ impl Scan {
         }
 
         patch.0.iter_mut().for_each(|value| *value = value.clamp(0.0, 255.0));
+    }
+
+    /// Turns the light around a patch into what the camera records, as for the patch itself, which becomes part of it.
+    /// The fixed pattern is that of the patch, repeated.
+    fn take_surroundings(&mut self, light: &Surroundings, patch: &Patch) -> Surroundings {
+        let mut levels = light.levels.to_vec();
+        let gain = self.settings.exposure.0 as f32;
+        let offset = self.settings.exposure.1 as f32;
+        let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
+        expose(&mut levels, gain, (detail * self.contrast) as f32, offset);
+
+        if self.settings.noise > 0.0 {
+            for value in &mut levels {
+                *value += self.settings.noise as f32 * cheap_normal(&mut self.surrounding_noise);
+            }
+        }
+
+        if !self.pattern.is_empty() {
+            for (index, value) in levels.iter_mut().enumerate() {
+                let x = (index % Surroundings::SIDE + PATCH_SIDE - light.patch.0 % PATCH_SIDE) % PATCH_SIDE;
+                let y = (index / Surroundings::SIDE + PATCH_SIDE - light.patch.1 % PATCH_SIDE) % PATCH_SIDE;
+                *value += self.pattern[y * PATCH_SIDE + x];
+            }
+        }
+
+        digitise(&mut levels);
+        put_patch(patch, light.patch, &mut levels);
+        Surroundings { levels: levels.into(), patch: light.patch }
     }
 
     /// What is seen of a focal stack.
@@ -357,6 +402,11 @@ impl Scan {
                 for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
                     *value += share * (veiled - *value);
                 }
+            }
+
+            if let (Some(seen), Some(veil)) = (&mut view.surroundings, &veil.surroundings) {
+                let pairs = seen.levels.iter().zip(veil.levels.iter());
+                seen.levels = pairs.map(|(value, veiled)| value + share * (veiled - value)).collect();
             }
         }
 
@@ -448,26 +498,38 @@ impl Scene {
     }
 }
 
-/// Scales differences from the patch's mean by `contrast`, then everything by `gain`, and adds `offset`.
+/// Scales differences from the levels' mean by `contrast`, then everything by `gain`, and adds `offset`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn expose(patch: &mut Patch, gain: f32, contrast: f32, offset: f32) {
-    let mean = patch.0.iter().sum::<f32>() / patch.0.len() as f32;
-    for value in &mut patch.0 {
+fn expose(levels: &mut [f32], gain: f32, contrast: f32, offset: f32) {
+    let mean = levels.iter().sum::<f32>() / levels.len() as f32;
+    for value in levels {
         *value = gain * (mean + contrast * (*value - mean)) + offset;
     }
 }
 
 /// Rounds to whole gray levels, 0..=255.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn digitise(patch: &mut Patch) {
-    for value in &mut patch.0 {
+fn digitise(levels: &mut [f32]) {
+    for value in levels {
         *value = value.clamp(0.0, 255.0).round();
+    }
+}
+
+/// Writes `patch` into the surroundings `levels`, with its corner at `(x, y)`.
+fn put_patch(patch: &Patch, (x, y): (usize, usize), levels: &mut [f32]) {
+    let lines = levels.chunks_exact_mut(Surroundings::SIDE).skip(y);
+    for (line, row) in lines.zip(patch.0.chunks_exact(PATCH_SIDE)) {
+        line[x..x + PATCH_SIDE].copy_from_slice(row);
     }
 }
 
 impl FocalTimeScan for Scan {
     fn observe(&mut self, focal_power: FocalPower) -> View {
-        self.view(focal_power)
+        self.whole_view(focal_power)
+    }
+
+    fn patch(&mut self, focal_power: FocalPower) -> Patch {
+        Self::observe(self, focal_power)
     }
 
     fn optimum(&self) -> FocalPower {

@@ -7,4 +7,5 @@ pub mod error;
 pub mod optimiser;
 pub mod recipe;
 pub mod run;
+pub mod served;
 pub mod trainer;

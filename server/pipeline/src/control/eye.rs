@@ -47,8 +47,10 @@ impl Eye {
     pub fn look(&self, image: &FrameImage, area: PatchArea, field: FieldOfView) -> View {
         match (field, image) {
             (FieldOfView::Patch, _) => View::from(self.patch(image, area)),
-            (FieldOfView::Wide, FrameImage::Mosaic(mosaic)) => self.reconstructor.gray_view(mosaic, area),
-            (FieldOfView::Wide, FrameImage::Rgb(rgb)) => rgb_view(rgb, area),
+            (FieldOfView::Wide | FieldOfView::Surroundings, FrameImage::Mosaic(mosaic)) => {
+                self.reconstructor.gray_view(mosaic, area)
+            }
+            (FieldOfView::Wide | FieldOfView::Surroundings, FrameImage::Rgb(rgb)) => rgb_view(rgb, area),
         }
     }
 }

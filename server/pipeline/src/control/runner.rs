@@ -85,7 +85,7 @@ impl Runner {
         self.hurry();
         self.asked_at = Some(now);
         // If the thread has ended, the reason is among the answers.
-        let _ = self.questions.try_send(Question { view: *seen.view, focal_power: seen.focal_power });
+        let _ = self.questions.try_send(Question { view: seen.view.clone(), focal_power: seen.focal_power });
     }
 
     /// Time at which the open question was asked; `None` if no question is open.

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::sqlite::SqliteConnection;
 
 use super::actors::name_actor;
 use super::chain::{self, Head};
+use super::insert::Insert;
 use super::schema::DATABASE;
-use super::values::{drop_if_failed, nanoseconds};
+use super::values::nanoseconds;
+use super::writer::Writer;
 use super::{Reader, Store, StoreError};
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SessionId;
@@ -81,7 +82,7 @@ impl Access {
 /// Records accesses to a database, in that database.
 #[derive(Clone)]
 pub struct Recorder {
-    way: Backend,
+    writer: Writer,
     /// The data folder.
     folder: PathBuf,
     reader: Reader,
@@ -92,14 +93,6 @@ pub struct Recorder {
     clock: Arc<dyn Clock>,
 }
 
-#[derive(Clone)]
-enum Backend {
-    /// Within the server.
-    Server(Store),
-    /// From the command line, whether or not a server runs.
-    CommandLine(SqlitePool),
-}
-
 impl Recorder {
     /// Records what `by` does through the server.
     #[must_use]
@@ -107,7 +100,7 @@ impl Recorder {
         let folder = store.inner.folder.clone();
         let Actor { role, account } = by;
         Self {
-            way: Backend::Server(store.clone()),
+            writer: Writer::Server(store.clone()),
             folder,
             reader: store.reader().clone(),
             role: Some(role),
@@ -127,15 +120,9 @@ impl Recorder {
 
     pub(super) async fn open_file(file: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
         let reader = Reader::open_checked(file).await?;
-        let options = SqliteConnectOptions::new()
-            .filename(file)
-            .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5))
-            .pragma("wal_autocheckpoint", "0")
-            .synchronous(SqliteSynchronous::Full);
-        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+        let writer = Writer::of_command(file).await?;
         let folder = file.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(Self { way: Backend::CommandLine(pool), folder, reader, role: None, account: None, clock })
+        Ok(Self { writer, folder, reader, role: None, account: None, clock })
     }
 
     /// The data folder.
@@ -155,23 +142,13 @@ impl Recorder {
     /// # Errors
     /// If the disk or database fails.
     pub async fn record(&self, access: &Access) -> Result<Head, StoreError> {
-        let (pool, run, _turn) = match &self.way {
-            Backend::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
-            Backend::CommandLine(pool) => (pool, None, None),
-        };
-
-        let mut connection = pool.acquire().await?;
-        let recorded = self.record_on(&mut connection, run, access).await;
-        drop_if_failed(connection, &recorded);
-        recorded
+        let run = self.writer.run();
+        self.writer.write(async |connection| self.record_on(connection, run, access).await).await
     }
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Backend::CommandLine(pool) = &self.way {
-            self.reader.close().await;
-            pool.close().await;
-        }
+        self.writer.close(&self.reader).await;
     }
 
     async fn record_on(
@@ -191,21 +168,19 @@ impl Recorder {
 
         // Chains the session's telemetry first, so that the export can prove it.
         if let Access::Exported { session, .. } = access {
-            chain::seal(&mut transaction, &session.to_string(), &wall, false).await?;
+            chain::seal(&mut transaction, &session.to_string(), &wall).await?;
         }
 
-        let done = sqlx::query(
-            "INSERT INTO accesses (run, wall, monotonic_ns, role, kind, session, detail) VALUES (?, ?, ?, ?, ?, ?, ?)",
-        )
-        .bind(run)
-        .bind(&wall)
-        .bind(run.map(|_| nanoseconds(self.clock.now())))
-        .bind(self.role.map_or("command-line", Role::name))
-        .bind(access.name())
-        .bind(session)
-        .bind(access.detail())
-        .execute(&mut *transaction)
-        .await?;
+        let done = Insert::into("accesses")
+            .set("run", run)
+            .set("wall", &wall)
+            .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
+            .set("role", self.role.map_or("command-line", Role::name))
+            .set("kind", access.name())
+            .set("session", session)
+            .set("detail", access.detail())
+            .execute(&mut transaction)
+            .await?;
 
         let number = done.last_insert_rowid().to_string();
         name_actor(&mut transaction, self.account.as_ref(), "access", &number, access.session(), &wall).await?;

@@ -2,13 +2,14 @@
 //! its name.
 
 use std::fs::{DirBuilder, File};
+use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use jiff::Timestamp;
 use serde::Serialize;
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError, TempPath};
 
 use super::export::verify::{Check, Verdict};
 use super::lock::FolderLock;
@@ -35,6 +36,20 @@ pub enum BackupError {
         /// The error of the file system.
         error: std::io::Error,
     },
+    /// The disk has no room for a copy beside the database.
+    #[error(
+        "the disk of {} has no room for a copy of the database ({needed} bytes) beside the reserve that is kept for a \
+         session; make room, or run `parfocal backup` with --out on another disk", .path.display()
+    )]
+    NoRoom {
+        /// Folder of the copy.
+        path: PathBuf,
+        /// Size of the database in bytes.
+        needed: u64,
+    },
+    /// The receiver of a backup stopped reading, or its disk is full.
+    #[error("the backup was not sent whole: {0}; remove what arrived of it, and try again")]
+    Sending(io::Error),
     /// The copy does not verify.
     #[error("{what} does not verify: {problem}; nothing was changed")]
     Unsound {
@@ -114,22 +129,98 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
         return Err(BackupError::Exists(out.to_owned()));
     }
 
-    let copy = temporary_beside(out)?;
+    let temporary = temporary_beside(out)?;
     let recorder = Recorder::open(folder, clock).await?;
-    recorder.record(&Access::BackedUp).await?;
-    let copied = recorder.reader().copy_to(copy.path()).await;
+    let copied = copy_into(&recorder, temporary, &out.display().to_string()).await;
     recorder.close().await;
-    copied?;
 
-    let head = verified(copy.path(), &out.display().to_string()).await?;
-    let bytes = copy.as_file().metadata().map_err(BackupError::file(out))?.len();
-    synced(copy.path())?;
-    copy.persist_noclobber(out).map_err(|error| match error.error.kind() {
-        std::io::ErrorKind::AlreadyExists => BackupError::Exists(out.to_owned()),
-        _ => BackupError::File { path: out.to_owned(), error: error.error },
-    })?;
+    let VerifiedCopy { file, bytes, head } = copied?;
+    put_in_place(file, out, |file, out| file.persist_noclobber(out))?;
     sync_folder_of(out);
     Ok(Backup { file: out.to_owned(), bytes, head: head.to_string() })
+}
+
+/// Sends a verified copy of the database of data folder `folder` to `receiver`, whether or not a server has the
+/// database open. The copy is made in the data folder and removed afterwards.
+///
+/// # Errors
+/// If the data folder has no room for the copy, the database cannot be read, the copy does not verify, or `receiver`
+/// does not take all of it.
+pub async fn backup_to(folder: &Path, receiver: &mut impl Write, clock: Arc<dyn Clock>) -> Result<Backup, BackupError> {
+    let recorder = Recorder::open(folder, clock).await?;
+    let copied = verified_copy(&recorder, folder).await;
+    recorder.close().await;
+
+    let VerifiedCopy { file, bytes, head } = copied?;
+    let mut content = file.reopen().map_err(BackupError::file(file.path()))?;
+    io::copy(&mut content, receiver).and_then(|_| receiver.flush()).map_err(BackupError::Sending)?;
+    Ok(Backup { file: PathBuf::from("-"), bytes, head: head.to_string() })
+}
+
+/// A verified copy of a database, in a file that is removed when this is dropped.
+pub struct VerifiedCopy {
+    file: NamedTempFile,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// Head of its chain.
+    pub head: Head,
+}
+
+impl VerifiedCopy {
+    /// The path of the file, which is removed when the path is dropped.
+    #[must_use]
+    pub fn into_path(self) -> TempPath {
+        self.file.into_temp_path()
+    }
+}
+
+/// Records a backup, and copies the database of `recorder` into a new file in `folder`.
+///
+/// # Errors
+/// If the file cannot be written, the database cannot be read, or the copy does not verify.
+pub async fn verified_copy(recorder: &Recorder, folder: &Path) -> Result<VerifiedCopy, BackupError> {
+    copy_into(recorder, temporary_in(folder)?, "the backup").await
+}
+
+/// Records a backup, and copies the database of `recorder` into `file`. Errors call the copy `what`.
+async fn copy_into(recorder: &Recorder, file: NamedTempFile, what: &str) -> Result<VerifiedCopy, BackupError> {
+    recorder.record(&Access::BackedUp).await?;
+    // A connection of its own: its thread has the priority of this one, and the server's readers stay free.
+    let reader = Reader::open(recorder.folder()).await?;
+    let copied = reader.copy_to(file.path()).await;
+    reader.close().await;
+    copied?;
+
+    let head = verified(file.path(), what).await?;
+    let bytes = file.as_file().metadata().map_err(BackupError::file(file.path()))?.len();
+    synced(file.path())?;
+    Ok(VerifiedCopy { file, bytes, head })
+}
+
+/// Gives `file` the name `out`, unless there is such a file. `rename` does so in one step, where the file system can.
+fn put_in_place(
+    file: NamedTempFile,
+    out: &Path,
+    rename: impl FnOnce(NamedTempFile, &Path) -> Result<File, PersistError>,
+) -> Result<(), BackupError> {
+    let failed = |error: io::Error| match error.kind() {
+        ErrorKind::AlreadyExists => BackupError::Exists(out.to_owned()),
+        _ => BackupError::File { path: out.to_owned(), error },
+    };
+    let file = match rename(file, out) {
+        Ok(_) => return Ok(()),
+        Err(error) if error.error.kind() == ErrorKind::AlreadyExists => return Err(failed(error.error)),
+        Err(error) => error.file,
+    };
+
+    // Some file systems, such as exFAT, can neither rename without replacing nor link. There an empty file of ours takes
+    // the name, if nobody has it, and is then replaced.
+    File::options().write(true).create_new(true).open(out).map_err(failed)?;
+    file.persist(out).map_err(|error| {
+        let _ = std::fs::remove_file(out);
+        failed(error.error)
+    })?;
+    Ok(())
 }
 
 /// Replaces the database of data folder `folder` by the backup `file`. The replaced database is kept beside it.
@@ -216,7 +307,10 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
     // Several restores within a second are possible; a hundred are not.
     let kept = (0..100).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
 
-    std::fs::hard_link(database, &kept).map_err(BackupError::file(&kept))?;
+    // Where the file system has no links, a copy keeps the database at its place as well.
+    std::fs::hard_link(database, &kept)
+        .or_else(|_| std::fs::copy(database, &kept).map(|_| ()))
+        .map_err(BackupError::file(&kept))?;
     for suffix in LOG_SUFFIXES {
         match std::fs::rename(sibling(database, suffix), sibling(&kept, suffix)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -235,7 +329,7 @@ fn put_back(database: &Path, kept: &Path) {
     let moved = |suffix| sibling(kept, suffix).exists();
     let back = |suffix| std::fs::rename(sibling(kept, suffix), sibling(database, suffix));
     if LOG_SUFFIXES.into_iter().filter(|&suffix| moved(suffix)).all(|suffix| back(suffix).is_ok()) {
-        // The database itself was never gone: `kept` is a second name of it.
+        // The database itself was never gone: `kept` is a second name or a copy of it.
         let _ = std::fs::remove_file(kept);
     }
 }
@@ -264,11 +358,42 @@ async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
 
 /// A temporary file beside `path`. It is removed unless it is renamed.
 fn temporary_beside(path: &Path) -> Result<NamedTempFile, BackupError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    temporary_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+}
+
+/// A temporary file in `folder`. It is removed unless it is renamed.
+fn temporary_in(folder: &Path) -> Result<NamedTempFile, BackupError> {
     let builder = tempfile::Builder::new().prefix(".parfocal-backup-").tempfile_in(folder);
     builder.map_err(BackupError::file(folder))
 }
 
 fn synced(path: &Path) -> Result<(), BackupError> {
     File::open(path).and_then(|file| file.sync_all()).map_err(BackupError::file(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a file system does that can neither rename without replacing nor link, such as exFAT.
+    fn not_permitted(file: NamedTempFile, _: &Path) -> Result<File, PersistError> {
+        Err(PersistError { error: io::Error::from_raw_os_error(1), file })
+    }
+
+    #[test]
+    fn a_copy_gets_its_name_on_a_file_system_without_links_and_replaces_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("backup.db");
+        let copy = |text: &str| {
+            let mut file = temporary_beside(&out).unwrap();
+            file.write_all(text.as_bytes()).unwrap();
+            file
+        };
+
+        put_in_place(copy("first"), &out, not_permitted).unwrap();
+        let refused = put_in_place(copy("second"), &out, not_permitted).unwrap_err();
+        assert!(matches!(refused, BackupError::Exists(_)), "{refused}");
+        assert_eq!(std::fs::read_to_string(&out).unwrap(), "first");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1, "nothing is left beside it");
+    }
 }

@@ -4,6 +4,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
+use super::insert::Insert;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::ids::SessionId;
@@ -38,11 +39,8 @@ impl Store {
         by: &Actor,
         stamp: Stamp,
     ) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let kept = insert_consent(&mut connection, self.inner.run, session, consent, by, stamp).await;
-        turn.end(connection, &kept);
-        kept
+        self.write(async |connection| insert_consent(connection, self.inner.run, session, consent, by, stamp).await)
+            .await
     }
 }
 
@@ -56,21 +54,18 @@ async fn insert_consent(
 ) -> Result<(), StoreError> {
     let wall = stamp.wall.to_string();
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO consents (session, text_version, given_on, obtained_by, medium, role, run, wall, monotonic_ns)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(session.to_string())
-    .bind(&consent.text_version)
-    .bind(consent.given_on.to_string())
-    .bind(&consent.obtained_by)
-    .bind(consent.medium.name())
-    .bind(by.role.name())
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(stamp.at))
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("consents")
+        .set("session", session.to_string())
+        .set("text_version", &consent.text_version)
+        .set("given_on", consent.given_on.to_string())
+        .set("obtained_by", &consent.obtained_by)
+        .set("medium", consent.medium.name())
+        .set("role", by.role.name())
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(stamp.at))
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "consent", &number, &wall).await?;

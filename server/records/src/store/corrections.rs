@@ -6,6 +6,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
+use super::insert::Insert;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -91,11 +92,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let corrected = insert_correction(&mut connection, self.inner.run, correction, account).await;
-        turn.end(connection, &corrected);
-        corrected
+        self.write(async |connection| insert_correction(connection, self.inner.run, correction, account).await).await
     }
 }
 
@@ -107,24 +104,20 @@ async fn insert_correction(
 ) -> Result<(), StoreError> {
     let wall = correction.stamp.wall.to_string();
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO corrections (session, subject, record, field, old_value, new_value, reason, role, run, wall,
-             monotonic_ns)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(correction.session.to_string())
-    .bind(correction.subject.name())
-    .bind(&correction.record)
-    .bind(correction.field.name())
-    .bind(&correction.old)
-    .bind(&correction.new)
-    .bind(&correction.reason)
-    .bind(correction.by.name())
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(correction.stamp.at))
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("corrections")
+        .set("session", correction.session.to_string())
+        .set("subject", correction.subject.name())
+        .set("record", &correction.record)
+        .set("field", correction.field.name())
+        .set("old_value", &correction.old)
+        .set("new_value", &correction.new)
+        .set("reason", &correction.reason)
+        .set("role", correction.by.name())
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(correction.stamp.at))
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "correction", &number, &wall).await?;

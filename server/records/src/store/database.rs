@@ -19,6 +19,7 @@ use parfocal_base::files::make_private;
 use parfocal_base::{BlurRate, PolicyName};
 
 use super::counts::Counts;
+use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
@@ -73,6 +74,28 @@ pub(super) struct Inner {
     _lock: FolderLock,
 }
 
+/// A data folder that no other process can change, but whose database is not open yet.
+#[derive(Debug)]
+pub struct LockedFolder {
+    folder: PathBuf,
+    lock: FolderLock,
+}
+
+impl LockedFolder {
+    /// Locks the data folder `folder`. Creates it if it does not exist.
+    ///
+    /// # Errors
+    /// If another server uses the folder, or it cannot be made or written.
+    pub fn of(folder: &Path) -> Result<Self, StoreError> {
+        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
+        made.map_err(|error| StoreError::folder(folder, &error))?;
+
+        let lock = FolderLock::of(folder)?;
+        keep_private(folder);
+        Ok(Self { folder: folder.to_owned(), lock })
+    }
+}
+
 impl Store {
     /// Opens the data folder `folder` and records the start of `run`. Creates the folder and the database if they do
     /// not exist, and brings an older database up to date.
@@ -80,12 +103,15 @@ impl Store {
     /// # Errors
     /// If another server uses the folder, the database is from a newer version, or the disk cannot be written.
     pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
-        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
-        made.map_err(|error| StoreError::folder(folder, &error))?;
+        Self::open_locked(LockedFolder::of(folder)?, run).await
+    }
 
-        let lock = FolderLock::of(folder)?;
-        keep_private(folder);
-
+    /// The same, for a data folder that this process has locked before.
+    ///
+    /// # Errors
+    /// If the database is from a newer version, or the disk cannot be written.
+    pub async fn open_locked(locked: LockedFolder, run: &Run) -> Result<Self, StoreError> {
+        let LockedFolder { folder, lock } = locked;
         let file = folder.join(DATABASE);
         let options = SqliteConnectOptions::new()
             .filename(&file)
@@ -115,7 +141,7 @@ impl Store {
         }
 
         let inner = Inner {
-            folder: folder.to_owned(),
+            folder,
             trial,
             telemetry,
             checkpoints,
@@ -179,16 +205,30 @@ impl Store {
         self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Telemetry)
     }
 
+    /// Writes records, in a turn of their own. What `write` has committed is on disk when this returns.
+    pub(super) async fn write<T>(
+        &self,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let turn = self.turn().await;
+        turn.write(&self.inner.trial, write).await
+    }
+
+    /// Writes telemetry, in a turn of its own.
+    pub(super) async fn write_telemetry<T>(
+        &self,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let turn = self.telemetry_turn().await;
+        turn.write(&self.inner.telemetry, write).await
+    }
+
     /// Records that a device started or stopped working.
     ///
     /// # Errors
     /// If the disk or database fails.
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let recorded = insert_device_event(&mut connection, self.inner.run, event).await;
-        turn.end(connection, &recorded);
-        recorded
+        self.write(async |connection| insert_device_event(connection, self.inner.run, event).await).await
     }
 
     /// Adds participant `code`. A participant that exists already stays as it is.
@@ -196,11 +236,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let added = insert_participant(&mut connection, code, &wall.to_string()).await;
-        turn.end(connection, &added);
-        added
+        self.write(async |connection| insert_participant(connection, code, &wall.to_string()).await).await
     }
 
     /// Limits the database to `pages` pages, so that tests can simulate a full disk.
@@ -225,32 +261,27 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before that, chains what an earlier version recorded, and the telemetry that the run
-/// before left unchained.
+/// Records the start of a run. Before that, chains the telemetry that the run before left unchained.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
 
     let mut connection = trial.acquire().await?;
     let mut transaction = begin(&mut connection).await?;
-    chain::adopt(&mut transaction, &wall).await?;
     seal_what_was_left(&mut transaction, &wall).await?;
 
-    let done = sqlx::query(
-        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, blur, weights, seed)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(&wall)
-    .bind(nanoseconds(run.at))
-    .bind(env!("CARGO_PKG_VERSION"))
-    .bind(&run.camera)
-    .bind(&run.lens)
-    .bind(&run.calibration)
-    .bind(run.blur.map(BlurRate::get))
-    .bind(weights)
-    .bind(run.seed.map(u64::cast_signed))
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("runs")
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(run.at))
+        .set("version", env!("CARGO_PKG_VERSION"))
+        .set("camera", &run.camera)
+        .set("lens", &run.lens)
+        .set("calibration", &run.calibration)
+        .set("blur", run.blur.map(BlurRate::get))
+        .set("weights", weights)
+        .set("seed", run.seed.map(u64::cast_signed))
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid();
     chain::append(&mut transaction, "run", &number.to_string(), &wall).await?;
@@ -264,7 +295,7 @@ async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Re
     let sessions = sqlx::query_scalar("SELECT DISTINCT session FROM events WHERE run = (SELECT max(run) FROM events)");
     let sessions: Vec<String> = sessions.fetch_all(&mut *connection).await?;
     for session in sessions {
-        chain::seal(connection, &session, wall, false).await?;
+        chain::seal(connection, &session, wall).await?;
     }
     Ok(())
 }
@@ -276,17 +307,15 @@ async fn insert_device_event(
 ) -> Result<(), StoreError> {
     let wall = event.wall.to_string();
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
-    )
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(event.at))
-    .bind(&event.device)
-    .bind(event.working)
-    .bind(&event.message)
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("device_events")
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(event.at))
+        .set("device", &event.device)
+        .set("working", event.working)
+        .set("message", &event.message)
+        .execute(&mut transaction)
+        .await?;
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "device", &number, &wall).await?;
@@ -308,7 +337,7 @@ async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall:
 }
 
 /// Keeps other accounts of the machine out of the folder and its files, which hold seeds, policies and what surgeons
-/// said. Earlier versions let every account read them. If the rights cannot be changed, the server runs all the same
+/// said. If the rights cannot be changed, the server runs all the same
 /// and logs a warning.
 fn keep_private(folder: &Path) {
     let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));

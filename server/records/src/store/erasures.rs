@@ -1,10 +1,14 @@
 //! Erasure of words: from their record, from the free pages of the file, and from its log. The record and its hash
 //! stay. The salt of the hash is deleted, so that nobody can test which words had that hash.
 
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
+use super::insert::Insert;
 use super::scrub::scrub;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
@@ -41,6 +45,27 @@ pub struct StoredErasure {
     pub erasure: Erasure,
 }
 
+/// When the words of the records of a session were erased.
+#[derive(Debug, Clone, Default)]
+pub struct Erased(BTreeMap<(Erasable, String), Timestamp>);
+
+impl Erased {
+    /// Takes the `erasures` of a session.
+    #[must_use]
+    pub fn by(erasures: &[StoredErasure]) -> Self {
+        let entry = |StoredErasure { erasure, .. }: &StoredErasure| {
+            ((erasure.subject, erasure.record.clone()), erasure.stamp.wall)
+        };
+        Self(erasures.iter().map(entry).collect())
+    }
+
+    /// When the words of this record were erased, by the server's wall clock; `None` if they were not.
+    #[must_use]
+    pub fn at(&self, subject: Erasable, record: &impl ToString) -> Option<Timestamp> {
+        self.0.get(&(subject, record.to_string())).copied()
+    }
+}
+
 impl Store {
     /// Erases the words of all `erasures`, or of none. Words that were erased before stay so. When this returns, the
     /// words are nowhere in the database's files.
@@ -49,11 +74,8 @@ impl Store {
     /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
     /// free pages of the file or in its log, until the same words are erased again or the server starts again.
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let erased = insert_erasures(&mut connection, self.inner.run, erasures, account).await;
-        turn.end(connection, &erased);
-        erased?;
+        let run = self.inner.run;
+        self.write(async |connection| insert_erasures(connection, run, erasures, account).await).await?;
         scrub(&self.inner.trial).await
     }
 }
@@ -91,20 +113,17 @@ async fn insert_erasure(
         return note_unfinished(connection, known).await;
     }
 
-    let done = sqlx::query(
-        "INSERT INTO erasures (session, subject, record, reason, role, run, wall, monotonic_ns)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(erasure.session.to_string())
-    .bind(erasure.subject.name())
-    .bind(&erasure.record)
-    .bind(&erasure.reason)
-    .bind(erasure.by.name())
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(erasure.stamp.at))
-    .execute(&mut *connection)
-    .await?;
+    let done = Insert::into("erasures")
+        .set("session", erasure.session.to_string())
+        .set("subject", erasure.subject.name())
+        .set("record", &erasure.record)
+        .set("reason", &erasure.reason)
+        .set("role", erasure.by.name())
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(erasure.stamp.at))
+        .execute(connection)
+        .await?;
     let number = done.last_insert_rowid();
 
     let emptied = match erasure.subject {
@@ -145,6 +164,14 @@ async fn note_unfinished(connection: &mut SqliteConnection, number: i64) -> Resu
 }
 
 impl Reader {
+    /// The number of erasures in the database.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub(super) async fn count_erasures(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar("SELECT count(*) FROM erasures").fetch_one(self.pool()).await?)
+    }
+
     /// The erasures in `session`, in the order in which they were made.
     ///
     /// # Errors

@@ -31,6 +31,13 @@ pub enum StoreError {
     /// The database was made by an older version, and is open for reading only.
     #[error("the database is of another version of parfocal; start `parfocal serve` on it once to update it")]
     Outdated,
+    /// The file has no tables.
+    #[error(
+        "the database has no tables: it was probably copied while a server ran, without the file beside it whose name \
+         ends in -wal and which holds the latest records; make the copy with `parfocal backup`, which needs no second \
+         file, or copy that file too"
+    )]
+    WithoutLog,
     /// The folder cannot be used.
     #[error("the data folder {} cannot be used: {reason}", .folder.display())]
     Folder {
@@ -84,6 +91,7 @@ impl StoreError {
             Self::InUse { .. }
             | Self::Newer { .. }
             | Self::Outdated
+            | Self::WithoutLog
             | Self::Folder { .. }
             | Self::Missing(_)
             | Self::ErasureUnfinished => false,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
-use sqlx::{Connection as _, Row, migrate::Migrate};
+use sqlx::{AssertSqlSafe, Connection as _, Row, migrate::Migrate};
 
 use super::motion::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR, check_names};
@@ -21,6 +21,22 @@ use parfocal_trial::phase::SessionStatus;
 /// Rows that are read ahead of the caller that takes them. With fewer, two threads wait for each other over and over
 /// while telemetry is read.
 const ROWS_AHEAD: usize = 1024;
+
+/// Selects the lines of the list of sessions.
+const SESSION_LINES: &str = "SELECT session, wall, participant, protocol, practice,
+             (SELECT study FROM study_sessions AS m WHERE m.session = s.session) AS study,
+             (SELECT kind FROM events AS e
+                 WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
+             (SELECT count(*) FROM events AS e
+                 WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
+             (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
+             (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
+             (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
+                 AS emergency,
+             EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
+             (SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
+                 ORDER BY number DESC LIMIT 1) AS corrected_participant
+         FROM sessions AS s";
 
 /// A database open for reading. Clone freely.
 #[derive(Clone, Debug)]
@@ -78,6 +94,10 @@ impl Reader {
 
     pub(super) async fn check_version(&self) -> Result<(), StoreError> {
         let mut connection = self.pool.acquire().await?;
+        let tables: i64 = sqlx::query_scalar("SELECT count(*) FROM sqlite_master").fetch_one(&mut *connection).await?;
+        if tables == 0 {
+            return Err(StoreError::WithoutLog);
+        }
         let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
         if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
             return Err(StoreError::Newer { version: newer.version });
@@ -89,6 +109,13 @@ impl Reader {
 
     pub(super) const fn pool(&self) -> &SqlitePool {
         &self.pool
+    }
+
+    /// Size of the database in bytes, without its log.
+    pub(super) async fn bytes(&self) -> Result<u64, StoreError> {
+        let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&self.pool).await?;
+        let size: i64 = sqlx::query_scalar("PRAGMA page_size").fetch_one(&self.pool).await?;
+        Ok(u64::try_from(pages.saturating_mul(size)).unwrap_or(0))
     }
 
     /// Copies the database as it is now into `file`, which must be empty or must not exist.
@@ -138,27 +165,19 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT session, wall, participant, protocol, practice,
-                 (SELECT study FROM study_sessions AS m WHERE m.session = s.session) AS study,
-                 (SELECT kind FROM events AS e
-                     WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
-                 (SELECT count(*) FROM events AS e
-                     WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
-                 (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
-                 (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
-                 (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
-                     AS emergency,
-                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
-                 (SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
-                     ORDER BY number DESC LIMIT 1) AS corrected_participant
-             FROM sessions AS s WHERE practice = 0 OR ?1 ORDER BY s.rowid DESC",
-        )
-        .bind(practice)
-        .fetch_all(&self.pool)
-        .await?;
-
+        let sql = format!("{SESSION_LINES} WHERE practice = 0 OR ? ORDER BY s.rowid DESC");
+        let rows = sqlx::query(AssertSqlSafe(sql)).bind(practice).fetch_all(&self.pool).await?;
         rows.iter().map(line).collect()
+    }
+
+    /// The line of `session` in the list; `None` if there is no such session.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn session_line(&self, session: SessionId) -> Result<Option<SessionLine>, StoreError> {
+        let sql = format!("{SESSION_LINES} WHERE session = ?");
+        let row = sqlx::query(AssertSqlSafe(sql)).bind(session.to_string()).fetch_optional(&self.pool).await?;
+        row.as_ref().map(line).transpose()
     }
 
     /// The clocks at each start of the server. If the wall clock was behind when a run began, that run counts from the

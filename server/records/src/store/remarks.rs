@@ -1,9 +1,14 @@
 //! Comments and answers. Each is kept once, however often it is sent, and never changed.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
+use super::insert::Insert;
 use super::values::{begin, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
@@ -27,11 +32,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn keep_comment(&self, comment: &Comment) -> Result<KeepOutcome, StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let kept = insert_comment(&mut connection, self.inner.run, comment).await;
-        turn.end(connection, &kept);
-        kept
+        self.write(async |connection| insert_comment(connection, self.inner.run, comment).await).await
     }
 
     /// Keeps an answer. It is on disk when this returns.
@@ -39,11 +40,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn keep_answer(&self, answer: &Answer) -> Result<KeepOutcome, StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let kept = insert_answer(&mut connection, self.inner.run, answer).await;
-        turn.end(connection, &kept);
-        kept
+        self.write(async |connection| insert_answer(connection, self.inner.run, answer).await).await
     }
 
     /// Notes how many comments and answers of a session a surgeon's device still holds, at `stamp`.
@@ -78,31 +75,27 @@ async fn insert_comment(
     let (kind, text) = said_columns(&comment.said);
 
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence,
-             client_millis, waited_ms, waited_by, late, frame, frame_run, kind, text)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
-    )
-    .bind(comment.key.to_string())
-    .bind(comment.session.to_string())
-    .bind(comment.segment.map(|segment| segment.to_string()))
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(comment.stamp.at))
-    .bind(comment.origin.device.map(|device| device.to_string()))
-    .bind(comment.origin.sequence)
-    .bind(comment.origin.client_millis)
-    .bind(comment.origin.waited_millis)
-    .bind(comment.origin.waited_by.map(WaitClock::name))
-    .bind(comment.late)
-    .bind(comment.frame.map(u64::cast_signed))
-    .bind(comment.frame_run)
-    .bind(kind)
-    .bind(text)
-    .execute(&mut *transaction)
-    .await?;
+    let is_new = Insert::into("comments")
+        .set("key", comment.key.to_string())
+        .set("session", comment.session.to_string())
+        .set("segment", comment.segment.map(|segment| segment.to_string()))
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(comment.stamp.at))
+        .set("device", comment.origin.device.map(|device| device.to_string()))
+        .set("sequence", comment.origin.sequence)
+        .set("client_millis", comment.origin.client_millis)
+        .set("waited_ms", comment.origin.waited_millis)
+        .set("waited_by", comment.origin.waited_by.map(WaitClock::name))
+        .set("late", comment.late)
+        .set("frame", comment.frame.map(u64::cast_signed))
+        .set("frame_run", comment.frame_run)
+        .set("kind", kind)
+        .set("text", text.as_deref())
+        .execute_once(&mut transaction)
+        .await?;
 
-    if done.rows_affected() == 1 {
+    if is_new {
         chain::append(&mut transaction, "comment", &comment.key.to_string(), &wall).await?;
         transaction.commit().await?;
         return Ok(KeepOutcome::New);
@@ -128,29 +121,25 @@ async fn insert_answer(
     let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
     let mut transaction = begin(connection).await?;
-    let done = sqlx::query(
-        "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns, device, sequence,
-             client_millis, waited_ms, waited_by, late)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
-    )
-    .bind(answer.key.to_string())
-    .bind(answer.session.to_string())
-    .bind(answer.segment.map(|segment| segment.to_string()))
-    .bind(&answer.question)
-    .bind(&value)
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(answer.stamp.at))
-    .bind(answer.origin.device.map(|device| device.to_string()))
-    .bind(answer.origin.sequence)
-    .bind(answer.origin.client_millis)
-    .bind(answer.origin.waited_millis)
-    .bind(answer.origin.waited_by.map(WaitClock::name))
-    .bind(answer.late)
-    .execute(&mut *transaction)
-    .await?;
+    let is_new = Insert::into("answers")
+        .set("key", answer.key.to_string())
+        .set("session", answer.session.to_string())
+        .set("segment", answer.segment.map(|segment| segment.to_string()))
+        .set("question", &answer.question)
+        .set("value", &value)
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(answer.stamp.at))
+        .set("device", answer.origin.device.map(|device| device.to_string()))
+        .set("sequence", answer.origin.sequence)
+        .set("client_millis", answer.origin.client_millis)
+        .set("waited_ms", answer.origin.waited_millis)
+        .set("waited_by", answer.origin.waited_by.map(WaitClock::name))
+        .set("late", answer.late)
+        .execute_once(&mut transaction)
+        .await?;
 
-    if done.rows_affected() == 1 {
+    if is_new {
         chain::append(&mut transaction, "answer", &answer.key.to_string(), &wall).await?;
         transaction.commit().await?;
         return Ok(KeepOutcome::New);
@@ -241,6 +230,17 @@ impl Reader {
     }
 }
 
+/// The comments that the surgeon took back, each with when that was kept. A withdrawal that came too late to count is
+/// none.
+#[must_use]
+pub fn withdrawn(comments: &[(i64, Comment)]) -> BTreeMap<IdempotencyKey, Timestamp> {
+    let withdrawn = |(_, comment): &(i64, Comment)| match comment.said {
+        CommentContent::Withdrawal(key) if !comment.late => Some((key, comment.stamp.wall)),
+        _ => None,
+    };
+    comments.iter().filter_map(withdrawn).collect()
+}
+
 fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
     let frame: Option<i64> = row.try_get("frame")?;
     Ok(Comment {
@@ -275,16 +275,13 @@ fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
 fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
     let device: Option<String> = row.try_get("device")?;
     let waited_by: Option<String> = row.try_get("waited_by")?;
-    let origin = Origin {
+    Ok(Origin {
         device: device.map(|_| parsed(row, "device")).transpose()?,
         sequence: row.try_get("sequence")?,
         client_millis: row.try_get("client_millis")?,
         waited_millis: row.try_get("waited_ms")?,
         waited_by: waited_by.as_deref().and_then(WaitClock::named),
-    };
-
-    // Records of older versions name no clock. It was the wall clock.
-    Ok(origin.plausible())
+    })
 }
 
 fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {
@@ -302,16 +299,18 @@ fn said(row: &SqliteRow) -> Result<CommentContent, StoreError> {
         // An erasure leaves an empty text.
         ("voice", None) => Ok(CommentContent::Voice),
         ("voice", Some(text)) if text.is_empty() => Ok(CommentContent::Voice),
+        ("withdrawal", Some(_)) => Ok(CommentContent::Withdrawal(parsed(row, "text")?)),
         _ => Err(StoreError::Damaged(format!("comment of kind '{kind}'"))),
     }
 }
 
 /// A comment's kind and text, as in the database and in exports.
-pub(super) fn said_columns(said: &CommentContent) -> (&'static str, Option<&str>) {
+pub(super) fn said_columns(said: &CommentContent) -> (&'static str, Option<Cow<'_, str>>) {
     match said {
-        CommentContent::Text(text) => ("text", Some(text)),
-        CommentContent::Quick(text) => ("quick", Some(text)),
+        CommentContent::Text(text) => ("text", Some(text.into())),
+        CommentContent::Quick(text) => ("quick", Some(text.into())),
         CommentContent::Mark => ("mark", None),
         CommentContent::Voice => ("voice", None),
+        CommentContent::Withdrawal(key) => ("withdrawal", Some(key.to_string().into())),
     }
 }

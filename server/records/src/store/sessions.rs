@@ -7,6 +7,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
+use super::insert::Insert;
 use super::session_events::insert_event;
 use super::studies::{Enrolment, enrol};
 use super::values::{begin, nanoseconds, parsed, stamp};
@@ -103,11 +104,7 @@ impl Store {
         created: &Event,
         enrolment: Option<&Enrolment>,
     ) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let made = insert_session(&mut connection, self.inner.run, new, created, enrolment).await;
-        turn.end(connection, &made);
-        made
+        self.write(async |connection| insert_session(connection, self.inner.run, new, created, enrolment).await).await
     }
 
     /// Appends `events` to `session`, all or none. Appending the same events again changes nothing.
@@ -115,11 +112,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let appended = insert_events(&mut connection, self.inner.run, session, events).await;
-        turn.end(connection, &appended);
-        appended
+        self.write(async |connection| insert_events(connection, self.inner.run, session, events).await).await
     }
 
     /// Notes how long `segment`, under way in `session`, has been inspected so far.
@@ -156,34 +149,30 @@ async fn insert_session(
 ) -> Result<(), StoreError> {
     let wall = new.stamp.wall.to_string();
     let mut transaction = begin(connection).await?;
-    sqlx::query(
-        "INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml,
-         protocol_sha256, practice, algorithm, seed, set_index, commitment)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(new.session.to_string())
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(new.stamp.at))
-    .bind(&new.participant)
-    .bind(&new.protocol)
-    .bind(&new.protocol_toml)
-    .bind(&new.protocol_sha256)
-    .bind(new.practice)
-    .bind(new.algorithm.name())
-    .bind(new.seed.to_hex())
-    .bind(i64::try_from(new.set_index).unwrap_or(i64::MAX))
-    .bind(&new.commitment)
-    .execute(&mut *transaction)
-    .await?;
+    Insert::into("sessions")
+        .set("session", new.session.to_string())
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(new.stamp.at))
+        .set("participant", &new.participant)
+        .set("protocol", &new.protocol)
+        .set("protocol_toml", &new.protocol_toml)
+        .set("protocol_sha256", &new.protocol_sha256)
+        .set("practice", new.practice)
+        .set("algorithm", new.algorithm.name())
+        .set("seed", new.seed.to_hex())
+        .set("set_index", i64::try_from(new.set_index).unwrap_or(i64::MAX))
+        .set("commitment", &new.commitment)
+        .execute(&mut transaction)
+        .await?;
 
     for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
-        sqlx::query("INSERT INTO segments (segment, session, setting, policy) VALUES (?, ?, ?, ?)")
-            .bind(segment.to_string())
-            .bind(new.session.to_string())
-            .bind(setting)
-            .bind(policy.as_str())
-            .execute(&mut *transaction)
+        Insert::into("segments")
+            .set("segment", segment.to_string())
+            .set("session", new.session.to_string())
+            .set("setting", setting)
+            .set("policy", policy.as_str())
+            .execute(&mut transaction)
             .await?;
     }
 

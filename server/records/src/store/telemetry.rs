@@ -147,11 +147,7 @@ impl Writer {
             return Ok(());
         }
 
-        let turn = store.telemetry_turn().await;
-        let mut connection = store.inner.telemetry.acquire().await?;
-        let written = self.write_on(&mut connection, store.run()).await;
-        turn.end(connection, &written);
-        written
+        store.write_telemetry(async |connection| self.write_on(connection, store.run()).await).await
     }
 
     async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
@@ -201,11 +197,7 @@ impl Store {
         let started = self.inner.started;
         let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
 
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let sealed = seal(&mut connection, segments, &wall).await;
-        turn.end(connection, &sealed);
-        sealed
+        self.write(async |connection| seal(connection, segments, &wall).await).await
     }
 }
 
@@ -218,7 +210,7 @@ async fn seal(connection: &mut SqliteConnection, segments: &BTreeSet<SegmentId>,
     }
 
     for session in sessions {
-        chain::seal(&mut transaction, &session, wall, false).await?;
+        chain::seal(&mut transaction, &session, wall).await?;
     }
     Ok(transaction.commit().await?)
 }

@@ -1,7 +1,6 @@
 //! Values as the database keeps them.
 
 use jiff::Timestamp;
-use sqlx::pool::PoolConnection;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Row, Sqlite, Transaction};
 
@@ -36,12 +35,4 @@ where
 /// and its writes.
 pub(super) async fn begin(connection: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, StoreError> {
     Ok(connection.begin_with("BEGIN IMMEDIATE").await?)
-}
-
-/// Closes `connection` if its transaction failed. The pool then opens another. A full disk can undo a transaction
-/// behind the driver's back or leave it half open, and a half-open one would keep all others from writing forever.
-pub(super) fn drop_if_failed<T>(mut connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
-    if outcome.is_err() {
-        connection.close_on_drop();
-    }
 }

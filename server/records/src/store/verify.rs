@@ -117,7 +117,6 @@ fn found(row: &SqliteRow) -> Result<FoundRow, StoreError> {
         key: text("key")?,
         session: text("session")?,
         place: row.try_get("place")?,
-        adopted: row.try_get("adopted")?,
         salt: text("salt")?,
         sealed: text("sealed")?,
         content: text("content")?,

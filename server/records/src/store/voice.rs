@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
+use super::insert::Insert;
 use super::remarks::is_erased;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
@@ -133,11 +134,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn keep_voice(&self, piece: &VoicePiece) -> Result<PieceKept, StoreError> {
-        let turn = self.turn().await;
-        let mut connection = self.inner.trial.acquire().await?;
-        let kept = insert_piece(&mut connection, self.inner.run, piece).await;
-        turn.end(connection, &kept);
-        kept
+        self.write(async |connection| insert_piece(connection, self.inner.run, piece).await).await
     }
 }
 
@@ -184,25 +181,21 @@ async fn insert_piece(connection: &mut SqliteConnection, run: i64, new: &VoicePi
     }
 
     let erased = is_erased(&mut transaction, "comment", &new.comment).await?;
-    let done = sqlx::query(
-        "INSERT INTO voice_pieces (comment, session, piece, media_type, through_ms, ended, bytes, sha256, audio, run,
-             wall, monotonic_ns)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(&comment)
-    .bind(new.session.to_string())
-    .bind(new.piece)
-    .bind(new.media_type.name())
-    .bind(new.through_ms)
-    .bind(new.ended.map(Ending::name))
-    .bind(i64::try_from(new.audio.len()).unwrap_or(i64::MAX))
-    .bind(&sha256)
-    .bind((!erased).then_some(&new.audio))
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(new.stamp.at))
-    .execute(&mut *transaction)
-    .await?;
+    let done = Insert::into("voice_pieces")
+        .set("comment", &comment)
+        .set("session", new.session.to_string())
+        .set("piece", new.piece)
+        .set("media_type", new.media_type.name())
+        .set("through_ms", new.through_ms)
+        .set("ended", new.ended.map(Ending::name))
+        .set("bytes", i64::try_from(new.audio.len()).unwrap_or(i64::MAX))
+        .set("sha256", &sha256)
+        .set("audio", (!erased).then_some(&new.audio))
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", nanoseconds(new.stamp.at))
+        .execute(&mut transaction)
+        .await?;
 
     chain::append(&mut transaction, "voice-piece", &done.last_insert_rowid().to_string(), &wall).await?;
     transaction.commit().await?;

@@ -6,13 +6,11 @@ use std::time::Duration;
 
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::histogram::Histogram;
-use sqlx::Sqlite;
-use sqlx::pool::PoolConnection;
+use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::MutexGuard;
 use tokio::time::Instant;
 
 use super::StoreError;
-use super::values::drop_if_failed;
 
 /// Upper bounds of the histograms' buckets, in seconds: from a solid-state disk's few milliseconds to a disk that
 /// hangs.
@@ -123,10 +121,15 @@ pub(super) struct Turn<'a> {
 }
 
 impl Turn<'_> {
-    /// Notes the outcome of a write on `connection`, and closes the connection if it failed.
-    pub(super) fn end<T>(&self, connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
-        self.writes.note(outcome);
-        drop_if_failed(connection, outcome);
+    /// Writes on a connection of `pool`, and notes how that went.
+    pub(super) async fn write<T>(
+        &self,
+        pool: &SqlitePool,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let outcome = write_on(pool, write).await;
+        self.writes.note(&outcome);
+        outcome
     }
 }
 
@@ -139,6 +142,21 @@ impl Drop for Turn<'_> {
         times.observe(self.began.elapsed().as_secs_f64());
         self.writes.under_way.clear();
     }
+}
+
+/// Writes on a connection of `pool`. If that fails, the connection is closed, and the pool opens another: a full disk can
+/// undo a transaction behind the driver's back or leave it half open, and a half-open one would keep all others from
+/// writing forever.
+pub(super) async fn write_on<T>(
+    pool: &SqlitePool,
+    write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+) -> Result<T, StoreError> {
+    let mut connection = pool.acquire().await?;
+    let outcome = write(&mut connection).await;
+    if outcome.is_err() {
+        connection.close_on_drop();
+    }
+    outcome
 }
 
 /// A time after the origin in milliseconds, plus one; 0 for none.

@@ -1,5 +1,8 @@
 //! Errors of the analysis.
 
+use std::path::PathBuf;
+
+use crate::package::PackageError;
 use parfocal_records::store::StoreError;
 use parfocal_records::store::export::ExportError;
 use parfocal_trial::study::stage::Stage;
@@ -26,6 +29,30 @@ pub enum AnalysisError {
         /// Its stage.
         stage: Stage,
     },
+    /// A package does not contain the policies.
+    #[error(
+        "{} does not contain the policies: export the study with --unblinded once all of it is unblinded, and join it \
+         again", .0.display()
+    )]
+    BlindedPackage(PathBuf),
+    /// An export in a package was made before its site unblinded the study.
+    #[error(
+        "{} cannot be analysed: {} was exported while the study was {stage} at site '{site}'; unblind the study there, \
+         export it again and join it again", .package.display(), .export.display()
+    )]
+    ExportedBefore {
+        /// The package.
+        package: PathBuf,
+        /// The export in it.
+        export: PathBuf,
+        /// The site of the export.
+        site: String,
+        /// Stage of the study at the time of the export.
+        stage: String,
+    },
+    /// A package could not be read.
+    #[error(transparent)]
+    Package(#[from] PackageError),
     /// The tables could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),

@@ -1,6 +1,7 @@
 //! Figures of an analysis as SVG, for the page and for print: black and gray, told apart by shape.
 
 use super::comparison::Comparison;
+use super::outcomes::{FOCAL_ERROR, Outcome};
 use super::statistics::median;
 use parfocal_base::plot::{Axis, Plot};
 
@@ -14,7 +15,7 @@ const ALL: &str = "#000000";
 pub fn figure(compared: &Comparison) -> Option<String> {
     let means = || compared.surgeons.iter().flat_map(|line| line.means.iter().flatten().copied());
     let positions = compared.position.means.iter().copied();
-    let axis = Scale::over(means().chain(positions))?.within(compared.outcome.lowest, compared.outcome.highest);
+    let axis = Scale::of(&compared.outcome, means().chain(positions))?;
     let label = format!("{} ({})", compared.outcome.label, compared.outcome.unit);
     let up = axis.axis(&label);
 
@@ -62,6 +63,19 @@ struct Scale {
 }
 
 impl Scale {
+    /// The scale of `outcome`, as a whole where it has ends: cut to the data, small differences would look large. A
+    /// distance begins at its zero and ends with the data. `None` if there are no values.
+    fn of(outcome: &Outcome, values: impl Iterator<Item = f64>) -> Option<Self> {
+        let values: Vec<f64> = values.collect();
+        if values.is_empty() {
+            return None;
+        }
+        let Outcome { lowest, highest, .. } = *outcome;
+        let end = highest.filter(|_| outcome.outcome != FOCAL_ERROR);
+        let ends = lowest.into_iter().chain(end);
+        Some(Self::over(values.into_iter().chain(ends))?.within(lowest, highest))
+    }
+
     fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut ends: Option<(f64, f64)> = None;
         for value in values {
@@ -134,6 +148,27 @@ mod tests {
         assert_eq!(ends(&[4.0, 4.0]), (4.0, 5.0, vec![]));
         assert_eq!(ends(&[0.0]), (0.0, 0.5, vec![]));
         assert!(Scale::over(std::iter::empty()).is_none());
+    }
+
+    #[test]
+    fn a_rated_outcome_is_drawn_on_its_whole_scale_and_a_distance_from_zero() {
+        let outcome = |name: &str, lowest, highest| Outcome {
+            outcome: name.to_owned(),
+            label: String::new(),
+            unit: String::new(),
+            better: None,
+            lowest,
+            highest,
+        };
+        let ends = |outcome: &Outcome, values: &[f64]| {
+            let (from, to, _) = told(Scale::of(outcome, values.iter().copied()).unwrap());
+            (from, to)
+        };
+        assert_eq!(ends(&outcome("sharpness", Some(1.0), Some(7.0)), &[5.5, 6.0]), (1.0, 7.0));
+        assert_eq!(ends(&outcome("workload", Some(0.0), Some(100.0)), &[41.0, 44.0]), (0.0, 100.0));
+        assert_eq!(ends(&outcome(FOCAL_ERROR, Some(0.0), Some(1.0)), &[0.04, 0.09]), (0.0, 0.1));
+        assert_eq!(ends(&outcome("turns", None, None), &[2.5, 6.0]), (2.0, 6.0));
+        assert!(Scale::of(&outcome("sharpness", Some(1.0), Some(7.0)), std::iter::empty()).is_none());
     }
 
     #[test]

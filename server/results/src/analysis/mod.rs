@@ -2,10 +2,13 @@
 //! tables.
 
 mod comparison;
+mod database;
 mod error;
+mod exports;
 mod figures;
 mod gathering;
 mod outcomes;
+mod records;
 mod report;
 pub mod statistics;
 mod study;
@@ -17,12 +20,13 @@ mod writing;
 mod tests;
 
 pub use comparison::{Comparison, Difference, LEVEL, Pair, PolicySummary, Position, Repeats, SurgeonMeans, compare};
+pub use database::check;
 pub use error::AnalysisError;
 pub use figures::figure;
 pub use outcomes::{Observation, Outcome};
 pub use report::{
-    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SurgeonWords, Value, WholeSessions, Words,
+    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, Value, WholeSessions, Words,
 };
-pub use study::{analyse, check};
+pub use study::{analyse, analyse_package};
 pub use tables::TABLES;
 pub use words::{decimals, p_words};

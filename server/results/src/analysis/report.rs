@@ -23,8 +23,10 @@ pub struct Analysis {
     /// When the study was unblinded, by the server's wall clock.
     #[schema(value_type = String)]
     pub unblinded: Timestamp,
-    /// Names of the study's sites that this database runs.
+    /// Names of the study's sites that this database, or the databases of this package, run.
     pub sites: Vec<String>,
+    /// Names of the definition's sites of which no session is here.
+    pub missing_sites: Vec<String>,
     /// Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`.
     pub seed: String,
     /// Notes that apply to all figures.
@@ -50,14 +52,31 @@ pub struct ProtocolAnalysis {
     pub sessions: Vec<AnalysedSession>,
     /// Notes that apply to this protocol's figures.
     pub notes: Vec<String>,
-    /// The outcomes, compared between the policies.
+    /// The outcomes, compared between the policies, over all sites.
     pub outcomes: Vec<Comparison>,
+    /// The same for each site alone; empty if all sessions that count are of one site.
+    pub by_site: Vec<SiteAnalysis>,
     /// Answers about sessions as a whole, which cannot be assigned to a policy.
     pub whole_sessions: Vec<WholeSessions>,
     /// Comments and answers in words.
     pub words: Vec<SurgeonWords>,
     /// Every value that was compared.
     pub values: Vec<Value>,
+}
+
+/// The figures of one site's sessions.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SiteAnalysis {
+    /// Name of the site.
+    pub site: String,
+    /// Number of its sessions that count.
+    pub sessions: usize,
+    /// Number of its surgeons whose sessions count.
+    pub surgeons: usize,
+    /// The outcomes, compared between the policies.
+    pub outcomes: Vec<Comparison>,
+    /// Answers about sessions as a whole.
+    pub whole_sessions: Vec<WholeSessions>,
 }
 
 /// A session of the study, and whether it counts.

@@ -1,102 +1,83 @@
 //! Analyses a whole study after it was unblinded.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
-use futures_util::{StreamExt, TryStreamExt, stream};
-
-use super::comparison::compare;
+use super::comparison::{Comparison, compare};
 use super::error::AnalysisError;
-use super::gathering::{GatheredSession, gather};
+use super::gathering::{GatheredSession, GatheredSetting, gather};
 use super::outcomes::{FOCAL_ERROR, IN_FOCUS, Observation, Outcome, asked, asked_of_session, driven};
-use super::report::{AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SurgeonWords, Value, WholeSessions};
+use super::records::{ProtocolRecords, StudyRecords};
+use super::report::{
+    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, Value, WholeSessions,
+};
 use super::statistics::summary;
 use super::words::counted;
-use parfocal_records::store::{Reader, RunClocks, StoredStudy};
-use parfocal_trial::protocol::Protocol;
-use parfocal_trial::study::event::StudyEventKind;
-use parfocal_trial::study::places::Enrolled;
-use parfocal_trial::study::stage::Stage;
-
-/// Number of sessions that are read at a time: as many as a reader has connections.
-const AT_A_TIME: usize = 3;
+use super::{database, exports};
+use parfocal_records::store::{Reader, StoreError};
 
 /// Analyses study `name` in the database of `reader`.
 ///
 /// # Errors
 /// If there is no such study, it is not unblinded, or the database failed.
 pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisError> {
-    let study = check(reader, name).await?;
-    let unblinding = study.events.iter().rev().find(|event| matches!(event.kind, StudyEventKind::Unblinded));
-    let unblinded = unblinding.map(|event| event.wall).unwrap_or_default();
-    let definition = &study.definition;
-    let definition_sha256 = definition.sha256();
-    let seed: String = definition_sha256.chars().take(16).collect();
-    let number = u64::from_str_radix(&seed, 16).unwrap_or(0);
-
-    let clocks = reader.run_clocks().await?;
-    let mut protocols = Vec::new();
-    for protocol in &definition.protocols {
-        let sessions: Vec<&Enrolled> =
-            study.sessions.iter().filter(|session| session.protocol == protocol.name).collect();
-        let (lines, gathered) = gather_all(reader, &clocks, protocol, sessions).await?;
-        let protocol = protocol.clone();
-        // Permutations need much processor time, so keep them off the asynchronous threads.
-        let analysed = tokio::task::spawn_blocking(move || analyse_protocol(&protocol, lines, &gathered, number));
-        protocols
-            .push(analysed.await.map_err(|error| parfocal_records::store::StoreError::Damaged(error.to_string()))?);
-    }
-
-    Ok(Analysis {
-        study: name.to_owned(),
-        title: definition.title.clone(),
-        planned: definition.analysis.clone(),
-        unblinded,
-        sites: study.sites.clone(),
-        notes: notes(),
-        definition_sha256,
-        seed,
-        protocols,
-    })
+    let records = database::read(reader, name).await?;
+    // Permutations need much processor time, so keep them off the asynchronous threads.
+    let analysed = tokio::task::spawn_blocking(move || analyse_records(records));
+    Ok(analysed.await.map_err(|error| StoreError::Damaged(error.to_string()))?)
 }
 
-/// Study `name`, if it can be analysed.
+/// Analyses the package in `folder`, which must be verified: the sessions of all its sites together, and of each site.
 ///
 /// # Errors
-/// If there is no such study, it is not unblinded, or the database failed.
-pub async fn check(reader: &Reader, name: &str) -> Result<StoredStudy, AnalysisError> {
-    let Some(study) = reader.study(name).await? else {
-        let names = reader.study_names().await?;
-        let known = if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
-        return Err(AnalysisError::NoStudy { study: name.to_owned(), known });
-    };
-    match study.state().stage {
-        Stage::Unblinded => Ok(study),
-        stage => Err(AnalysisError::StillBlinded { study: name.to_owned(), stage }),
+/// If the package is blinded, an export in it was made before its site unblinded the study, or a file cannot be read.
+pub fn analyse_package(folder: &Path) -> Result<Analysis, AnalysisError> {
+    Ok(analyse_records(exports::read(folder)?))
+}
+
+fn analyse_records(records: StudyRecords) -> Analysis {
+    let seed: String = records.definition_sha256.chars().take(16).collect();
+    let number = u64::from_str_radix(&seed, 16).unwrap_or(0);
+
+    let sessions = records.protocols.iter().flat_map(|protocol| &protocol.sessions);
+    let with_sessions: BTreeSet<String> = sessions.map(|(line, _)| line.site.clone()).collect();
+    let missing_sites: Vec<String> =
+        records.defined_sites.iter().filter(|site| !with_sessions.contains(*site)).cloned().collect();
+
+    let mut notes = notes();
+    notes.extend(records.notes);
+    if !missing_sites.is_empty() {
+        notes.push(format!(
+            "No session of {} is here: {}. The definition has {}.",
+            counted(missing_sites.len(), "site"),
+            missing_sites.join(", "),
+            counted(records.defined_sites.len(), "site"),
+        ));
+    }
+
+    let sites = &records.defined_sites;
+    let protocols = records.protocols.into_iter().map(|protocol| analyse_protocol(protocol, sites, number)).collect();
+    Analysis {
+        study: records.study,
+        title: records.title,
+        definition_sha256: records.definition_sha256,
+        planned: records.planned,
+        unblinded: records.unblinded,
+        sites: records.sites,
+        missing_sites,
+        seed,
+        notes,
+        protocols,
     }
 }
 
-async fn gather_all(
-    reader: &Reader,
-    clocks: &RunClocks,
-    protocol: &Protocol,
-    sessions: Vec<&Enrolled>,
-) -> Result<(Vec<AnalysedSession>, Vec<GatheredSession>), AnalysisError> {
-    let mut reading = Vec::new();
-    for session in sessions {
-        reading.push(gather(reader, clocks, protocol, session));
-    }
-    let read: Vec<_> = stream::iter(reading).buffered(AT_A_TIME).try_collect().await?;
-    let (lines, gathered): (Vec<_>, Vec<Option<GatheredSession>>) = read.into_iter().unzip();
-    Ok((lines, gathered.into_iter().flatten().collect()))
-}
-
-fn analyse_protocol(
-    protocol: &Protocol,
-    sessions: Vec<AnalysedSession>,
-    gathered: &[GatheredSession],
-    seed: u64,
-) -> ProtocolAnalysis {
+fn analyse_protocol(records: ProtocolRecords, sites: &[String], seed: u64) -> ProtocolAnalysis {
+    let protocol = records.protocol;
+    let (sessions, records): (Vec<AnalysedSession>, Vec<_>) = records.sessions.into_iter().unzip();
+    let gathered: Vec<GatheredSession> =
+        records.into_iter().flatten().map(|session| gather(&protocol, session)).collect();
     let policies: Vec<String> = protocol.policies.iter().map(|policy| policy.as_str().to_owned()).collect();
+
     let with_values = |outcome: &Outcome| {
         gathered
             .iter()
@@ -104,34 +85,72 @@ fn analyse_protocol(
             .any(|setting| setting.values.contains_key(&outcome.outcome))
     };
     let measured: Vec<Outcome> = driven().into_iter().filter(with_values).collect();
-    let notes = protocol_notes(&sessions, gathered, &measured);
+    let notes = protocol_notes(&sessions, &gathered, &measured);
 
-    let mut outcomes = Vec::new();
-    let mut values = Vec::new();
-    for outcome in asked(protocol).into_iter().chain(measured) {
-        let observations = observations(gathered, &outcome.outcome);
-        values.extend(observations.iter().map(|one| value(one, &outcome.outcome)));
-        outcomes.push(compare(outcome, &policies, &observations, seed));
-    }
+    let compared: Vec<Outcome> = asked(&protocol).into_iter().chain(measured).collect();
+    let whole: Vec<Outcome> = asked_of_session(&protocol);
+    let all: Vec<&GatheredSession> = gathered.iter().collect();
+    let of_outcome = |outcome: &Outcome| {
+        let observations = observations(&all, &outcome.outcome);
+        observations.iter().map(|one| value(one, &outcome.outcome)).collect::<Vec<_>>()
+    };
 
     ProtocolAnalysis {
         protocol: protocol.name.clone(),
         researcher_title: protocol.researcher_title.clone(),
-        policies,
         repeats: protocol.repeats,
-        surgeons: gathered.iter().map(|session| &session.surgeon).collect::<BTreeSet<_>>().len(),
+        surgeons: surgeons(&all),
         sessions,
         notes,
-        outcomes,
-        whole_sessions: asked_of_session(protocol).into_iter().map(|asked| whole(asked, gathered)).collect(),
-        words: words(gathered),
-        values,
+        outcomes: comparisons(&compared, &policies, &all, seed),
+        by_site: by_site(sites, &gathered, &compared, &whole, &policies, seed),
+        whole_sessions: whole_sessions(&whole, &all),
+        words: words(&gathered),
+        values: compared.iter().flat_map(of_outcome).collect(),
+        policies,
     }
 }
 
-fn observations(gathered: &[GatheredSession], outcome: &str) -> Vec<Observation> {
-    let of_session = |session: &GatheredSession| {
-        let observation = |(setting, number): (&super::gathering::GatheredSetting, usize)| Observation {
+/// The figures of each site, in the order of `sites`; none if all sessions that count are of one site.
+fn by_site(
+    sites: &[String],
+    gathered: &[GatheredSession],
+    compared: &[Outcome],
+    whole: &[Outcome],
+    policies: &[String],
+    seed: u64,
+) -> Vec<SiteAnalysis> {
+    let of_site = |site: &String| {
+        let own: Vec<&GatheredSession> = gathered.iter().filter(|session| session.site == *site).collect();
+        (!own.is_empty()).then(|| SiteAnalysis {
+            site: site.clone(),
+            sessions: own.len(),
+            surgeons: surgeons(&own),
+            outcomes: comparisons(compared, policies, &own, seed),
+            whole_sessions: whole_sessions(whole, &own),
+        })
+    };
+
+    let with_sessions: BTreeSet<&str> = gathered.iter().map(|session| session.site.as_str()).collect();
+    if with_sessions.len() < 2 {
+        return Vec::new();
+    }
+    sites.iter().filter_map(of_site).collect()
+}
+
+fn comparisons(outcomes: &[Outcome], policies: &[String], sessions: &[&GatheredSession], seed: u64) -> Vec<Comparison> {
+    let of_outcome =
+        |outcome: &Outcome| compare(outcome.clone(), policies, &observations(sessions, &outcome.outcome), seed);
+    outcomes.iter().map(of_outcome).collect()
+}
+
+fn surgeons(sessions: &[&GatheredSession]) -> usize {
+    sessions.iter().map(|session| &session.surgeon).collect::<BTreeSet<_>>().len()
+}
+
+fn observations(sessions: &[&GatheredSession], outcome: &str) -> Vec<Observation> {
+    let of_session = |session: &&GatheredSession| {
+        let observation = |(setting, number): (&GatheredSetting, usize)| Observation {
             session: session.session,
             surgeon: session.surgeon.clone(),
             setting: number,
@@ -141,7 +160,7 @@ fn observations(gathered: &[GatheredSession], outcome: &str) -> Vec<Observation>
         };
         session.settings.iter().zip(1..).map(observation).collect::<Vec<_>>()
     };
-    gathered.iter().flat_map(of_session).collect()
+    sessions.iter().flat_map(of_session).collect()
 }
 
 fn value(one: &Observation, outcome: &str) -> Value {
@@ -156,9 +175,14 @@ fn value(one: &Observation, outcome: &str) -> Value {
     }
 }
 
-fn whole(outcome: Outcome, gathered: &[GatheredSession]) -> WholeSessions {
-    let values: Vec<f64> = gathered.iter().filter_map(|session| session.whole.get(&outcome.outcome).copied()).collect();
-    WholeSessions { missing: gathered.len() - values.len(), summary: summary(&values), outcome }
+fn whole_sessions(outcomes: &[Outcome], sessions: &[&GatheredSession]) -> Vec<WholeSessions> {
+    let of_outcome = |outcome: &Outcome| {
+        let values: Vec<f64> =
+            sessions.iter().filter_map(|session| session.whole.get(&outcome.outcome).copied()).collect();
+        let missing = sessions.len() - values.len();
+        WholeSessions { missing, summary: summary(&values), outcome: outcome.clone() }
+    };
+    outcomes.iter().map(of_outcome).collect()
 }
 
 fn words(gathered: &[GatheredSession]) -> Vec<SurgeonWords> {
@@ -169,7 +193,6 @@ fn words(gathered: &[GatheredSession]) -> Vec<SurgeonWords> {
     let line = |(surgeon, settings): (&str, Vec<SettingWords>)| SurgeonWords { surgeon: surgeon.to_owned(), settings };
     surgeons.into_iter().map(line).filter(|line| !line.settings.is_empty()).collect()
 }
-
 fn notes() -> Vec<String> {
     [
         "Only sessions that were completed and not withdrawn count. Of several answers to a question, the one given \

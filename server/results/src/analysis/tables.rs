@@ -63,6 +63,28 @@ table! {
 }
 
 table! {
+    name: "analysis_sites",
+    description: "Each outcome by policy at each site, where sessions of several sites count",
+    key: [protocol, outcome, site, policy],
+    row:
+    /// Summary of a policy's values at a site.
+    #[derive(Debug, Clone)]
+    SiteRow {
+        protocol: String = means("Protocol's name"),
+        outcome: String = means("Outcome; see analysis_policies"),
+        site: String = means("Site"),
+        surgeons: usize = means("Surgeons of the site whose sessions count"),
+        sessions: usize = means("Sessions of the site that count"),
+        policy: String = means("Policy"),
+        n: usize = means("Settings with a value"),
+        missing: usize = means("Settings without a value"),
+        mean: Option<f64> = means("Mean over the settings"),
+        median: Option<f64> = means("Median"),
+        sd: Option<f64> = means("Standard deviation of the sample (divided by n - 1)"),
+    }
+}
+
+table! {
     name: "analysis_tests",
     description: "What is tested of each outcome over all policies; surgeons with a missing value are left out",
     key: [protocol, outcome],
@@ -167,9 +189,10 @@ table! {
 }
 
 /// Every table of an analysis.
-pub const TABLES: [Table; 7] = [
+pub const TABLES: [Table; 8] = [
     SessionRow::TABLE,
     PolicyRow::TABLE,
+    SiteRow::TABLE,
     TestRow::TABLE,
     PairRow::TABLE,
     WholeRow::TABLE,
@@ -227,6 +250,28 @@ impl ProtocolAnalysis {
             compared.policies.iter().map(row).collect::<Vec<_>>()
         };
         self.outcomes.iter().flat_map(of_outcome).collect()
+    }
+
+    pub(super) fn site_rows(&self) -> Vec<SiteRow> {
+        let mut rows = Vec::new();
+        for site in &self.by_site {
+            for compared in &site.outcomes {
+                rows.extend(compared.policies.iter().map(|line| SiteRow {
+                    protocol: self.protocol.clone(),
+                    outcome: compared.outcome.outcome.clone(),
+                    site: site.site.clone(),
+                    surgeons: site.surgeons,
+                    sessions: site.sessions,
+                    policy: line.policy.clone(),
+                    n: line.summary.n,
+                    missing: line.missing,
+                    mean: line.summary.mean,
+                    median: line.summary.median,
+                    sd: line.summary.sd,
+                }));
+            }
+        }
+        rows
     }
 
     pub(super) fn test_rows(&self) -> Vec<TestRow> {

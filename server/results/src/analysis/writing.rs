@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::comparison::Comparison;
 use super::error::AnalysisError;
 use super::figures::figure;
 use super::report::{Analysis, ProtocolAnalysis};
@@ -43,6 +44,7 @@ impl Analysis {
     async fn write(&self, mut folder: Folder) -> Result<Vec<String>, AnalysisError> {
         folder.table(&rows(self, ProtocolAnalysis::session_rows)).await?;
         folder.table(&rows(self, ProtocolAnalysis::policy_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::site_rows)).await?;
         folder.table(&rows(self, ProtocolAnalysis::test_rows)).await?;
         folder.table(&rows(self, ProtocolAnalysis::pair_rows)).await?;
         folder.table(&rows(self, ProtocolAnalysis::whole_rows)).await?;
@@ -50,10 +52,9 @@ impl Analysis {
         folder.table(&rows(self, ProtocolAnalysis::value_rows)).await?;
 
         for protocol in &self.protocols {
-            for compared in &protocol.outcomes {
-                let Some(svg) = figure(compared) else { continue };
-                let outcome = compared.outcome.outcome.replace('/', "-");
-                folder.file(&format!("figure-{}-{outcome}.svg", protocol.protocol), svg.as_bytes()).await?;
+            figures(&mut folder, &protocol.protocol, "", &protocol.outcomes).await?;
+            for site in &protocol.by_site {
+                figures(&mut folder, &protocol.protocol, &format!("-at-{}", site.site), &site.outcomes).await?;
             }
         }
 
@@ -71,10 +72,22 @@ impl Analysis {
             "parfocal": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "study": self.study,
+                "sites": self.sites,
+                "missing_sites": self.missing_sites,
                 "study_definition_sha256": self.definition_sha256,
                 "unblinded": self.unblinded,
                 "notes": self.notes,
             },
         })
     }
+}
+
+/// Writes a figure of each outcome that has values. The names of the files end in `end`.
+async fn figures(folder: &mut Folder, protocol: &str, end: &str, outcomes: &[Comparison]) -> Result<(), AnalysisError> {
+    for compared in outcomes {
+        let Some(svg) = figure(compared) else { continue };
+        let outcome = compared.outcome.outcome.replace('/', "-");
+        folder.file(&format!("figure-{protocol}-{outcome}{end}.svg"), svg.as_bytes()).await?;
+    }
+    Ok(())
 }

@@ -7,7 +7,7 @@ use super::error::PackageError;
 use super::source::{SESSIONS, Source, exports_of, left_out};
 use super::writing::{Sessions, sums, write};
 use parfocal_records::store::Head;
-use parfocal_records::store::export::verify::{Check, Verdict};
+use parfocal_records::store::export::verify::{Check, Verdict, not_part};
 use parfocal_records::store::export::{ExportFiles, SUMS};
 
 /// Whether `path` looks like a package: it has a folder with sessions.
@@ -68,7 +68,8 @@ fn checksums(folder: &Path) -> Result<Verdict, String> {
     let listed = std::fs::read_to_string(folder.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
     let found = sums(folder).map_err(|error| error.to_string())?;
     compare(&listed, &found)?;
-    Ok(Verdict::Passed(format!("{} files are as they were written", listed.lines().count())))
+    let beside = not_part(folder)?;
+    Ok(Verdict::Passed(format!("{} files are as they were written{beside}", listed.lines().count())))
 }
 
 /// Joins the exports again, and compares every file.

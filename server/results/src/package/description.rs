@@ -6,14 +6,16 @@ use serde_json::{Value, json};
 
 use super::source::{LeftOut, Source};
 use super::table::JoinedTable;
-use parfocal_records::store::export::{Column, FORMAT, TEXTS_IN_CSV};
+use parfocal_records::store::export::{Column, FORMAT, TEXTS_IN_CSV, Type};
 
 /// Start of a package's description.
 const ABOUT: &str = "A study, joined from the exports of its sessions by parfocal. The complete exports \
     are in sessions/. parfocal verify checks each of them, and that the tables here match them. Wall times are UTC; \
     monotonic times are nanoseconds, comparable within a run of a site. Numbers such as run are counted at each site. \
-    telemetry and policy_steps are joined only as Parquet; sessions/ has them as CSV. load.R loads the tables into R, spss/ has them for SPSS, \
-    redcap/ has a data dictionary and an import file for REDCap.";
+    telemetry and policy_steps are joined only as Parquet; sessions/ has them as CSV. load.R loads the tables into R, \
+    spss/ has them for SPSS, redcap/ has a data dictionary and an import file for REDCap. voice/ has the recordings of \
+    voice comments with their duration written into them, for players; the recordings as they arrived, to which the \
+    hashes in the tables belong, are in sessions/.";
 
 /// Kind of the package, as in its description.
 pub const KIND: &str = "study";
@@ -51,7 +53,7 @@ fn resource(table: &JoinedTable, format: &str) -> Value {
         "description": table.table.description,
         "path": format!("{name}.{format}"),
         "format": format,
-        "schema": schema(table),
+        "schema": schema(table, format),
     });
 
     if format == "csv" {
@@ -64,8 +66,16 @@ fn resource(table: &JoinedTable, format: &str) -> Value {
     resource
 }
 
-fn schema(table: &JoinedTable) -> Value {
-    let fields: Vec<Value> = table.columns().map(Column::field).collect();
+fn schema(table: &JoinedTable, format: &str) -> Value {
+    let field = |column: &Column| {
+        let mut field = column.field();
+        // Readers that go through pandas, such as Frictionless, have "nan" where Parquet has no number.
+        if format == "parquet" && matches!(column.kind, Type::Integer | Type::Number) {
+            field["missingValues"] = json!(["", "nan"]);
+        }
+        field
+    };
+    let fields: Vec<Value> = table.columns().map(field).collect();
     let mut schema = json!({ "fields": fields, "primaryKey": table.key, "missingValues": [""] });
     if table.of_sessions() && table.table.name != "sessions" {
         let of_session = json!(["site", "session"]);

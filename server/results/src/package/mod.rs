@@ -10,6 +10,7 @@ mod error;
 mod join;
 mod labels;
 mod parquet;
+mod playable;
 mod r;
 mod redcap;
 mod source;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::PackageError;
+use parfocal_base::files::is_systems_own;
 use parfocal_records::store::export::verify::{Verdict, is_export, verify_files};
 use parfocal_records::store::export::{ExportFiles, FORMAT};
 
@@ -18,6 +19,10 @@ pub const SESSIONS: &str = "sessions";
 pub struct LeftOut {
     /// The session.
     pub session: String,
+    /// Name of the session's site.
+    pub site: String,
+    /// Name of the session's protocol.
+    pub protocol: String,
     /// Why it is not in the package.
     pub reason: String,
 }
@@ -53,9 +58,7 @@ impl Source {
 
         let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
         let export = ExportFiles::of(folder);
-        let package = export.json("datapackage.json").map_err(unreadable)?;
-        let told = &package["parfocal"];
-        let format = told["format"].as_u64().unwrap_or(1);
+        let format = export.format().map_err(unreadable)?;
         if format != FORMAT {
             return Err(PackageError::OtherFormat { folder: folder.to_owned(), found: format, expected: FORMAT });
         }
@@ -70,6 +73,8 @@ impl Source {
             }
         }
 
+        let package = export.json("datapackage.json").map_err(unreadable)?;
+        let told = &package["parfocal"];
         let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let cell = |file: &str, column: &str| {
@@ -123,7 +128,10 @@ pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
 
     let mut folders = Vec::new();
     for entry in std::fs::read_dir(&sessions).map_err(PackageError::unreadable(&sessions))? {
-        folders.push(entry.map_err(PackageError::unreadable(&sessions))?.path());
+        let entry = entry.map_err(PackageError::unreadable(&sessions))?;
+        if !is_systems_own(&entry.file_name()) {
+            folders.push(entry.path());
+        }
     }
     folders.sort();
     Ok(folders)

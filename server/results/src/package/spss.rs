@@ -115,7 +115,8 @@ impl Variable {
             Type::Integer => (5, 20, 0),
             Type::Boolean => (5, 1, 0),
             Type::Number => (5, 20, 6),
-            Type::Datetime => (22, 23, 3),
+            // A day, a time and three decimals have 24 characters. SPSS shows a number where the width is less.
+            Type::Datetime => (22, 24, 3),
         };
         (kind << 16) | ((width as i32) << 8) | decimals
     }

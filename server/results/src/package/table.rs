@@ -1,18 +1,12 @@
 //! A joined table: a table of the exports, with columns for session and site.
 
-use parfocal_records::store::export::{Column, FORMAT, TABLES, Table, Type};
+use parfocal_records::store::export::{Column, TABLES, Table, Type, means};
 
 /// Column that tells the records of different databases apart.
-const SITE: Column = Column {
-    name: "site",
-    kind: Type::String,
-    unit: "",
-    description: "Site of the study that recorded it; numbers such as run are counted at each site",
-    since: FORMAT,
-};
+const SITE: Column = means("Site of the study that recorded it; numbers such as run are counted at each site")
+    .column("site", Type::String);
 
-const SESSION: Column =
-    Column { name: "session", kind: Type::String, unit: "", description: "Session's random id", since: FORMAT };
+const SESSION: Column = means("Session's random id").column("session", Type::String);
 
 /// Tables whose rows may belong to several sessions of a site; each row is joined once.
 const SHARED: [&str; 5] = ["runs", "devices", "studies", "study_events", "weights"];

@@ -14,9 +14,10 @@ use super::error::PackageError;
 use super::parquet::ParquetFile;
 use super::source::{LeftOut, SESSIONS, Source, agree};
 use super::table::{JoinedTable, joined_tables};
-use super::{description, join, r, redcap, spss};
-use parfocal_base::files::{files_below, sync_folder_of, write_through};
-use parfocal_records::store::export::SUMS;
+use super::{description, join, playable, r, redcap, spss};
+use parfocal_base::files::{files_below, is_systems_own, sync_folder_of, write_through};
+use parfocal_records::store::export::{ExportFiles, SUMS};
+use parfocal_trial::voice::MediaType;
 
 /// Summary of the written package.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -116,6 +117,7 @@ fn fill(
 
     join_tables(&tables, &taken, folder, &steps)?;
     beside(&tables, &taken, folder)?;
+    recordings(&taken, folder)?;
     let description = description::describe(&taken, &tables, left_out);
     write_file(folder, "datapackage.json", format!("{description:#}\n").as_bytes())?;
     write_file(folder, SUMS, sums(folder)?.as_bytes())?;
@@ -187,6 +189,9 @@ fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
     fs::create_dir_all(to).map_err(PackageError::unwritable(to))?;
     for entry in fs::read_dir(from).map_err(PackageError::unreadable(from))? {
         let entry = entry.map_err(PackageError::unreadable(from))?;
+        if is_systems_own(&entry.file_name()) {
+            continue;
+        }
         let copy = to.join(entry.file_name());
         if entry.path().is_dir() {
             copy_folder(&entry.path(), &copy)?;
@@ -240,12 +245,31 @@ fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(
     write_file(folder, "redcap/import.csv", &redcap::import(&instruments, sources)?)
 }
 
+/// Writes the recordings of voice comments as players expect them, under the names that the table `voice` has.
+fn recordings(sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+    for source in sources {
+        let export = ExportFiles::of(&source.folder);
+        let column = |name| export.cells("voice.csv", name).map_err(PackageError::unreadable(&source.folder));
+        for (file, media_type) in column("file")?.into_iter().zip(column("media_type")?) {
+            let Some(media_type) = MediaType::named(&media_type).filter(|_| !file.is_empty()) else { continue };
+            let original = source.folder.join(&file);
+            let sound = fs::read(&original).map_err(PackageError::unreadable(&original))?;
+            let place = folder.join(&file);
+            let above = place.parent().unwrap_or(folder);
+            fs::create_dir_all(above).map_err(PackageError::unwritable(above))?;
+            write_file(folder, &file, &playable::with_duration(media_type, sound))?;
+        }
+    }
+    Ok(())
+}
+
 fn write_file(folder: &Path, name: &str, content: &[u8]) -> Result<(), PackageError> {
     let path = folder.join(name);
     write_through(&path, content).map_err(PackageError::unwritable(path))
 }
 
-/// The checksums of all files below `folder`, in the form of `sha256sum`, except that of the list itself.
+/// The checksums of all files below `folder`, in the form of `sha256sum`, except that of the list itself and of files
+/// that operating systems left there.
 pub fn sums(folder: &Path) -> Result<String, PackageError> {
     let mut files = files_below(folder).map_err(PackageError::unreadable(folder))?;
     files.retain(|file| file != Path::new(SUMS));

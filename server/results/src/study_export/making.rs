@@ -97,6 +97,8 @@ async fn sessions_of(
 
     let withdrawn = |session: &Enrolled| LeftOut {
         session: session.session.to_string(),
+        site: session.site.clone(),
+        protocol: session.protocol.clone(),
         reason: "the participant withdrew".to_owned(),
     };
     let left_out = stored.sessions.iter().filter(|session| session.withdrawn).map(withdrawn).collect();

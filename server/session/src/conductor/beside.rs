@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use super::course::Course;
 use super::{ConductError, Conductor};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Answer, Stamp, StoredConsent, StoredCorrection, StoredErasure};
+use parfocal_records::store::{Answer, Erased, Stamp, StoredConsent, StoredCorrection, StoredErasure};
 use parfocal_trial::consent::Consent;
 use parfocal_trial::correction::{Field, Subject};
 use parfocal_trial::erasure::Erasable;
@@ -128,14 +128,8 @@ impl Conductor {
         let corrections = reader.corrections(session).await?;
         let answers = reader.answers(session).await?;
         let comments = reader.comments(session).await?;
-        let erasures = reader.erasures(session).await?;
+        let erased = Erased::by(&reader.erasures(session).await?);
 
-        let erased = |number: i64| {
-            let its_own = |stored: &&StoredErasure| {
-                stored.erasure.subject == Erasable::Correction && stored.erasure.record == number.to_string()
-            };
-            erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
-        };
         let line = |StoredCorrection { number, correction, .. }: StoredCorrection| {
             let mut all = answers.iter().map(|(_, answer)| answer);
             let answer = all.find(|answer| answer.key.to_string() == correction.record);
@@ -159,7 +153,7 @@ impl Conductor {
                 old: words(&correction.old),
                 new: words(&correction.new),
                 reason: correction.reason.clone(),
-                erased: erased(number),
+                erased: erased.at(Erasable::Correction, &number),
             }
         };
         Ok(corrections.into_iter().map(line).collect())

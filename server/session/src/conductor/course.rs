@@ -1,16 +1,17 @@
 //! A session in memory: how it was made, its state, the comments on it, which events are not on disk yet, and what it
 //! requires of the control loop.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::ConductError;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
-use parfocal_base::ids::{SegmentId, SessionId};
+use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_pipeline::control::{Command, Drive};
 use parfocal_records::store::{Comment, NewSession, Reader, RunClocks};
 use parfocal_trial::account::Actor;
@@ -21,8 +22,12 @@ use parfocal_trial::grace::Grace;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::refusal::Refusal;
+use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
-use parfocal_trial::session::{Plan, SessionState, decide, decide_time};
+use parfocal_trial::session::{
+    Plan, SessionState, decide, decide_by_hand, decide_small_picture, decide_tablet, decide_time,
+};
+use parfocal_trial::tablet::{PictureSize, Presence, Report};
 use parfocal_trial::unblinding::Circumstances;
 use parfocal_trial::view::CommentLine;
 
@@ -48,10 +53,10 @@ pub(super) struct Course {
     clock: RunClock,
     /// The participant's consent, if recorded.
     pub consent: Option<Consent>,
-    /// Number of all comments.
-    pub comments: usize,
-    /// The latest comments, newest last.
-    pub latest_comments: Vec<CommentLine>,
+    /// The comments, in the order they were kept. Withdrawals are not among them.
+    comments: Vec<(IdempotencyKey, CommentLine)>,
+    /// The comments that the surgeon took back.
+    withdrawn: BTreeSet<IdempotencyKey>,
     /// Whether the operator has closed it.
     pub dismissed: bool,
     /// Number of events that are on disk.
@@ -64,7 +69,39 @@ pub(super) struct Course {
     begin_at: Option<FocalPower>,
     /// Focal power of the lens when the server ended during this session.
     interrupted_at: Option<FocalPower>,
+    /// Where the operator last moved the lens by hand since the session was stopped, as recorded.
+    by_hand: Option<FocalPower>,
+    /// The operator's latest movement of the lens, until it is recorded.
+    movement: Option<Movement>,
+    /// What the surgeon sees, since the size of the picture last changed in this inspection.
+    sight: Option<Sight>,
+    /// Since when the surgeon's picture is smaller than the protocol allows.
+    small_since: Option<Moment>,
 }
+
+/// Pictures of one size that the surgeon saw.
+#[derive(Debug, Clone, Copy)]
+struct Sight {
+    segment: SegmentId,
+    size: PictureSize,
+    since: Moment,
+    pictures: u64,
+}
+
+/// A picture may be smaller than the protocol allows for this long: each link begins with small ones.
+const SMALL_FOR: Duration = Duration::from_secs(3);
+
+/// A movement of the lens by hand that is not among the events yet, because the hand may still be moving.
+#[derive(Debug, Clone)]
+struct Movement {
+    by: Actor,
+    to: FocalPower,
+    at: Moment,
+    wall: Timestamp,
+}
+
+/// A hand that has not moved the lens for this long is at rest.
+const AT_REST: Duration = Duration::from_secs(1);
 
 /// The number of this run of the server, and the clocks of all runs up to it.
 #[derive(Debug, Clone)]
@@ -80,15 +117,30 @@ impl RunClock {
     }
 }
 
-/// Something that stops the lens: a person's action, or the time limit. It takes effect at once, and is recorded as
-/// soon as the disk takes it.
+/// Something that does not wait for the disk. It takes effect at once, and is recorded as soon as the disk takes it.
 #[derive(Debug, Clone)]
 struct Stop {
     by: Actor,
-    /// `None` means the time limit.
-    action: Option<Action>,
+    cause: StopCause,
     at: Moment,
     wall: Timestamp,
+}
+
+/// What does not wait for the disk.
+#[derive(Debug, Clone)]
+enum StopCause {
+    /// A person's action that stops the lens.
+    Action(Action),
+    /// The time limit.
+    TimeLimit,
+    /// The operator focuses by hand, after the session was stopped.
+    ByHand { to: FocalPower, left_at: Option<FocalPower> },
+    /// The surgeon's tablet went away, or is back.
+    Tablet(Presence),
+    /// The surgeon's picture is smaller than the protocol allows.
+    SmallPicture,
+    /// What the surgeon saw is to be recorded.
+    Seen(EventKind),
 }
 
 impl Course {
@@ -116,14 +168,18 @@ impl Course {
             times: Vec::new(),
             clock,
             consent: None,
-            comments: 0,
-            latest_comments: Vec::new(),
+            comments: Vec::new(),
+            withdrawn: BTreeSet::new(),
             dismissed: false,
             recorded: 0,
             stops: Vec::new(),
             writing: false,
             begin_at: None,
             interrupted_at: None,
+            by_hand: None,
+            movement: None,
+            sight: None,
+            small_since: None,
         }
     }
 
@@ -208,25 +264,135 @@ impl Course {
     /// # Errors
     /// If `by` may not do this, or the action does not fit the session's state.
     pub fn stop(&mut self, by: Actor, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
-        self.take(Stop { by, action: Some(action), at, wall })
+        self.record_movement();
+        self.record_sight(at, wall);
+        self.take(Stop { by, cause: StopCause::Action(action), at, wall })
+    }
+
+    /// Sends the lens to `to` by hand; `lens_at` is where it is. The first place of a movement is recorded as soon as
+    /// the disk takes it, and the last when the hand is at rest.
+    ///
+    /// # Errors
+    /// If `by` may not do this, or the session is neither paused nor aborted.
+    pub fn focus_by_hand(
+        &mut self,
+        by: Actor,
+        to: FocalPower,
+        lens_at: FocalPower,
+        at: Moment,
+        wall: Timestamp,
+    ) -> Result<(), Refusal> {
+        let left_at = self.by_hand.is_none().then_some(lens_at);
+        let is_first = self.movement.is_none() && !self.moved_within(AT_REST, at);
+        if is_first {
+            return self.take(Stop { by, cause: StopCause::ByHand { to, left_at }, at, wall });
+        }
+
+        decide_by_hand(&self.state, by.role, to, left_at)?;
+        self.movement = Some(Movement { by, to, at, wall });
+        Ok(())
+    }
+
+    /// Whether the last event is a movement by hand no longer than `time` before `at`.
+    fn moved_within(&self, time: Duration, at: Moment) -> bool {
+        let last = self.events.last();
+        last.is_some_and(|event| event.kind.focal_power().is_some() && at.since(event.at) < time)
+    }
+
+    /// Makes an event of the operator's last movement of the lens, if there is one that is none yet.
+    pub fn record_movement(&mut self) {
+        let Some(Movement { by, to, at, wall }) = self.movement.take() else { return };
+        // It is refused only if the session is under way again.
+        let _ = self.take(Stop { by, cause: StopCause::ByHand { to, left_at: None }, at, wall });
+    }
+
+    /// The same once the hand is at rest at `now`. Returns whether there was something to record.
+    pub fn record_movement_at_rest(&mut self, now: Moment) -> bool {
+        let at_rest = self.movement.as_ref().is_some_and(|movement| now.since(movement.at) >= AT_REST);
+        if at_rest {
+            self.record_movement();
+        }
+        at_rest
+    }
+
+    /// Whether a movement waits for the hand to come to rest.
+    pub const fn is_moved(&self) -> bool {
+        self.movement.is_some()
     }
 
     /// Ends the setting if its time is up; its events wait for the disk. Returns whether it ended.
     pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
         let before = self.events.len();
+        if decide_time(&self.state, at).is_empty() {
+            return false;
+        }
+        self.record_sight(at, wall);
         // The time limit is never refused.
-        let _ = self.take(Stop { by: Role::System.into(), action: None, at, wall });
+        let _ = self.take(Stop { by: Role::System.into(), cause: StopCause::TimeLimit, at, wall });
         self.events.len() > before
     }
 
+    /// Follows what the surgeon's tablets report. Returns whether there is something to record.
+    pub fn follow_tablets(&mut self, report: &Report, at: Moment, wall: Timestamp) -> bool {
+        let before = self.events.len();
+        let system = |cause| Stop { by: Role::System.into(), cause, at, wall };
+
+        self.see(report, at, wall);
+        if !decide_tablet(&self.state, report.presence, at).is_empty() {
+            self.record_sight(at, wall);
+            // What the server itself notices is never refused.
+            let _ = self.take(system(StopCause::Tablet(report.presence)));
+        }
+        if self.small_since.is_some_and(|since| at.since(since) >= SMALL_FOR) {
+            self.small_since = None;
+            self.record_sight(at, wall);
+            let _ = self.take(system(StopCause::SmallPicture));
+        }
+        self.events.len() > before
+    }
+
+    /// Notes the pictures of `report` that were seen during an inspection.
+    fn see(&mut self, report: &Report, at: Moment, wall: Timestamp) {
+        let Some(segment) = self.state.segment().filter(|_| self.state.running()) else {
+            self.sight = None;
+            self.small_since = None;
+            return;
+        };
+        let Some(size) = report.size else { return };
+
+        let least = self.protocol.least_picture_width.unwrap_or(0);
+        self.small_since = if size.width < least { self.small_since.or(Some(at)) } else { None };
+
+        if self.sight.is_some_and(|sight| sight.size != size) {
+            self.record_sight(at, wall);
+        }
+        let sight = self.sight.get_or_insert(Sight { segment, size, since: at, pictures: 0 });
+        sight.pictures += report.pictures;
+    }
+
+    /// Makes an event of what the surgeon saw until `at`.
+    fn record_sight(&mut self, at: Moment, wall: Timestamp) {
+        let Some(Sight { segment, size, since, pictures }) = self.sight.take() else { return };
+        if !self.state.running() || self.state.segment() != Some(segment) {
+            return;
+        }
+        let over_ms = u64::try_from(at.since(since).as_millis()).unwrap_or(u64::MAX);
+        let seen = EventKind::PicturesSeen { segment, size, pictures, over_ms };
+        let _ = self.take(Stop { by: Role::System.into(), cause: StopCause::Seen(seen), at, wall });
+    }
+
     fn take(&mut self, stop: Stop) -> Result<(), Refusal> {
-        let kinds = match &stop.action {
-            Some(action) => decide(&self.state, stop.by.role, action, stop.at)?,
-            None => decide_time(&self.state, stop.at),
+        let kinds = match &stop.cause {
+            StopCause::Action(action) => decide(&self.state, stop.by.role, action, stop.at)?,
+            StopCause::TimeLimit => decide_time(&self.state, stop.at),
+            StopCause::ByHand { to, left_at } => decide_by_hand(&self.state, stop.by.role, *to, *left_at)?,
+            StopCause::Tablet(presence) => decide_tablet(&self.state, *presence, stop.at),
+            StopCause::SmallPicture => decide_small_picture(&self.state, stop.at),
+            StopCause::Seen(seen) => vec![seen.clone()],
         };
 
         // An action that changes nothing now may change something after the events that are being written.
-        if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
+        if kinds.is_empty() && !(self.writing && matches!(stop.cause, StopCause::Action(_))) {
             return Ok(());
         }
         for event in self.number(&stop.by, kinds, stop.at, stop.wall) {
@@ -269,6 +435,7 @@ impl Course {
         self.state = self.state.replayed(&[]);
         self.grace = Grace::new(self.protocol.grace).locked(self.study_locked);
         self.begin_at = None;
+        self.by_hand = None;
         self.events = Vec::with_capacity(events.len());
         self.times = Vec::with_capacity(events.len());
         for (at, event) in events {
@@ -281,9 +448,23 @@ impl Course {
             EventKind::SegmentStarted { .. } => Some(self.protocol.start),
             EventKind::ServerRestarted { .. } => self.interrupted_at,
             EventKind::Paused { .. } if !self.state.running() => self.begin_at,
-            EventKind::Resumed | EventKind::Unblinded { .. } => self.begin_at,
+            EventKind::FocusedByHand { left_at, .. } => self.begin_at.or(*left_at),
+            EventKind::Resumed
+            | EventKind::ReasonGiven { .. }
+            | EventKind::TabletAway { .. }
+            | EventKind::TabletBack
+            | EventKind::PicturesSeen { .. }
+            | EventKind::Unblinded { .. } => self.begin_at,
             _ => None,
         };
+        match &event.kind {
+            EventKind::FocusedByHand { focal_power, .. } => self.by_hand = Some(*focal_power),
+            EventKind::Resumed => {
+                self.by_hand = None;
+                self.movement = None;
+            }
+            _ => {}
+        }
 
         self.state.apply(&event);
         self.grace.apply(&event.kind, at);
@@ -299,8 +480,7 @@ impl Course {
 
     /// Replaces all comments by `comments`, after some were erased.
     pub fn hear_again(&mut self, comments: impl IntoIterator<Item = Comment>) {
-        self.comments = 0;
-        self.latest_comments.clear();
+        self.comments.clear();
         comments.into_iter().for_each(|comment| self.heard(comment));
     }
 
@@ -316,12 +496,32 @@ impl Course {
 
     /// Adds a comment that was stored.
     pub fn heard(&mut self, comment: Comment) {
-        self.comments += 1;
-        if self.latest_comments.len() == LATEST {
-            self.latest_comments.remove(0);
+        if let CommentContent::Withdrawal(key) = comment.said {
+            if !comment.late {
+                self.withdrawn.insert(key);
+            }
+            return;
         }
+
+        let waited = comment.origin.waited_millis.unwrap_or(0).max(0);
+        let kept = comment.stamp.wall;
+        let at = kept.saturating_sub(SignedDuration::from_millis(waited)).unwrap_or(kept);
         let setting = comment.segment.map(|segment| self.setting(segment));
-        self.latest_comments.push(CommentLine { at: comment.stamp.wall, setting, said: comment.said });
+        self.comments.push((comment.key, CommentLine { at, setting, said: comment.said }));
+    }
+
+    /// The comments that the surgeon did not take back, in the order they were said.
+    pub fn standing_comments(&self) -> Vec<&CommentLine> {
+        let standing = self.comments.iter().filter(|(key, _)| !self.withdrawn.contains(key));
+        let mut standing: Vec<&CommentLine> = standing.map(|(_, line)| line).collect();
+        standing.sort_by_key(|line| line.at);
+        standing
+    }
+
+    /// Where the operator last moved the lens by hand since the session was stopped; `None` if nobody did.
+    pub fn moved_by_hand(&self) -> Option<FocalPower> {
+        let moved = self.movement.as_ref().map(|movement| movement.to).or(self.by_hand);
+        moved.filter(|_| self.state.may_be_focused_by_hand())
     }
 
     /// The command to the control loop that says what drives the lens now. `None` before the session's start and after
@@ -330,6 +530,11 @@ impl Course {
         let segment = self.state.segment();
         let running = self.state.running();
         let paused = self.state.paused().is_some();
+
+        if let Some(to) = self.moved_by_hand() {
+            // Outside the segment: what a hand does is not the policy's path.
+            return Some(Command::Drive { drive: Drive::Manual(to), segment: None });
+        }
 
         let (drive, segment) = match (self.state.phase(), segment) {
             (Phase::Inspecting, Some(segment)) if running => {

@@ -1,11 +1,9 @@
 //! Erases words, together with everything that the database has about them.
 
-use std::collections::BTreeSet;
-
 use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Answer, Comment, Erasure, StoredCorrection};
+use parfocal_records::store::{Answer, Comment, Erased, Erasure, StoredCorrection};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -63,7 +61,8 @@ impl Shared {
     pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let comments = reader.comments(session).await?.into_iter();
-        let comments = comments.filter(|(_, comment)| comment.said != CommentContent::Mark);
+        let wordless = |said: &CommentContent| !said.has_words() && *said != CommentContent::Voice;
+        let comments = comments.filter(|(_, comment)| !wordless(&comment.said));
         let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
         let answers = reader.answers(session).await?.into_iter();
         let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
@@ -72,10 +71,9 @@ impl Shared {
         let notes = notes.filter(|stored| stored.correction.field == Field::Note);
         let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
 
-        let erased = reader.erasures(session).await?;
-        let erased: BTreeSet<(Erasable, String)> =
-            erased.into_iter().map(|stored| (stored.erasure.subject, stored.erasure.record)).collect();
-        let left = comments.chain(answers).chain(notes).filter(|record| !erased.contains(record));
+        let erased = Erased::by(&reader.erasures(session).await?);
+        let is_left = |(subject, record): &(Erasable, String)| erased.at(*subject, record).is_none();
+        let left = comments.chain(answers).chain(notes).filter(is_left);
         Ok(left.collect())
     }
 
@@ -194,8 +192,12 @@ fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind
 }
 
 fn is_comment(comments: &[(i64, Comment)], record: &str) -> Result<(), ConductError> {
-    let found = comments.iter().any(|(_, comment)| comment.key.to_string() == record);
-    if found { Ok(()) } else { Err(no_such_record()) }
+    let found = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
+    let (_, comment) = found.ok_or_else(no_such_record)?;
+    if comment.said.has_words() || comment.said == CommentContent::Voice {
+        return Ok(());
+    }
+    Err(Refusal::conflict("only words can be erased; this comment has none").into())
 }
 
 fn is_text(answers: &[(i64, Answer)], record: &str) -> Result<(), ConductError> {

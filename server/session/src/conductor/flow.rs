@@ -11,15 +11,18 @@ use tokio::time::timeout;
 use super::circumstances::Subject;
 use super::course::Course;
 use super::{ConductError, Live, Pen, Shared, views};
+use parfocal_base::FocalPower;
 use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::{Command, Drive};
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::permission;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::decide_restart;
 use parfocal_trial::study::signature::Signature;
+use parfocal_trial::tablet::Report;
 
 /// How long the screens wait until a stop is on disk. After that they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
@@ -80,6 +83,9 @@ impl Shared {
         let mut pen = self.pen.lock().await;
         let events = loop {
             self.keep_time();
+            if let Some(course) = self.live().course_of(session) {
+                course.record_movement();
+            }
             self.record_stops(&mut pen).await?;
 
             let subject = self.live().course_of(session).map(|course| Subject::of(course));
@@ -123,6 +129,7 @@ impl Shared {
         let mut pen = self.pen.lock().await;
         let mut earlier = self.load(session).await?;
         let circumstances = self.circumstances(&mut pen, Subject::of(&earlier), action, signature).await?;
+        permission::check_while_on_screen(action)?;
         let events = earlier.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
         self.append(session, &events, signature).await
     }
@@ -176,7 +183,8 @@ impl Shared {
         Ok(())
     }
 
-    /// Ends the current setting if its time is up. Returns whether it ended.
+    /// Ends the current setting if its time is up, and makes an event of a movement by hand that has come to rest.
+    /// Returns whether there was something to record.
     pub(super) fn keep_time(&self) -> bool {
         let mut live = self.live();
         let at = self.clock.now();
@@ -185,7 +193,51 @@ impl Shared {
         if ended {
             self.hold(&mut live);
         }
-        ended
+        let rested = live.course.as_mut().is_some_and(|course| course.record_movement_at_rest(at));
+        ended || rested
+    }
+
+    /// Sends the lens to `to` by hand, in a session that is paused or was aborted. Does not wait for the disk.
+    pub(super) async fn focus_by_hand(
+        self: &Arc<Self>,
+        by: &Actor,
+        session: SessionId,
+        to: FocalPower,
+    ) -> Result<(), ConductError> {
+        {
+            let mut live = self.live();
+            let lens_at = self.control.status.borrow().focal_power;
+            let at = self.clock.now();
+            let wall = self.clock.wall();
+            let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
+            course.focus_by_hand(by.clone(), to, lens_at, at, wall)?;
+            self.drive(&mut live);
+        }
+
+        self.record_promptly().await;
+        self.show_and_drive();
+        self.wake();
+        Ok(())
+    }
+
+    /// Follows what the surgeon's tablets report. May pause the session, which does not wait for the disk.
+    pub(super) async fn follow_tablets(self: &Arc<Self>, report: &Report) {
+        let changed = {
+            let mut live = self.live();
+            let at = self.clock.now();
+            let wall = self.clock.wall();
+            let changed = live.course.as_mut().is_some_and(|course| course.follow_tablets(report, at, wall));
+            if changed {
+                self.hold(&mut live);
+            }
+            changed
+        };
+
+        if changed {
+            self.record_promptly().await;
+            self.show_and_drive();
+            self.wake();
+        }
     }
 
     /// Records the stops. Waits for the disk only as long as the screens can wait.

@@ -62,6 +62,9 @@ impl Conductor {
         self.shared.show_and_drive();
 
         let live = self.shared.live();
+        if live.course.as_ref().is_some_and(Course::is_moved) {
+            return BEAT;
+        }
         let Some(course) = live.course.as_ref().filter(|course| course.state.running()) else {
             return Duration::from_hours(1);
         };

@@ -7,12 +7,14 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use parfocal_base::PolicyName;
+use parfocal_base::files::is_systems_own;
 use parfocal_trial::protocol::{Protocol, ProtocolError};
 
 /// Protocols that ship, by file name.
-const SHIPPED: [(&str, &str); 2] = [
+const SHIPPED: [(&str, &str); 3] = [
     ("paper.toml", include_str!("../../../../trial-protocols/paper.toml")),
     ("practice.toml", include_str!("../../../../trial-protocols/practice.toml")),
+    ("follow-up.toml", include_str!("../../../../trial-protocols/follow-up.toml")),
 ];
 
 /// The available protocols, by name.
@@ -126,7 +128,8 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable(folder))? {
         let path = entry.map_err(unreadable(folder))?.path();
-        if path.extension().is_some_and(|extension| extension == "toml") {
+        let is_protocol = path.extension().is_some_and(|extension| extension == "toml");
+        if is_protocol && !path.file_name().is_some_and(is_systems_own) {
             files.push(path);
         }
     }
@@ -150,14 +153,14 @@ mod tests {
     use super::*;
 
     fn known() -> Vec<PolicyName> {
-        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned"].map(PolicyName::new).to_vec()
+        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned", "parfocal"].map(PolicyName::new).to_vec()
     }
 
     #[test]
     fn the_shipped_protocols_are_there_without_any_folder() {
         let library = Library::load(None, &known()).unwrap();
-        assert_eq!(library.names(), "paper, practice");
-        assert_eq!(library.summaries()[0].settings, 6);
+        assert_eq!(library.names(), "follow-up, paper, practice");
+        assert_eq!(library.get("paper").unwrap().settings(), 6);
     }
 
     #[test]
@@ -169,7 +172,7 @@ mod tests {
         std::fs::write(folder.path().join("b.toml"), shorter).unwrap();
         std::fs::write(folder.path().join("notes.txt"), "no protocol").unwrap();
         let library = Library::load(Some(folder.path()), &known()).unwrap();
-        assert_eq!(library.names(), "mine, paper, practice");
+        assert_eq!(library.names(), "follow-up, mine, paper, practice");
         assert_eq!(library.get("paper").unwrap().segment_limit.as_secs(), 100);
     }
 

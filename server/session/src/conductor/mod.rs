@@ -37,7 +37,9 @@ pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
 pub use studies::Studies;
 pub use study_reports::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol, StudySession};
-pub use timeline::{PauseSpan, Played, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint, TimelineVoice};
+pub use timeline::{
+    PauseSpan, Played, SetAside, SettingSpan, SightSpan, Timeline, TimelineComment, TimelinePoint, TimelineVoice,
+};
 
 use course::{Course, RunClock};
 use parfocal_autofocus::Registry;
@@ -53,6 +55,7 @@ use parfocal_trial::protocol::Record;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal_trial::role::Role;
 use parfocal_trial::study::signature::Signature;
+use parfocal_trial::tablet::Report;
 use parfocal_trial::view::{OperatorView, SurgeonView};
 
 /// The parts that a conductor is made of.
@@ -295,10 +298,13 @@ impl Conductor {
         permission::check(by, Request::CloseSession, CurrentSession::of(phase))?;
 
         if let Some(course) = live.course_of(session) {
+            course.record_movement();
             course.dismissed = true;
         }
         live.forget_what_is_done_with();
         self.shared.publish(&live);
+        drop(live);
+        self.shared.wake();
         Ok(())
     }
 
@@ -317,6 +323,12 @@ impl Conductor {
     /// If the question has not been asked yet, the value does not fit it, or the disk failed.
     pub async fn answer(&self, answer: NewAnswer) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.answer(answer).await }).await
+    }
+
+    /// Follows what the surgeon's tablets report: one that goes away or comes back, and what is seen on them, are
+    /// recorded, and may pause the session. To be called a few times a second.
+    pub async fn follow_tablets(&self, report: Report) {
+        self.shared.follow_tablets(&report).await;
     }
 
     /// Records how much of a session a surgeon's device still holds unsent.

@@ -8,21 +8,21 @@ use utoipa::ToSchema;
 
 use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 use super::course::Course;
-use super::timeline::erased;
 use super::{ConductError, Conductor, ProtocolSummary};
 use parfocal_base::PolicyName;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal_records::store::{DeviceEvent, Latest, Participant, Reader, Recorder, SessionLine, standings};
+use parfocal_records::store::{DeviceEvent, Erased, Latest, Participant, Reader, Recorder, SessionLine, standings};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::{Field, Subject};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
 use parfocal_trial::grace::Outstanding;
-use parfocal_trial::instruments::{Measure, in_words, measures, sus};
+use parfocal_trial::instruments::{Measure, in_words, measures, sus_score};
 use parfocal_trial::participant::ParticipantCode;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::question::{AnswerValue, QuestionKind};
 use parfocal_trial::role::Role;
+use parfocal_trial::session::inspections;
 use parfocal_trial::view::LogLine;
 
 /// A session in detail, for the researcher. Contains the policies only after it was unblinded.
@@ -195,8 +195,7 @@ impl Conductor {
             corrections.retain(|correction| correction.field == Field::Participant);
         }
 
-        let lines = self.sessions(true).await?;
-        let line = lines.into_iter().find(|line| line.session == session);
+        let line = self.shared.store.reader().session_line(session).await?;
         let line = line.ok_or_else(|| ConductError::NotFound("there is no such session".to_owned()))?;
         Ok(SessionDetail {
             line,
@@ -253,7 +252,7 @@ impl Conductor {
         let answers = self.shared.store.reader().answers(course.session()).await?;
         let standings = standings(&answers, clocks);
         let corrections = Latest::of(&self.shared.store.reader().corrections(course.session()).await?);
-        let erasures = self.shared.store.reader().erasures(course.session()).await?;
+        let erased = Erased::by(&self.shared.store.reader().erasures(course.session()).await?);
 
         let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();
         for ((run, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {
@@ -264,16 +263,13 @@ impl Conductor {
                 at: answer.stamp.wall,
                 setting: answer.segment.map(|segment| course.setting(segment)),
                 text: question.map(|question| question.text.clone()).unwrap_or_default(),
-                sus_score: match (kind, &standing.value) {
-                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
-                    _ => None,
-                },
+                sus_score: sus_score(kind, &standing.value),
                 kind: kind.map(QuestionKind::name),
                 key: answer.key,
                 words: in_words(kind, &standing.value),
                 corrected_words: corrected.as_ref().map(|value| in_words(kind, value)),
                 note: corrections.note(Subject::Answer, &answer.key).map(str::to_owned),
-                erased: erased(&erasures, Erasable::Answer, &answer.key),
+                erased: erased.at(Erasable::Answer, &answer.key),
                 scores: kind.map_or_else(Vec::new, |kind| scores(kind, corrected.as_ref().unwrap_or(&standing.value))),
                 corrected,
                 question: answer.question,
@@ -297,20 +293,14 @@ fn scores(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
 }
 
 fn settings(course: &Course) -> Vec<SettingDetail> {
+    let inspections = inspections(course.events.iter().map(|event| (event, &event.kind)));
     let detail = |(&segment, setting): (&SegmentId, usize)| {
-        let of_it = || course.events.iter().filter(move |event| event.kind.segment() == Some(segment));
+        let inspection = inspections.iter().find(|inspection| inspection.segment == segment);
         SettingDetail {
             setting,
             segment,
-            started: of_it()
-                .find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }))
-                .map(|event| event.wall),
-            inspected_seconds: of_it().find_map(|event| match event.kind {
-                EventKind::SegmentFinished { inspected_ms, .. } => {
-                    Some(std::time::Duration::from_millis(inspected_ms).as_secs_f64())
-                }
-                _ => None,
-            }),
+            started: inspection.map(|inspection| inspection.began.wall),
+            inspected_seconds: inspection.and_then(|inspection| inspection.inspected).map(|time| time.as_secs_f64()),
         }
     };
 

@@ -17,6 +17,7 @@ use parfocal_trial::allocation::Seed;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::role::Role;
+use parfocal_trial::study::concerns::concerns;
 use parfocal_trial::study::definition::{Definition, StudyName};
 use parfocal_trial::study::event::{StudyEvent, StudyEventKind};
 use parfocal_trial::study::lists::Lists;
@@ -110,7 +111,12 @@ impl Studies {
             Change::Lock { .. } => self.outstanding(&study).await?,
             _ => 0,
         };
+        let concerns = match change {
+            Change::Open { .. } => self.concerns(&study).await?,
+            _ => Vec::new(),
+        };
         let circumstances = StudyCircumstances {
+            concerns: &concerns,
             definition: &study.definition,
             sessions: &study.sessions,
             on_screens,
@@ -122,7 +128,7 @@ impl Studies {
         let mut seed = None;
         let mut sessions = Vec::new();
         let kind = match change {
-            Change::Open => {
+            Change::Open { .. } => {
                 let commitment = if study.seed.is_none() {
                     let drawn = Seed::random(random);
                     seed = Some(drawn);
@@ -199,6 +205,16 @@ impl Studies {
     /// The present moment on the monotonic clock of the sessions; `None` in a command, which has none.
     fn at(&self) -> Option<Moment> {
         self.book.run().map(|_| self.clock.now())
+    }
+
+    /// What in the plan of `study` cannot work as it is meant.
+    ///
+    /// # Errors
+    /// If the database failed.
+    pub async fn concerns(&self, study: &StoredStudy) -> Result<Vec<String>, ConductError> {
+        let mut enabled = self.reader().accounts().await?;
+        enabled.retain(|account| !account.disabled);
+        Ok(concerns(&study.definition, &enabled, &study.sites))
     }
 
     /// Number of sessions of `study` for which a surgeon's device may still hold something that counts.

@@ -11,7 +11,7 @@ use parfocal_records::store::StoredStudy;
 use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
-use parfocal_trial::study::definition::{PlaceRules, Site};
+use parfocal_trial::study::definition::{Definition, PlaceRules, Site};
 use parfocal_trial::study::event::StudyEvent;
 use parfocal_trial::study::lists::commitment_line;
 use parfocal_trial::study::places::Enrolled;
@@ -58,6 +58,8 @@ pub struct StudyDetail {
     pub analysis: String,
     /// The line to print, publish or mail before the first session; none until the orders are drawn.
     pub commitment_line: Option<String>,
+    /// What in the plan cannot work as it is meant, in sentences; empty once the study is open.
+    pub concerns: Vec<String>,
     /// Number of sessions for which a surgeon's device may still hold something that would not count after locking. 0
     /// unless the study is closed.
     pub outstanding: usize,
@@ -160,6 +162,9 @@ impl Studies {
     pub async fn detail(&self, name: &str) -> Result<StudyDetail, ConductError> {
         let study = self.stored(name).await?;
         let mut detail = StudyDetail::of(&study);
+        if detail.line.stage == Stage::Planned {
+            detail.concerns = self.concerns(&study).await?;
+        }
         if detail.line.stage == Stage::Closed {
             detail.outstanding = self.outstanding(&study).await?;
         }
@@ -168,6 +173,14 @@ impl Studies {
 }
 
 impl Conductor {
+    /// The text of a definition to start from, for a study that `lead` unblinds; none if no protocol is for studies.
+    #[must_use]
+    pub fn study_template(&self, lead: &str) -> Option<String> {
+        let protocols = self.shared.library.protocols();
+        let protocol = protocols.iter().find(|protocol| !protocol.practice)?;
+        Some(Definition::template(protocol, lead))
+    }
+
     /// The studies that accept new sessions now.
     ///
     /// # Errors
@@ -196,7 +209,7 @@ fn line(study: &StoredStudy) -> StudyLine {
 }
 
 impl StudyDetail {
-    /// The details of `study`; `outstanding` is 0.
+    /// The details of `study`; `outstanding` is 0, and `concerns` is empty.
     #[must_use]
     pub fn of(study: &StoredStudy) -> Self {
         let definition = &study.definition;
@@ -223,6 +236,7 @@ impl StudyDetail {
             when_used_up: definition.when_used_up.clone(),
             may_unblind: definition.may_unblind.clone(),
             analysis: definition.analysis.clone(),
+            concerns: Vec::new(),
             outstanding: 0,
             study_sessions: sessions(study),
             log: log(study),

@@ -11,16 +11,18 @@ use super::course::Course;
 use super::{ConductError, Conductor};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{Answer, Latest, PathPoint, Recorded, RunClocks, StoredErasure, standings};
+use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
-use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::event::{Event, EventKind, per_second};
 use parfocal_trial::permission;
 use parfocal_trial::protocol::Record;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
+use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::standing::Standing;
+use parfocal_trial::tablet::PictureSize;
 use parfocal_trial::voice::Ending;
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
@@ -30,6 +32,10 @@ pub struct Timeline {
     pub settings: Vec<SettingSpan>,
     /// When the session was paused and the lens held where it was.
     pub pauses: Vec<PauseSpan>,
+    /// When no tablet showed the surgeon's page.
+    pub absences: Vec<PauseSpan>,
+    /// What size of picture the surgeon saw, and how many.
+    pub sights: Vec<SightSpan>,
     /// The focal path.
     pub points: Vec<TimelinePoint>,
     /// The comments.
@@ -58,6 +64,20 @@ pub struct PauseSpan {
     pub to: Option<f64>,
     /// Reason in words.
     pub reason: String,
+}
+
+/// What the surgeon saw for a while.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SightSpan {
+    /// Start, in seconds.
+    pub from: f64,
+    /// End, in seconds.
+    pub to: f64,
+    /// Size of the pictures.
+    #[serde(flatten)]
+    pub size: PictureSize,
+    /// Pictures a second.
+    pub per_second: f64,
 }
 
 /// A point of the focal path.
@@ -98,6 +118,8 @@ pub struct TimelineComment {
     /// The content of the comment; empty if it was erased.
     #[serde(flatten)]
     pub said: CommentContent,
+    /// Whether the surgeon took it back at once.
+    pub withdrawn: bool,
     /// A researcher's note on the comment; for a voice comment, its transcript.
     pub note: Option<String>,
     /// The recording of a voice comment; none for other comments.
@@ -168,13 +190,16 @@ impl Conductor {
         };
 
         let notes = Latest::of(&reader.corrections(session).await?);
-        let erasures = reader.erasures(session).await?;
+        let erased = Erased::by(&reader.erasures(session).await?);
         let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
-        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+        let withdrawn = withdrawn(&comments);
+        let said = comments.into_iter().filter(|(_, comment)| comment.said.says_something());
+        let comments = said.map(|(run, comment)| TimelineComment {
             key: comment.key,
+            withdrawn: withdrawn.contains_key(&comment.key),
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
-            erased: erased(&erasures, Erasable::Comment, &comment.key),
+            erased: erased.at(Erasable::Comment, &comment.key),
             voice: (comment.said == CommentContent::Voice)
                 .then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
             at: comment.stamp.wall,
@@ -185,6 +210,10 @@ impl Conductor {
             said: comment.said,
         });
 
+        // What was said without a network arrived late. It stands where it was said.
+        let mut comments: Vec<TimelineComment> = comments.collect();
+        comments.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
+
         let answers = reader.answers(session).await?;
         let events: Vec<(f64, &EventKind)> =
             events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
@@ -192,8 +221,10 @@ impl Conductor {
         Ok(Timeline {
             settings: settings(&course, &events),
             pauses: pauses(&events, &points),
+            absences: absences(&events),
+            sights: sights(&events),
             points,
-            comments: comments.collect(),
+            comments,
             set_aside: set_aside(&course, &answers, runs, start),
         })
     }
@@ -262,13 +293,6 @@ fn told_of(recorded: &Recorded) -> TimelineVoice {
     }
 }
 
-/// When the words of the record with this key were erased; `None` if they were not.
-pub(super) fn erased(erasures: &[StoredErasure], subject: Erasable, key: &IdempotencyKey) -> Option<Timestamp> {
-    let key = key.to_string();
-    let its_own = |stored: &&StoredErasure| stored.erasure.subject == subject && stored.erasure.record == key;
-    erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
-}
-
 fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {
     let standings = standings(answers, runs);
     let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
@@ -291,22 +315,12 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
 }
 
 fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
-    let mut spans: Vec<SettingSpan> = Vec::new();
-    for &(at, kind) in events {
-        match kind {
-            EventKind::SegmentStarted { segment } => {
-                spans.push(SettingSpan { setting: course.setting(*segment), from: at, to: None });
-            }
-            EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
-                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
-                    open.to = Some(at);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    spans
+    let span = |Inspection { segment, began, ended, .. }: Inspection<f64>| SettingSpan {
+        setting: course.setting(segment),
+        from: began,
+        to: ended,
+    };
+    inspections(events.iter().copied()).into_iter().map(span).collect()
 }
 
 /// When the session was paused. A restart is recorded only when the server is back, but the pause starts when the
@@ -348,6 +362,40 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     }
 
     spans
+}
+
+/// When no tablet showed the surgeon's page.
+fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
+    let mut spans: Vec<PauseSpan> = Vec::new();
+    for &(at, kind) in events {
+        match kind {
+            EventKind::TabletAway { .. } => {
+                spans.push(PauseSpan { from: at, to: None, reason: kind.in_words(|_| 0) });
+            }
+            EventKind::TabletBack | EventKind::Completed | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    spans
+}
+
+/// What the surgeon saw. Each of these events tells of the time before it.
+fn sights(events: &[(f64, &EventKind)]) -> Vec<SightSpan> {
+    let span = |&(to, kind): &(f64, &EventKind)| match kind {
+        EventKind::PicturesSeen { size, pictures, over_ms, .. } => Some(SightSpan {
+            from: to - milliseconds(*over_ms),
+            to,
+            size: *size,
+            per_second: per_second(*pictures, *over_ms),
+        }),
+        _ => None,
+    };
+    events.iter().filter_map(span).collect()
 }
 
 /// Converts milliseconds to seconds.

@@ -3,19 +3,22 @@
 use std::collections::BTreeMap;
 
 use super::course::{Course, LATEST};
+use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_trial::event::Event;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::question::AnswerValue;
+use parfocal_trial::remark::CommentContent;
 use parfocal_trial::session::PauseCause;
-use parfocal_trial::view::{LogLine, OperatorView, SurgeonView};
+use parfocal_trial::view::{LogLine, OperatorView, ReasonWanted, SurgeonView};
 
 /// The surgeon's and the operator's view of `course` at `now`. `because` says why the last attempt to record a stop
 /// failed.
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
     let withdrawn = course.state.withdrawn();
-    let readable = course.latest_comments.iter().rev().filter(|_| !withdrawn);
+    let comments = course.standing_comments();
+    let readable = comments.iter().rev().filter(|_| !withdrawn).take(LATEST);
     let operator = OperatorView {
         surgeon: surgeon.clone(),
         study: course.study.clone(),
@@ -24,8 +27,11 @@ pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (Surg
         consent_required: course.protocol.consent.clone(),
         consent: course.consent.clone(),
         withdrawn,
+        may_focus_by_hand: course.state.may_be_focused_by_hand(),
+        by_hand: course.moved_by_hand().map(FocalPower::get),
+        reason_wanted: reason_wanted(course),
         unrecorded_because: because.filter(|_| course.is_unrecorded()).map(str::to_owned),
-        latest_comments: readable.cloned().collect(),
+        latest_comments: readable.copied().cloned().collect(),
         log: log(course),
     };
 
@@ -40,7 +46,9 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         session: course.session(),
         phase: state.phase(),
         paused: state.paused().is_some(),
-        may_resume: state.paused() == Some(PauseCause::Restart),
+        paused_by: state.paused(),
+        may_resume: state.paused().is_some_and(|cause| cause != PauseCause::Operator),
+        may_pause: may_pause(course),
         unrecorded: course.is_unrecorded(),
         practice: course.made.practice,
         title: course.protocol.title.clone(),
@@ -53,8 +61,35 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         voice: course.protocol.voice,
         questions: state.questions().to_vec(),
         answers: answers(course),
-        comments: course.comments,
+        comments: course.standing_comments().len(),
+        said: if state.phase() == Phase::Closing { said(course) } else { Vec::new() },
     }
+}
+
+/// What the surgeon said in words of each setting, so that the closing questions can recall it.
+fn said(course: &Course) -> Vec<Vec<String>> {
+    let mut said = vec![Vec::new(); course.state.plan().segments.len()];
+    for comment in course.standing_comments() {
+        let (CommentContent::Text(text) | CommentContent::Quick(text)) = &comment.said else { continue };
+        let place = comment.setting.and_then(|setting| said.get_mut(setting.checked_sub(1)?));
+        if let Some(words) = place.filter(|_| !text.is_empty()) {
+            words.push(text.clone());
+        }
+    }
+    said
+}
+
+/// Whether the surgeon can pause the session now.
+fn may_pause(course: &Course) -> bool {
+    let phase = course.state.phase();
+    phase != Phase::Ready && !phase.has_ended() && course.state.paused().is_none()
+}
+
+/// The latest pause without a reason.
+fn reason_wanted(course: &Course) -> Option<ReasonWanted> {
+    let number = *course.state.unreasoned().last()?;
+    let event = course.events.iter().find(|event| event.number == number)?;
+    Some(ReasonWanted { event: number, by: event.by, at: event.wall })
 }
 
 /// Number of the current setting, from 1; at the end, of the last one. 0 before the start.

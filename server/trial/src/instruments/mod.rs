@@ -36,6 +36,15 @@ pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
     }
 }
 
+/// The score of the System Usability Scale; `None` for another kind of question, and if an item is missing.
+#[must_use]
+pub fn sus_score(kind: Option<&QuestionKind>, value: &AnswerValue) -> Option<f64> {
+    match (kind, value) {
+        (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
+        _ => None,
+    }
+}
+
 /// The answers that a question of `kind` takes in a session of `settings` settings, in words.
 #[must_use]
 pub fn expected(kind: &QuestionKind, settings: usize) -> String {

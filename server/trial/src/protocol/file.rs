@@ -14,6 +14,7 @@ use crate::consent;
 use crate::grace::DEFAULT_GRACE;
 use crate::instruments::{nasa_tlx, surg_tlx};
 use crate::question::{Question, QuestionKind};
+use crate::tablet::WhenAway;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 
@@ -25,6 +26,8 @@ const MOST_BALANCED_SETTINGS: usize = 12;
 const LABELS: std::ops::RangeInclusive<u8> = 2..=9;
 /// Longest time for which a protocol may keep voice: thirty years, as for the records of some trials.
 const LONGEST_VOICE_DAYS: u32 = 30 * 366;
+/// Width of the largest picture that a surgeon's page gets, in pixels.
+const WIDEST_PICTURE: u32 = 2048;
 /// Maximum length of a text that surgeons read, in characters.
 const LONGEST_TEXT: usize = 400;
 
@@ -77,6 +80,10 @@ struct File {
     voice: bool,
     #[serde(default)]
     voice_days: Option<Spanned<u32>>,
+    #[serde(default)]
+    when_tablet_away: WhenAway,
+    #[serde(default)]
+    least_picture_width: Option<Spanned<u32>>,
     #[serde(default)]
     consent_version: Option<Spanned<String>>,
     #[serde(default)]
@@ -186,6 +193,8 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         record: file.record,
         voice: file.voice,
         voice_days: voice_days(&file)?,
+        when_tablet_away: file.when_tablet_away,
+        least_picture_width: file.least_picture_width.as_ref().map(least_picture_width).transpose()?,
         consent: file.consent_version.as_ref().map(consent_version).transpose()?,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
@@ -231,6 +240,11 @@ fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {
         FocalPower::new(*power.get_ref())
             .map_err(|error| Fault::new(power.span(), "start_focal_power", error.to_string()))
     })
+}
+
+/// Reads the width in pixels that the surgeon's picture must have.
+fn least_picture_width(given: &Spanned<u32>) -> Result<u32, Fault> {
+    between(given, "least_picture_width", 1..=WIDEST_PICTURE, " pixels")
 }
 
 /// Reads the version of the consent text that is required.

@@ -16,6 +16,7 @@ pub(crate) use file::{between, identifier};
 
 use super::allocation::Order;
 use super::question::Question;
+use super::tablet::WhenAway;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 
@@ -54,6 +55,10 @@ pub struct Protocol {
     pub grace: Duration,
     /// What is recorded during a session.
     pub record: Record,
+    /// What happens to a segment's clock while no tablet shows the surgeon's page.
+    pub when_tablet_away: WhenAway,
+    /// Width in pixels that the surgeon's picture must have; a session with a smaller one is paused.
+    pub least_picture_width: Option<u32>,
     /// Version of the consent text that a participant must have consented to before a session starts; none if no
     /// consent is required.
     pub consent: Option<String>,
@@ -130,7 +135,7 @@ mod tests {
     use super::*;
 
     fn known() -> Vec<PolicyName> {
-        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned"].map(PolicyName::new).to_vec()
+        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned", "parfocal"].map(PolicyName::new).to_vec()
     }
 
     fn error(source: &str) -> String {
@@ -147,6 +152,27 @@ mod tests {
         assert_eq!(paper.order, Order::Shuffled);
         assert!(!paper.practice);
         assert_eq!(paper.start, FocalPower::MIDDLE);
+    }
+
+    #[test]
+    fn the_follow_up_compares_the_papers_policies_with_our_own_in_balanced_orders() {
+        let source = include_str!("../../../../trial-protocols/follow-up.toml");
+        let follow_up = Protocol::parse(source, "follow-up.toml", &known()).unwrap();
+        let policies = ["mgm-hill-climber", "cnn-learned", "parfocal"].map(PolicyName::new);
+        assert_eq!(follow_up.policies, policies);
+        assert_eq!((follow_up.repeats, follow_up.order, follow_up.practice), (2, Order::Balanced, false));
+
+        // Everything that a surgeon meets is the paper's, so that results can be compared.
+        let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
+        let alike = Protocol {
+            name: paper.name.clone(),
+            researcher_title: paper.researcher_title.clone(),
+            policies: paper.policies.clone(),
+            order: paper.order,
+            source: paper.source.clone(),
+            ..follow_up
+        };
+        assert_eq!(alike, paper);
     }
 
     #[test]

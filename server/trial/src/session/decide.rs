@@ -12,6 +12,8 @@ use crate::question::Question;
 use crate::reason;
 use crate::refusal::Refusal;
 use crate::role::Role;
+use crate::tablet::{Presence, WhenAway};
+use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 
@@ -27,7 +29,8 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
         Action::FinishSegment { segment } => finish_segment(state, *segment, now),
         Action::FinishQuestions { segment: Some(segment) } => finish_questions(state, *segment),
         Action::FinishQuestions { segment: None } => finish_closing(state),
-        Action::Pause { reason } => pause(state, reason, now),
+        Action::Pause { reason } => pause(state, by, reason, now),
+        Action::GiveReason { event, reason } => give_reason(state, *event, reason),
         Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
         Action::Abort { reason } => abort(state, reason, now),
         Action::Withdraw { reason } => withdraw(state, reason),
@@ -44,6 +47,63 @@ pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
     state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
 }
 
+/// The events that are caused when `by` moves the lens to `focal_power` by hand. `left_at` is where the lens is, if
+/// nobody has moved it by hand since the session was stopped.
+///
+/// # Errors
+/// If `by` may not do this, or the session is neither paused nor aborted.
+pub fn decide_by_hand(
+    state: &SessionState,
+    by: Role,
+    focal_power: FocalPower,
+    left_at: Option<FocalPower>,
+) -> Result<Vec<EventKind>, Refusal> {
+    if by != Role::Operator {
+        return Err(Refusal::only("the operator"));
+    }
+    if !state.may_be_focused_by_hand() {
+        return Err(Refusal::conflict(
+            "a session is under way and controls the lens until it is closed; pause it to focus by hand",
+        ));
+    }
+    Ok(vec![EventKind::FocusedByHand { focal_power, left_at }])
+}
+
+/// The events that are caused by what the surgeon's tablets report: that none shows the page any longer, or one does
+/// again. If none ever did, nothing follows, as nobody can go away who was never there.
+#[must_use]
+pub fn decide_tablet(state: &SessionState, presence: Presence, now: Moment) -> Vec<EventKind> {
+    if state.ended() || state.phase == Phase::Ready {
+        return Vec::new();
+    }
+
+    let hidden = match presence {
+        Presence::Present if state.tablet_away => return vec![EventKind::TabletBack],
+        Presence::NeverSeen | Presence::Present => return Vec::new(),
+        Presence::Hidden => true,
+        Presence::Silent => false,
+    };
+    if state.tablet_away {
+        return Vec::new();
+    }
+
+    let mut events = vec![EventKind::TabletAway { hidden }];
+    if state.running() && state.plan.when_tablet_away == WhenAway::Pause {
+        events.push(paused_by_system(state, reason::TABLET_AWAY, now));
+    }
+    events
+}
+
+/// The events that are caused by a picture on the surgeon's page that is smaller than the protocol allows.
+#[must_use]
+pub fn decide_small_picture(state: &SessionState, now: Moment) -> Vec<EventKind> {
+    if state.running() { vec![paused_by_system(state, reason::SMALL_PICTURE, now)] } else { Vec::new() }
+}
+
+fn paused_by_system(state: &SessionState, reason: &str, now: Moment) -> EventKind {
+    EventKind::Paused { reason: reason.to_owned(), inspected_ms: milliseconds(state.inspected(now)) }
+}
+
 /// The events that a restart of the server causes. `inspected` is the known time inspected in the segment.
 #[must_use]
 pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
@@ -56,7 +116,8 @@ pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKin
 
 fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusal> {
     let (who, fits): (&str, bool) = match action {
-        Action::Start | Action::Pause { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
+        Action::Start | Action::GiveReason { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
+        Action::Pause { .. } => ("the operator or the surgeon", matches!(by, Role::Operator | Role::Surgeon)),
         Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
         Action::FinishSegment { .. } => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
         Action::Resume => {
@@ -158,18 +219,31 @@ fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
     events
 }
 
-fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+fn pause(state: &SessionState, by: Role, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match state.phase {
         Phase::Ready => return Err(Refusal::conflict("the session has not started")),
         Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
         _ => {}
     }
 
-    if state.paused == Some(PauseCause::Operator) {
+    // The operator's pause stands above every other, because the surgeon cannot end it.
+    let paused_enough = match by {
+        Role::Operator => state.paused == Some(PauseCause::Operator),
+        _ => state.paused.is_some(),
+    };
+    if paused_enough {
         return Ok(Vec::new());
     }
     let reason = reason::optional(reason)?;
     Ok(vec![EventKind::Paused { reason, inspected_ms: milliseconds(state.inspected(now)) }])
+}
+
+fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    let reason = reason::needed(reason)?;
+    if !state.unreasoned.contains(&event) {
+        return Err(Refusal::conflict("there is no such pause, or its reason was given"));
+    }
+    Ok(vec![EventKind::ReasonGiven { about: event, reason }])
 }
 
 fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {

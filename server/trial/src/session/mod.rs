@@ -11,19 +11,26 @@
 //! If there are no questions, their step is skipped. Every phase from Notice to Closing can be paused and aborted.
 
 mod decide;
+mod inspections;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-pub use decide::{decide, decide_restart, decide_time};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+pub use decide::{decide, decide_by_hand, decide_restart, decide_small_picture, decide_tablet, decide_time};
+pub use inspections::{Inspection, inspections};
 
 use super::event::{Event, EventKind};
 use super::phase::Phase;
 use super::protocol::Protocol;
 use super::question::{AnswerValue, Question};
+use super::role::Role;
 use super::standing::{GivenAnswer, counted};
+use super::tablet::WhenAway;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 
@@ -41,6 +48,8 @@ pub struct Plan {
     /// Version of the consent text that the participant must have consented to before the start; none if the protocol
     /// requires no consent.
     pub consent: Option<String>,
+    /// What happens to a segment's clock while no tablet shows the surgeon's page.
+    pub when_tablet_away: WhenAway,
 }
 
 impl Plan {
@@ -53,6 +62,7 @@ impl Plan {
             after_segment: protocol.after_segment.clone(),
             closing: protocol.closing.clone(),
             consent: protocol.consent.clone(),
+            when_tablet_away: protocol.when_tablet_away,
         }
     }
 
@@ -63,13 +73,20 @@ impl Plan {
     }
 }
 
-/// What paused a session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What paused a session. The surgeon can resume it too, unless it was the operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum PauseCause {
     /// The operator. Only the operator can resume the session.
     Operator,
-    /// A restart of the server. The surgeon can resume the session too.
+    /// The surgeon.
+    Surgeon,
+    /// A restart of the server.
     Restart,
+    /// No tablet showed the surgeon's page.
+    TabletAway,
+    /// The surgeon's picture was smaller than the protocol allows.
+    SmallPicture,
 }
 
 /// The state of a session.
@@ -85,6 +102,10 @@ pub struct SessionState {
     running_since: Option<Moment>,
     unblinded: bool,
     withdrawn: bool,
+    /// Whether the last event about the surgeon's tablet says that it is away.
+    tablet_away: bool,
+    /// Numbers of the pauses without a reason, oldest first.
+    unreasoned: Vec<u32>,
     /// Version of the consent text that the participant consented to last.
     consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
@@ -113,6 +134,8 @@ impl SessionState {
             running_since: None,
             unblinded: false,
             withdrawn: false,
+            tablet_away: false,
+            unreasoned: Vec::new(),
             consented: None,
             answers: BTreeMap::new(),
         }
@@ -146,6 +169,18 @@ impl SessionState {
     #[must_use]
     pub const fn paused(&self) -> Option<PauseCause> {
         self.paused
+    }
+
+    /// Whether the operator may focus by hand: while the session is paused, and after an abort.
+    #[must_use]
+    pub fn may_be_focused_by_hand(&self) -> bool {
+        self.phase == Phase::Aborted || (self.paused.is_some() && !self.ended())
+    }
+
+    /// Numbers of the events of people who paused the session without giving a reason, oldest first.
+    #[must_use]
+    pub fn unreasoned(&self) -> &[u32] {
+        &self.unreasoned
     }
 
     /// Whether the session was completed or aborted.
@@ -233,7 +268,10 @@ impl SessionState {
     /// Applies an event.
     pub fn apply(&mut self, event: &Event) {
         match &event.kind {
-            EventKind::Created | EventKind::QuestionsFinished { segment: None } => {}
+            EventKind::Created
+            | EventKind::QuestionsFinished { segment: None }
+            | EventKind::FocusedByHand { .. }
+            | EventKind::PicturesSeen { .. } => {}
             EventKind::Started => self.phase = Phase::Notice,
             EventKind::SegmentStarted { .. } => {
                 self.phase = Phase::Inspecting;
@@ -246,10 +284,21 @@ impl SessionState {
                 if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
             }
             EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),
-            EventKind::Paused { inspected_ms, .. } => {
+            EventKind::Paused { inspected_ms, reason } => {
                 self.stop_clock(*inspected_ms);
-                self.paused = Some(PauseCause::Operator);
+                self.paused = Some(match event.by {
+                    Role::Surgeon => PauseCause::Surgeon,
+                    Role::System if self.tablet_away => PauseCause::TabletAway,
+                    Role::System => PauseCause::SmallPicture,
+                    _ => PauseCause::Operator,
+                });
+                if reason.is_empty() {
+                    self.unreasoned.push(event.number);
+                }
             }
+            EventKind::ReasonGiven { about, .. } => self.unreasoned.retain(|number| number != about),
+            EventKind::TabletAway { .. } => self.tablet_away = true,
+            EventKind::TabletBack => self.tablet_away = false,
             EventKind::Resumed => {
                 self.paused = None;
                 self.running_since = (self.phase == Phase::Inspecting).then_some(event.at);

@@ -11,6 +11,7 @@ use crate::action::Action;
 use crate::question::QuestionKind;
 use crate::refusal::Refusal;
 use crate::role::Role;
+use parfocal_base::FocalPower;
 
 fn segment(number: usize) -> SegmentId {
     SegmentId(Uuid::from_u128(number as u128 + 1))
@@ -27,6 +28,7 @@ fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
         after_segment: if asks_after { vec![question("a", false), question("b", true)] } else { Vec::new() },
         closing: if asks_closing { vec![question("z", false)] } else { Vec::new() },
         consent: None,
+        when_tablet_away: WhenAway::Pause,
     }
 }
 
@@ -172,6 +174,56 @@ fn a_pause_by_the_operator_stays_the_operators_over_a_restart() {
 }
 
 #[test]
+fn a_pause_by_the_surgeon_is_ended_by_either_and_one_by_the_operator_stands_above_it() {
+    let pause = Action::Pause { reason: String::new() };
+    let mut run = Run::inspecting(true);
+    run.act(Role::Surgeon, &pause).unwrap();
+    assert_eq!((run.state.paused(), run.state.running()), (Some(PauseCause::Surgeon), false));
+    assert_eq!(run.act(Role::Surgeon, &pause), Ok(0));
+    assert_eq!(run.act(Role::Surgeon, &Action::Resume), Ok(1));
+
+    run.act(Role::Surgeon, &pause).unwrap();
+    assert_eq!(run.act(Role::Operator, &pause), Ok(1));
+    assert_eq!(run.act(Role::Surgeon, &pause), Ok(0));
+    assert!(matches!(run.act(Role::Surgeon, &Action::Resume), Err(Refusal::NotAllowed(_))));
+    assert_eq!(run.act(Role::Operator, &Action::Resume), Ok(1));
+}
+
+#[test]
+fn the_reason_for_a_pause_can_be_given_once_and_afterwards() {
+    let pause = |reason: &str| Action::Pause { reason: reason.to_owned() };
+    let give = |event, reason: &str| Action::GiveReason { event, reason: reason.to_owned() };
+    let mut run = Run::inspecting(true);
+    run.act(Role::Operator, &pause("")).unwrap();
+    let number = run.log.last().unwrap().number;
+    run.act(Role::Operator, &Action::Resume).unwrap();
+    run.act(Role::Operator, &pause("the drill")).unwrap();
+    assert_eq!(run.state.unreasoned(), [number]);
+
+    assert!(matches!(run.act(Role::Operator, &give(number, " ")), Err(Refusal::Invalid(_))));
+    assert!(matches!(run.act(Role::Surgeon, &give(number, "bleeding")), Err(Refusal::NotAllowed(_))));
+    assert_eq!(run.act(Role::Operator, &give(number, "bleeding")), Ok(1));
+    assert!(matches!(run.act(Role::Operator, &give(number, "bleeding")), Err(Refusal::Conflict(_))));
+    assert!(matches!(run.act(Role::Operator, &give(1, "bleeding")), Err(Refusal::Conflict(_))));
+}
+
+#[test]
+fn the_operator_focuses_by_hand_while_the_session_is_paused_and_after_an_abort() {
+    let by = |run: &Run, role| decide_by_hand(&run.state, role, FocalPower::MIDDLE, None);
+    let mut run = Run::inspecting(true);
+    assert!(matches!(by(&run, Role::Operator), Err(Refusal::Conflict(_))));
+    run.act(Role::Surgeon, &Action::Pause { reason: String::new() }).unwrap();
+    assert!(by(&run, Role::Operator).is_ok());
+    for role in [Role::Surgeon, Role::Researcher, Role::System] {
+        assert!(matches!(by(&run, role), Err(Refusal::NotAllowed(_))), "{role:?}");
+    }
+    run.act(Role::Operator, &Action::Resume).unwrap();
+    assert!(by(&run, Role::Operator).is_err());
+    run.act(Role::Operator, &Action::Abort { reason: "bleeding".to_owned() }).unwrap();
+    assert!(by(&run, Role::Operator).is_ok());
+}
+
+#[test]
 fn a_restart_never_takes_back_time_that_events_tell() {
     let mut run = Run::inspecting(true);
     run.wait(50 * SECOND);
@@ -189,7 +241,7 @@ fn each_role_does_its_own() {
         (Action::Acknowledge { segment: id }, vec![Role::Surgeon]),
         (Action::FinishSegment { segment: id }, vec![Role::Surgeon, Role::Operator]),
         (Action::FinishQuestions { segment: None }, vec![Role::Surgeon]),
-        (Action::Pause { reason: reason() }, vec![Role::Operator]),
+        (Action::Pause { reason: reason() }, vec![Role::Surgeon, Role::Operator]),
         (Action::Resume, vec![Role::Surgeon, Role::Operator]),
         (Action::Abort { reason: reason() }, vec![Role::Operator]),
         (Action::Unblind { reason: reason(), despite_outstanding: false }, vec![Role::Researcher]),

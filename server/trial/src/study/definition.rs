@@ -170,6 +170,41 @@ impl Definition {
         hex::encode(Sha256::digest(self.source.as_bytes()))
     }
 
+    /// A definition to start from, for a study by `protocol` that `lead` unblinds.
+    #[must_use]
+    pub fn template(protocol: &Protocol, lead: &str) -> String {
+        let in_a_set = protocol.order.algorithm().set_size(protocol.policies.len());
+        let surgeons = in_a_set * 12_usize.div_ceil(in_a_set);
+        let order = if protocol.order == Order::Balanced { "balanced" } else { "shuffled" };
+        format!(
+            "# A study. docs/study.md explains each key.\n\
+             name = \"my-study\"\n\
+             title = \"What the study compares\"\n\
+             order = \"{order}\"\n\
+             aborted = \"same-place\"\n\
+             withdrawn = \"next-spare\"\n\
+             repeated = \"refuse\"\n\
+             when_used_up = \"Call the trial office.\"\n\
+             # Names of leads\u{2019} accounts, as their signatures show them.\n\
+             may_unblind = [{lead}]\n\
+             analysis = \"The planned analysis, in words.\"\n\
+             \n\
+             [[protocols]]\n\
+             name = \"{name}\"\n\
+             sha256 = \"{sha256}\"\n\
+             \n\
+             [[sites]]\n\
+             name = \"my-site\"\n\
+             title = \"The hospital\"\n\
+             # A multiple of {in_a_set}, so that every order comes equally often.\n\
+             surgeons = {surgeons}\n\
+             spares = {in_a_set}\n",
+            lead = toml::Value::from(lead),
+            name = protocol.name,
+            sha256 = hex::encode(protocol.sha256()),
+        )
+    }
+
     /// The site with this name, if there is one.
     #[must_use]
     pub fn site(&self, name: &str) -> Option<&Site> {

@@ -27,6 +27,12 @@ pub enum StudyRefusal {
          with `parfocal account add NAME --role lead`"
     )]
     NoAccounts,
+    /// The plan cannot work as it is meant.
+    #[error("{concerns} Plan a new study, or confirm it (despite_concerns)")]
+    Concerns {
+        /// What cannot work, in sentences.
+        concerns: String,
+    },
     /// The study is already open.
     #[error("the study is open already")]
     AlreadyOpen,

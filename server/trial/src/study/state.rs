@@ -21,7 +21,11 @@ use parfocal_base::ids::SessionId;
 #[schema(as = StudyAction)]
 pub enum Change {
     /// Allow sessions to be made. The first time, the orders are drawn.
-    Open,
+    Open {
+        /// Whether to open it the first time even though its plan cannot work as it is meant.
+        #[serde(default)]
+        despite_concerns: bool,
+    },
     /// Allow no more sessions to be made.
     Close,
     /// Allow no more changes to the study or its sessions.
@@ -55,6 +59,8 @@ pub struct StudyState {
 /// Facts besides the study's own state that a change depends on.
 #[derive(Debug, Clone, Copy)]
 pub struct StudyCircumstances<'a> {
+    /// What in the plan cannot work as it is meant.
+    pub concerns: &'a [String],
     /// Definition of the study.
     pub definition: &'a Definition,
     /// Sessions of the study, in the order in which they were made.
@@ -111,7 +117,7 @@ impl StudyState {
     ) -> Result<(), StudyRefusal> {
         check_way(way)?;
         match change {
-            Change::Open => self.check_open(circumstances.has_accounts),
+            Change::Open { despite_concerns } => self.check_open(circumstances, despite_concerns),
             Change::Close => self.check_close(),
             Change::Lock { despite_outstanding } => self.check_lock(circumstances, despite_outstanding),
             Change::Unblind => self.check_unblind(signature, circumstances.definition),
@@ -130,9 +136,13 @@ impl StudyState {
         }
     }
 
-    const fn check_open(&self, has_accounts: bool) -> Result<(), StudyRefusal> {
+    fn check_open(&self, circumstances: StudyCircumstances<'_>, despite_concerns: bool) -> Result<(), StudyRefusal> {
+        let StudyCircumstances { has_accounts, concerns, .. } = circumstances;
         match self.stage {
             Stage::Planned | Stage::Closed if !has_accounts => Err(StudyRefusal::NoAccounts),
+            Stage::Planned if !concerns.is_empty() && !despite_concerns => {
+                Err(StudyRefusal::Concerns { concerns: concerns.join(" ") })
+            }
             Stage::Planned | Stage::Closed => Ok(()),
             Stage::Open => Err(StudyRefusal::AlreadyOpen),
             Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),

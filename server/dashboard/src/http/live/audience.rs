@@ -21,8 +21,9 @@ pub trait Audience: Send + Sync + 'static {
     /// Whether a recording of the view keeps the size of pictures that this page gets.
     const LEADS: bool;
 
-    /// What is sent with `frame`, which is `age_ms` milliseconds old.
-    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> Self::Header;
+    /// What is sent with `frame`, which is `age_ms` milliseconds old. It will arrive after about `travel_ms`,
+    /// and is `reduced` if the link is too slow for the size that the screen can show.
+    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> Self::Header;
     /// Source of the session's changes.
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
     /// The state of the devices.

@@ -1,15 +1,16 @@
 //! The size of a viewer's pictures: the size that its screen can show, if its link is fast enough for it.
 //!
-//! The link is judged only by the time from sending a picture to its acknowledgement by the page. That time covers
-//! the link and the browser but none of the server's own work, so the size tells nothing about a policy.
+//! The link is judged only by the time from sending a picture to its acknowledgement by the page, less the network's
+//! round trip, which a small picture takes as well. That time covers the link and the browser but none of the server's
+//! own work, so the size tells nothing about a policy.
 
 use std::time::Duration;
 
 use parfocal_base::clock::Moment;
 use parfocal_imaging::Size;
 
-/// A size is kept while its pictures are drawn within this time, on average. As a viewer has one picture in
-/// flight, it then gets at least ten a second, and none is much older than 150 ms.
+/// A size is kept while its pictures are drawn within this time beyond the round trip, on average. A viewer then gets
+/// at least ten a second.
 const LIMIT: Duration = Duration::from_millis(100);
 
 /// How many times longer a picture may take than one of the next smaller size: its JPEG has about this many
@@ -45,7 +46,8 @@ pub(super) struct Link {
     wanted: Size,
     /// The largest size for which the link has been fast enough so far.
     carried: Size,
-    /// Weighted average of the time from sending a picture to its acknowledgement, at the current size.
+    /// Weighted average of the time from sending a picture to its acknowledgement, less the round trip, at the current
+    /// size.
     mean: Duration,
     /// Pictures drawn at the current size.
     drawn: u32,
@@ -81,6 +83,11 @@ impl Link {
         self.carried >= self.wanted && self.mean <= LIMIT
     }
 
+    /// Whether the pictures are smaller than the screen can show, because the link is too slow for larger ones.
+    pub(super) fn is_reduced(&self) -> bool {
+        self.carried < self.wanted
+    }
+
     /// Notes that the whole picture, `cells` wide, covers `width` pixels of the screen, as the page says. The number
     /// need not be trusted: one that is too large gets at most the largest size, and only if the page's own link is
     /// fast enough.
@@ -92,7 +99,7 @@ impl Link {
         self.change(|link| link.wanted = size.min(link.largest));
     }
 
-    /// Notes that a picture was drawn, `took` after it was sent.
+    /// Notes that a picture was drawn; it took `took` longer than the network's round trip.
     pub(super) fn drawn(&mut self, now: Moment, took: Duration) {
         self.mean = self.mean.mul_f64(1.0 - WEIGHT) + took.mul_f64(WEIGHT);
         self.drawn = self.drawn.saturating_add(1);

@@ -10,13 +10,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 pub(super) enum PageMessage {
-    /// This frame is on screen.
-    Drawn { frame: u64 },
+    /// The page is done with this frame.
+    Drawn {
+        frame: u64,
+        /// Milliseconds for which the page had it.
+        #[serde(default)]
+        held: f64,
+        /// Whether it was on screen: a page that falls behind leaves out all but the newest picture.
+        #[serde(default = "yes")]
+        shown: bool,
+    },
     /// Whether the page is visible.
     Visible { visible: bool },
     /// The whole picture, including the parts outside the view, covers this many pixels of the screen from left to
     /// right.
     Screen { width: u32 },
+}
+
+const fn yes() -> bool {
+    true
 }
 
 /// A text message to a page.
@@ -55,6 +67,11 @@ pub(super) fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
 /// `age` in milliseconds, rounded to one decimal.
 pub(super) fn tenth_millis(age: Duration) -> f64 {
     (age.as_secs_f64() * 1e4).round() / 10.0
+}
+
+/// `travel` in milliseconds, rounded to whole tens.
+pub(super) fn whole_tens(travel: Duration) -> f64 {
+    (travel.as_secs_f64() * 1e2).round() * 10.0
 }
 
 #[cfg(test)]

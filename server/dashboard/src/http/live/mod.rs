@@ -3,18 +3,23 @@
 //! Binary messages are frames: the length of the header (u16, little-endian), the header (JSON), the JPEG.
 //! Text messages are JSON with a `type`: `session` when the session changes, `status` when the devices' state
 //! does, and `beat` every few seconds, so that a page can tell a silently broken link from one with nothing to
-//! say. The page acknowledges each frame that it has drawn. Only then does it get the next, which is the latest
-//! at that time. So no queue forms anywhere, however slow the link. A page that says it is hidden gets no frames.
+//! say. The page acknowledges each frame that it has drawn. Only as many are under way as the round trip needs (see
+//! `pace.rs`), and what is sent next is the latest at that time. So no queue forms anywhere, however slow the link. A
+//! page that says it is hidden gets no frames.
 
 mod audience;
 mod link;
 mod message;
 mod operator;
+mod pace;
 mod surgeon;
+mod tablet_reports;
 mod tablets;
 
+pub(super) use tablet_reports::report_tablets;
 pub use tablets::OpenTablets;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -41,19 +46,27 @@ use super::shutdown::ended;
 use super::tablets::{admit, no_longer_admitted};
 use audience::Audience;
 use link::Link;
-use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis};
+use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis, whole_tens};
 use operator::ForOperator;
+use pace::Pace;
 use parfocal_base::clock::Moment;
 use parfocal_imaging::Size;
 use parfocal_pipeline::control::ControlStatus;
-use parfocal_pipeline::live::{EncodedFrame, Watcher};
+use parfocal_pipeline::live::{EncodedFrame, Picture, Watcher};
 use parfocal_records::accounts::Token;
 use parfocal_trial::role::Role;
+use parfocal_trial::tablet::PictureSize;
 use surgeon::ForSurgeon;
 use tablets::OpenTablet;
 
-/// Interval of heartbeats. A page that stays silent through two of them is gone.
-const HEARTBEAT: Duration = Duration::from_secs(5);
+/// Interval of pings. Browsers answer them by themselves, and the time of the answer is the network's round trip.
+const PING: Duration = Duration::from_secs(1);
+
+/// Pings from one heartbeat to the next. Pages do not hear of pings, so they get this message as well.
+const PINGS_A_BEAT: u64 = 5;
+
+/// A page that stays silent through this many pings is gone.
+const PATIENT_PINGS: u32 = 10;
 
 /// A connection is dropped if sending a message takes longer than this.
 const SEND_LIMIT: Duration = Duration::from_secs(10);
@@ -94,7 +107,7 @@ async fn live(
     Ok(upgrade.on_upgrade(async move |socket| match role {
         Role::Operator | Role::Researcher => attend::<ForOperator>(socket, Desk::new(app, None, token)).await,
         Role::Surgeon | Role::System => {
-            let tablet = app.tablets.enter(&browser);
+            let tablet = app.tablets.enter(&browser, app.clock.now());
             attend::<ForSurgeon>(socket, Desk::new(app, pass, None).of_tablet(tablet)).await;
         }
     }))
@@ -126,6 +139,7 @@ struct PageGone;
 struct InFlight {
     number: u64,
     size: Size,
+    pixels: PictureSize,
     sent_at: Moment,
 }
 
@@ -136,8 +150,15 @@ struct Desk<A: Audience> {
     watcher: Option<Watcher>,
     /// The viewers of a larger size, until its first frame arrives.
     coming: Option<Watcher>,
-    /// The frame sent and not yet drawn.
-    in_flight: Option<InFlight>,
+    /// The frames sent and not yet acknowledged, the oldest first.
+    in_flight: VecDeque<InFlight>,
+    /// How many of them there may be.
+    pace: Pace,
+    /// Before this, no further picture is sent.
+    not_before: Instant,
+    /// Pings sent so far, and when the last one was.
+    pings: u64,
+    pinged_at: Moment,
     /// Number of the last frame sent. Frames of a larger size take longer, and none may follow a later frame.
     last: u64,
     /// Width in cells of the last frame sent, and (`screen`) pixels of the screen that it covers; `None` until known.
@@ -151,7 +172,7 @@ struct Desk<A: Audience> {
     /// The last status sent, so that only changes are sent.
     told: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
-    heartbeat: tokio::time::Interval,
+    ping: tokio::time::Interval,
     /// Resolves when a surgeon's page is no longer admitted.
     over: BoxFuture<'static, Error>,
     /// The link by which a surgeon's page was let in.
@@ -160,7 +181,7 @@ struct Desk<A: Audience> {
     token: Option<Token>,
     /// The operator's entry for a surgeon's tablet.
     tablet: Option<OpenTablet>,
-    /// Heartbeats since the page last sent anything.
+    /// Pings since the page last sent anything.
     silent: u32,
     /// The message to send next, before any other.
     next: Option<Message>,
@@ -168,8 +189,8 @@ struct Desk<A: Audience> {
 
 impl<A: Audience> Desk<A> {
     fn new(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Self {
-        let mut heartbeat = interval(HEARTBEAT);
-        heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut ping = interval(PING);
+        ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
 
@@ -179,7 +200,11 @@ impl<A: Audience> Desk<A> {
         Self {
             watcher: Some(join::<A>(&app, Size::Cell)),
             coming: None,
-            in_flight: None,
+            in_flight: VecDeque::new(),
+            pace: Pace::new(app.clock.now()),
+            not_before: Instant::now(),
+            pings: 0,
+            pinged_at: app.clock.now(),
             last: 0,
             cells: None,
             screen: None,
@@ -189,7 +214,7 @@ impl<A: Audience> Desk<A> {
             statuses,
             told: None,
             shutdown: app.shutdown.clone(),
-            heartbeat,
+            ping,
             over: is_over(&app, pass),
             pass,
             token,
@@ -226,10 +251,13 @@ impl<A: Audience> Desk<A> {
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
-                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.due), if self.in_flight.is_none() => {
+                // The first ping goes before the first picture: it then tells the round trip of an empty link.
+                _ = self.ping.tick() => self.ping().await?,
+                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.not_before, self.due),
+                    if self.pings > 0 && self.in_flight.len() < self.pace.window() =>
+                {
                     self.take(next)
                 }
-                _ = self.heartbeat.tick() => self.beat().await?,
             };
 
             if message.is_some() {
@@ -244,17 +272,21 @@ impl<A: Audience> Desk<A> {
             Message::Text(text) => text.as_str(),
             Message::Close(_) => return Err(PageGone),
             Message::Binary(_) => return Ok(Some(close(close_code::UNSUPPORTED, "text is expected"))),
-            Message::Ping(_) | Message::Pong(_) => return Ok(None),
+            Message::Pong(payload) => {
+                self.answered(payload);
+                return Ok(None);
+            }
+            Message::Ping(_) => return Ok(None),
         };
 
         match serde_json::from_str(text) {
-            Ok(PageMessage::Drawn { frame }) => self.drawn(frame),
+            Ok(PageMessage::Drawn { frame, held, shown }) => self.drawn(frame, held, shown),
             Ok(PageMessage::Visible { visible: false }) => {
                 self.watcher = None;
                 self.coming = None;
             }
             Ok(PageMessage::Visible { visible: true }) => {
-                self.in_flight = None;
+                self.in_flight.clear();
                 self.due = Instant::now() + link::PATIENCE;
                 self.watcher.get_or_insert_with(|| join::<A>(&self.app, self.link.size()));
             }
@@ -271,17 +303,39 @@ impl<A: Audience> Desk<A> {
     /// Updates the operator's entry for the surgeon's tablet.
     fn note_tablet(&self) {
         if let Some(tablet) = &self.tablet {
-            tablet.note(self.screen, self.watcher.is_some(), self.link.carries_all());
+            let now = self.app.clock.now();
+            tablet.note(self.screen, self.watcher.is_some(), self.link.carries_all(), now);
         }
     }
 
-    /// Notes that the page has drawn `frame`; it may then get the next one.
-    fn drawn(&mut self, frame: u64) {
-        let Some(sent) = self.in_flight.take_if(|sent| sent.number == frame) else { return };
+    /// Notes the answer to a ping.
+    fn answered(&mut self, payload: &[u8]) {
+        // The answer to an earlier ping, or to none, says nothing.
+        if payload == self.pings.to_be_bytes() {
+            let now = self.app.clock.now();
+            self.pace.answered(now, now.since(self.pinged_at));
+        }
+    }
+
+    /// Notes that the page is done with `frame`, which it had for `held` milliseconds and has `shown` or left out. It
+    /// may then get the next one.
+    fn drawn(&mut self, frame: u64, held: f64, shown: bool) {
+        let full = self.in_flight.len() >= self.pace.window();
+        let Some(place) = self.in_flight.iter().position(|sent| sent.number == frame) else { return };
+        // Pages answer in order.
+        let Some(sent) = self.in_flight.drain(..=place).next_back() else { return };
+
         let now = self.app.clock.now();
+        let took = now.since(sent.sent_at);
+        // What the page says need not be true.
+        let held = Duration::try_from_secs_f64(held / 1e3).unwrap_or_default().min(took);
+        if let Some(tablet) = self.tablet.as_ref().filter(|_| shown) {
+            tablet.drawn(sent.pixels);
+        }
         // While a larger size is coming, a frame of the previous size says nothing about it.
         if sent.size == self.link.size() {
-            self.link.drawn(now, now.since(sent.sent_at));
+            self.pace.drawn(now, took, held, full);
+            self.link.drawn(now, took.saturating_sub(self.pace.round_trip()));
         }
         if self.coming.is_none() {
             self.due = Instant::now() + link::PATIENCE;
@@ -307,6 +361,7 @@ impl<A: Audience> Desk<A> {
         }
 
         tracing::debug!(size = size.name(), "a viewer's pictures change size");
+        self.pace.resize(self.app.clock.now());
         self.coming = (size > watcher.size()).then(|| join::<A>(&self.app, size));
         if size < watcher.size() {
             *watcher = join::<A>(&self.app, size);
@@ -339,8 +394,14 @@ impl<A: Audience> Desk<A> {
 
     /// Waits for the next frame for a visible page; waits forever for a hidden one. A frame of a larger size must come
     /// before `due`. Dropping the future loses nothing.
-    async fn next_frame(watcher: &mut Option<Watcher>, coming: &mut Option<Watcher>, due: Instant) -> Next {
+    async fn next_frame(
+        watcher: &mut Option<Watcher>,
+        coming: &mut Option<Watcher>,
+        not_before: Instant,
+        due: Instant,
+    ) -> Next {
         let Some(watcher) = watcher else { return std::future::pending().await };
+        sleep_until(not_before).await;
         let waits = coming.as_ref().unwrap_or(watcher).size() != Size::Cell;
 
         tokio::select! {
@@ -380,10 +441,13 @@ impl<A: Audience> Desk<A> {
 
         let now = self.app.clock.now();
         let age = now.since(picture.exposed_at);
-        let message = pack(&A::header(frame, tenth_millis(age), &self.app), &picture.jpeg)?;
+        let travel = whole_tens(self.pace.travel());
+        let message =
+            pack(&A::header(frame, tenth_millis(age), travel, self.link.is_reduced(), &self.app), &picture.jpeg)?;
 
         self.last = picture.number;
-        self.in_flight = Some(InFlight { number: picture.number, size, sent_at: now });
+        self.not_before = Instant::now() + self.pace.gap();
+        self.in_flight.push_back(InFlight { number: picture.number, size, pixels: pixels(picture), sent_at: now });
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);
 
@@ -395,21 +459,35 @@ impl<A: Audience> Desk<A> {
         Some(Message::Binary(message))
     }
 
-    async fn beat(&mut self) -> Result<Option<Message>, PageGone> {
+    async fn ping(&mut self) -> Result<Option<Message>, PageGone> {
+        self.silent += 1;
+        if self.silent > PATIENT_PINGS {
+            return Err(PageGone);
+        }
+
+        let beats = self.pings.is_multiple_of(PINGS_A_BEAT);
+        self.pings += 1;
+        self.pinged_at = self.app.clock.now();
+        let ping = Message::Ping(Bytes::copy_from_slice(&self.pings.to_be_bytes()));
+        if !beats {
+            return Ok(Some(ping));
+        }
+
         if let Some(token) = &self.token
             && self.app.accounts.has_ended(token).await.unwrap_or(false)
         {
             return Ok(Some(close(close_code::POLICY, "the sign-in has ended")));
         }
 
-        self.silent += 1;
-        if self.silent > 2 {
-            return Err(PageGone);
-        }
-        // Browsers answer pings themselves without telling the page, so the page gets a message as well.
         self.next = tell(&ServerMessage::<&A::Session, &A::Status>::Beat);
-        Ok(Some(Message::Ping(Bytes::new())))
+        Ok(Some(ping))
     }
+}
+
+/// The size of `picture`.
+fn pixels(picture: &Picture) -> PictureSize {
+    let pixels = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    PictureSize { width: pixels(picture.width), height: pixels(picture.height) }
 }
 
 /// Joins the viewers of `size`.

@@ -12,6 +12,7 @@ use tokio::sync::watch;
 
 use super::audience::Audience;
 use super::surgeon::{SurgeonFrame, coarse};
+use super::tablets::TabletSign;
 use crate::http::App;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
@@ -89,6 +90,8 @@ pub(super) struct OperatorStatus {
     priority: Priority,
     /// When the server's certificate expires. The page cannot reach the server after that.
     certificate_until: Option<Timestamp>,
+    /// The surgeon's tablet.
+    tablet: TabletSign,
 }
 
 /// A [`Standing`], with what it means and what to do, in words.
@@ -99,7 +102,7 @@ struct Priority {
 }
 
 impl OperatorStatus {
-    fn new(status: &ControlStatus, blinded: bool, certificate_until: Option<Timestamp>) -> Self {
+    fn new(status: &ControlStatus, blinded: bool, certificate_until: Option<Timestamp>, tablet: TabletSign) -> Self {
         let (held, message) = match status.held {
             Some(hold) if blinded => told_in_session(hold, status.held_for, status.message.as_ref()),
             held => (held, status.message.clone()),
@@ -120,6 +123,7 @@ impl OperatorStatus {
             latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
             priority: Priority { standing: status.priority, message: status.priority.words() },
             certificate_until,
+            tablet,
         }
     }
 }
@@ -144,7 +148,7 @@ impl Audience for ForOperator {
 
     const LEADS: bool = false;
 
-    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
+    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> OperatorFrame {
         // Ask only once: a session may begin between two questions.
         let blinded = app.blinded();
         let (age, seen) = if blinded {
@@ -154,7 +158,7 @@ impl Audience for ForOperator {
         };
         let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));
 
-        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
+        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, travel_ms, reduced, app), held, seen }
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<OperatorView>>> {
@@ -162,7 +166,8 @@ impl Audience for ForOperator {
     }
 
     fn status(status: &ControlStatus, app: &App) -> OperatorStatus {
-        OperatorStatus::new(status, app.blinded(), app.reach.certificate_until())
+        let tablet = app.tablets.sign(app.clock.now());
+        OperatorStatus::new(status, app.blinded(), app.reach.certificate_until(), tablet)
     }
 }
 

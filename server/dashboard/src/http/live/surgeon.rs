@@ -28,12 +28,17 @@ pub(super) struct SurgeonFrame {
     run: i64,
     /// Milliseconds from the end of the exposure to sending; in whole hundreds for those who must not know the policy.
     age: f64,
+    /// Milliseconds that the latest pictures took from sending to this page, in whole tens: half of the round trip and
+    /// the time to carry a picture.
+    travel: f64,
     /// Width of the picture in pixels.
     width: usize,
     /// Height of the picture in pixels.
     height: usize,
     /// Pixels of the picture along each side of a mosaic cell: 1, 2 or 4.
     per_cell: usize,
+    /// Whether the link is too slow for the size of pictures that the screen can show.
+    reduced: bool,
     /// Whether the colours are estimated from bands that hold no red.
     estimated: bool,
     /// The patch that is brought into focus, in cells.
@@ -52,15 +57,17 @@ pub(super) struct Circle {
 }
 
 impl SurgeonFrame {
-    /// What is sent with `picture`, which is `age` milliseconds old.
-    pub(super) fn new(picture: &Picture, age: f64, app: &App) -> Self {
+    /// What is sent with `picture`, which is `age` milliseconds old and will arrive after about `travel`.
+    pub(super) fn new(picture: &Picture, age: f64, travel: f64, reduced: bool, app: &App) -> Self {
         Self {
             frame: picture.number,
             run: app.store.run(),
             age,
+            travel,
             width: picture.width,
             height: picture.height,
             per_cell: picture.per_cell,
+            reduced,
             estimated: picture.estimated,
             patch: picture.patch,
             area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),
@@ -115,8 +122,8 @@ impl Audience for ForSurgeon {
 
     const LEADS: bool = true;
 
-    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> SurgeonFrame {
-        SurgeonFrame::new(&frame.picture, coarse(age_ms), app)
+    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> SurgeonFrame {
+        SurgeonFrame::new(&frame.picture, coarse(age_ms), travel_ms, reduced, app)
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<SurgeonView>>> {

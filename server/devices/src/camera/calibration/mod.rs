@@ -1,5 +1,6 @@
 //! Calibrations in files: TOML, with 16-bit pictures beside it for references per pixel.
 
+pub mod maker;
 pub mod tables;
 
 use std::fs;

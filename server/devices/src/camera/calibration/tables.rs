@@ -1,16 +1,21 @@
 //! A maker's tables of a sensor's unit, as CSV: the bands' responses and the spectral correction.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::CalibrationFault;
 use parfocal_imaging::{BANDS, Band};
 
+/// Wavelengths in nm between which a sensor's filters let light through. Beyond them a band's response has side lobes,
+/// which the camera's own filter keeps away.
+pub type WavelengthRange = RangeInclusive<f64>;
+
 /// Reads the bands from the responses in `path`: a line per wavelength with nm and 16 responses; a heading may come
-/// first. Centre and width are those of each response's main peak at half its height.
+/// first. Centre and width are those of each response's highest peak within `range`, at half its height.
 ///
 /// # Errors
-/// If the table cannot be read or has no peak in a band.
-pub fn bands(path: &Path) -> Result<[Band; BANDS], CalibrationFault> {
+/// If the table cannot be read, or a band has no peak within `range`.
+pub fn bands(path: &Path, range: &WavelengthRange) -> Result<[Band; BANDS], CalibrationFault> {
     let rows = rows(path, BANDS + 1)?;
     let rising = rows.windows(2).all(|pair| pair[0][0] < pair[1][0]);
     if rows.len() < 3 || !rising {
@@ -20,11 +25,20 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], CalibrationFault> {
     let mut bands = Vec::with_capacity(BANDS);
     for band in 1..=BANDS {
         let response: Vec<(f64, f64)> = rows.iter().map(|row| (row[0], row[band])).collect();
-        let found = main_peak(&response);
-        bands.push(found.ok_or_else(|| format!("{}: band {} has no peak", path.display(), band - 1))?);
+        let found = main_peak(&response, range);
+        bands.push(found.ok_or_else(|| no_peak(path, band - 1, range))?);
     }
 
     bands.try_into().map_err(|_| CalibrationFault("16 bands".to_owned()))
+}
+
+/// The fault of a band, counted from 0, without a peak within `range`.
+pub(super) fn no_peak(path: &Path, band: usize, range: &WavelengthRange) -> CalibrationFault {
+    let (from, to) = (range.start(), range.end());
+    CalibrationFault(format!(
+        "{}: band {band} has no peak between {from} and {to} nm; give the sensor's own range, as --range {from}-{to}",
+        path.display()
+    ))
 }
 
 /// Reads the correction in `path`: 16 lines of 16 numbers.
@@ -61,11 +75,16 @@ fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, CalibrationFault> 
     Ok(rows)
 }
 
-/// The highest peak of a response: where it falls to half its height on either side, and the middle between them.
-fn main_peak(response: &[(f64, f64)]) -> Option<Band> {
-    let top = response.iter().enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1))?.0;
+/// The highest peak of a response within `range`: where it falls to half its height on either side, and the middle
+/// between them. None if the response only falls or rises there, because then its peak is outside.
+fn main_peak(response: &[(f64, f64)], range: &WavelengthRange) -> Option<Band> {
+    let inside = response.iter().enumerate().filter(|(_, (nm, _))| range.contains(nm));
+    let top = inside.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?.0;
     let half = response[top].1 / 2.0;
-    if half <= 0.0 {
+    let is_higher = |neighbour: Option<&(f64, f64)>| neighbour.is_some_and(|there| there.1 > response[top].1);
+    let goes_on =
+        is_higher(top.checked_sub(1).and_then(|before| response.get(before))) || is_higher(response.get(top + 1));
+    if half <= 0.0 || goes_on {
         return None;
     }
 
@@ -92,9 +111,14 @@ mod tests {
         // A triangle of height 2 about 500 nm that reaches 0 at 480 and 520, and a lesser peak at 560.
         let height = |nm: f64| (2.0 - (nm - 500.0).abs() / 10.0).max(0.0) + (0.5 - (nm - 560.0).abs() / 20.0).max(0.0);
         let response: Vec<_> = (0..40).map(|step| 450.0 + 3.0 * f64::from(step)).map(|nm| (nm, height(nm))).collect();
-        let band = main_peak(&response).unwrap();
+        let band = main_peak(&response, &(400.0..=700.0)).unwrap();
         // The sampled top is 1.9 at 501, so half of it, 0.95, lies 10.5 nm from the middle.
         assert!((band.centre_nm - 500.0).abs() < 1e-9 && (band.fwhm_nm - 21.0).abs() < 1e-9, "{band:?}");
-        assert_eq!(main_peak(&[(450.0, 0.0), (460.0, 0.0)]), None);
+        assert_eq!(main_peak(&[(450.0, 0.0), (460.0, 0.0)], &(400.0..=700.0)), None);
+
+        // Only the lesser peak is within the range, and then none is: the response just falls.
+        let band = main_peak(&response, &(530.0..=600.0)).unwrap();
+        assert!((band.centre_nm - 560.0).abs() < 0.5, "{band:?}");
+        assert_eq!(main_peak(&response, &(505.0..=519.0)), None);
     }
 }

@@ -11,8 +11,10 @@ use std::time::Duration;
 use bytes::Bytes;
 use turbojpeg::{Decompressor, Image, PixelFormat};
 
+use super::coverage::cut_off;
 use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::{FootageError, Video};
+use parfocal_base::notices::tell;
 use parfocal_imaging::{JpegEncoder, RgbImage};
 
 /// Pictures a second.
@@ -45,6 +47,9 @@ impl Clip {
         let mut video = Video::open(path, FPS, WIDTH, HEIGHT)?;
         let picture = video.next().ok_or_else(|| failed(&"it holds no pictures"))?;
         large_enough(path, picture.width, picture.height)?;
+        if let Some(cut) = cut_off(path) {
+            tell(format_args!("note: {} is cut off: {cut}", path.display()));
+        }
 
         let mut encoder = JpegEncoder::new(QUALITY).map_err(|error| failed(&error))?;
         let first = encoder.encode(&picture).map_err(|error| failed(&error))?;
@@ -160,14 +165,20 @@ struct Loader {
 impl Loader {
     /// Puts the pictures of `video` on the shelf, over and over if the video is longer than the window.
     fn run(mut self, mut video: Video) {
+        let mut first = true;
         loop {
+            let mut count = 0_u64;
             for picture in &mut video {
                 let Ok(jpeg) = self.encoder.encode(&picture) else { break };
                 if !self.shelf.put(jpeg) {
                     return;
                 }
+                count += 1;
             }
 
+            if std::mem::take(&mut first) {
+                self.tell_damage(&mut video, count + 1);
+            }
             let longer = self.shelf.lock().moved_on;
             let again = longer.then(|| Video::open(&self.path, FPS, WIDTH, HEIGHT).ok()).flatten();
 
@@ -177,6 +188,18 @@ impl Loader {
             };
 
             video = again;
+        }
+    }
+}
+
+impl Loader {
+    /// Says how many pictures of a damaged video could be read.
+    fn tell_damage(&self, video: &mut Video, count: u64) {
+        if let Some(damage) = video.damage() {
+            let path = self.path.display();
+            tell(format_args!(
+                "note: {path} is damaged (ffmpeg: {damage}); {count} pictures of it, {FPS} a second, could be read"
+            ));
         }
     }
 }
@@ -261,5 +284,40 @@ mod tests {
         let mut clip = Clip::with(&file, 8).unwrap();
         let (numbers, _) = played(&mut clip, 9);
         assert_eq!(numbers, [1, 2, 3, 4, 3, 2, 1, 0, 1]);
+    }
+
+    /// Lets ffmpeg write a video. `None` if there is no ffmpeg.
+    fn written(file: &Path, source: &str, more: &[&str]) -> Option<PathBuf> {
+        let mut ffmpeg = Command::new("ffmpeg");
+        ffmpeg.args(["-v", "error", "-f", "lavfi", "-i", source]).args(more).arg(file);
+        ffmpeg.status().is_ok_and(|status| status.success()).then(|| file.to_owned())
+    }
+
+    #[test]
+    fn wide_and_narrow_pixels_are_made_square() {
+        let folder = tempfile::tempdir().unwrap();
+        for (ratio, width) in [("2/1", 180), ("8/9", 80), ("1/1", 90)] {
+            let file = folder.path().join("pixels.mkv");
+            let filter = format!("setsar={ratio}");
+            let more = ["-vf", &filter, "-frames:v", "2", "-c:v", "ffv1", "-y"];
+            let Some(file) = written(&file, "color=gray:s=90x144:r=25", &more) else { return };
+            let picture = Video::open(&file, FPS, WIDTH, HEIGHT).unwrap().next().unwrap();
+            assert_eq!((picture.width, picture.height), (width, 144), "{ratio}");
+        }
+    }
+
+    #[test]
+    fn of_a_video_that_is_cut_off_the_missing_seconds_are_known() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["video.mp4", "video.mkv", "video.avi"] {
+            let more = ["-t", "4", "-c:v", "mpeg4", "-g", "5", "-movflags", "+faststart"];
+            let Some(file) = written(&folder.path().join(name), "testsrc=s=160x120:r=25", &more) else { return };
+            assert_eq!(cut_off(&file), None, "{name} is whole");
+
+            let bytes = std::fs::read(&file).unwrap();
+            std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+            let cut = cut_off(&file).unwrap();
+            assert!((cut.announced - 4.0).abs() < 0.1 && (1.0..3.0).contains(&cut.read), "{name}: {cut:?}");
+        }
     }
 }

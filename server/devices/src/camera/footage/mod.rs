@@ -3,16 +3,17 @@
 //! window is blurred by a Gaussian whose standard deviation grows with the distance between focal power and optimum.
 
 mod clip;
+mod coverage;
 mod defocus;
 mod pnm;
 mod reel;
 mod size;
 mod video;
 
+pub use coverage::{CutOff, cut_off};
 pub use pnm::{PnmError, next_pnm};
-pub use reel::picture_reader;
-pub use reel::{is_picture, pictures_in};
-pub use video::{FootageError, Video, ffmpeg};
+pub use reel::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
+pub use video::{FootageError, SQUARE_PIXELS, Video, ffmpeg};
 
 use std::time::Duration;
 

@@ -1,16 +1,16 @@
 //! The pictures of a footage camera over time: a video, or stills one after another.
 
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-use image::ImageReader;
 
 use super::clip::Clip;
 use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
-use parfocal_imaging::{RgbImage, decode_any, is_mosaic};
+use parfocal_base::files::is_systems_own;
+use parfocal_base::notices::tell;
+use parfocal_imaging::{DecodeError, Picture, PictureFile, PixelFormat, RgbImage, decode_raw, is_mosaic};
 
 /// Time for which a still is shown.
 const STILL: Duration = Duration::from_secs(5);
@@ -55,9 +55,11 @@ pub(super) struct Stills {
 impl Stills {
     fn open(files: Vec<PathBuf>) -> Result<Self, FootageError> {
         for file in &files {
-            let reader = picture_reader(file).map_err(|error| FootageError::unreadable(file, error))?;
-            let (width, height) = reader.into_dimensions().map_err(|error| FootageError::unreadable(file, error))?;
-            large_enough(file, width as usize, height as usize)?;
+            let head = picture_head(file).map_err(|error| FootageError::unreadable(file, error))?;
+            let opened = PictureFile::open(&head).and_then(|opened| Ok((opened.size(0)?, opened.pages())));
+            let ((width, height), pages) = opened.map_err(|error| FootageError::unreadable(file, error))?;
+            large_enough(file, width, height)?;
+            tell_unread(file, pages);
         }
 
         let picture = still(&files[0])?;
@@ -74,18 +76,56 @@ impl Stills {
     }
 }
 
-/// Begins to read the picture in `file`. The contents decide on the format, because the name may be wrong.
+/// Bytes from which a PNG's or JPEG's size and orientation can be read.
+const HEAD: u64 = 1 << 20;
+
+/// The beginning of the picture in `file`, for [`PictureFile::size`]. Of a TIFF, whose pages may be described at its
+/// end, the whole file.
 ///
 /// # Errors
 /// If the file cannot be read.
-pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
-    ImageReader::open(file).and_then(ImageReader::with_guessed_format)
+pub fn picture_head(file: &Path) -> io::Result<Vec<u8>> {
+    let mut file = File::open(file)?;
+    let mut head = Vec::new();
+    (&mut file).take(HEAD).read_to_end(&mut head)?;
+    if head.starts_with(b"II") || head.starts_with(b"MM") {
+        file.read_to_end(&mut head)?;
+    }
+    Ok(head)
+}
+
+/// Reads the first picture of a file, or a raw mosaic; says on standard error how many others are left out, and in
+/// which format a raw mosaic was read if that is not 16 bit a sample.
+///
+/// # Errors
+/// If it is not a picture or is damaged.
+pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
+    if is_raw(path) {
+        let (frame, format) = decode_raw(bytes, None)?;
+        if format != PixelFormat::Mono10 {
+            tell(format_args!("note: {} is read as {format}, by its length", path.display()));
+        }
+        return Ok(Picture::Mosaic(frame));
+    }
+
+    let file = PictureFile::open(bytes)?;
+    let picture = file.read(0, mosaic)?;
+    tell_unread(path, file.pages());
+    Ok(picture)
+}
+
+/// Says that only the first of `pages` pictures in a file is used.
+pub fn tell_unread(path: &Path, pages: usize) {
+    if pages > 1 {
+        tell(format_args!("note: {} holds {pages} pictures; only the first is used", path.display()));
+    }
 }
 
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
+    let picture = PictureFile::open(&bytes).and_then(|opened| opened.read_any(0));
+    let picture = picture.map_err(|error| FootageError::unreadable(file, error))?;
 
     if is_mosaic(&picture) {
         // A mosaic's colours would have to be marked as estimated, which footage's are not.
@@ -102,6 +142,12 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let height = rgb.height() as usize;
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
+}
+
+/// Whether `path` has the file extension of a raw mosaic.
+#[must_use]
+pub fn is_raw(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"))
 }
 
 /// Whether `path` has the file extension of a picture.
@@ -121,7 +167,22 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();
     let mut files = paths.map_err(unreadable)?;
 
-    files.retain(|file| is_picture(file));
+    files.retain(|file| is_picture(file) && !file.file_name().is_some_and(is_systems_own));
     files.sort();
     if files.is_empty() { Err(FootageError::Empty(folder.to_owned())) } else { Ok(files) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_computers_own_files_are_no_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.png", "a.jpg", "._a.jpg", ".DS_Store", "Thumbs.db"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = pictures_in(folder.path()).unwrap();
+        assert_eq!(found, ["a.jpg", "b.png"].map(|name| folder.path().join(name)));
+    }
 }

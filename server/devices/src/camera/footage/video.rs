@@ -1,7 +1,8 @@
 //! Videos, decoded by the `ffmpeg` program.
 
 use std::ffi::OsString;
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
@@ -47,11 +48,16 @@ impl FootageError {
     }
 }
 
-/// The pictures of a video in order of time, as an iterator; a damaged video ends where the damage begins.
+/// Filter of ffmpeg that makes pixels square, as players do: wide pixels become several, narrow ones fewer.
+pub const SQUARE_PIXELS: &str = "scale='max(1,round(iw*sar))':ih,setsar=1";
+
+/// The pictures of a video in order of time, as an iterator; a damaged video may end where the damage begins.
 #[derive(Debug)]
 pub struct Video {
     decoder: Child,
     pictures: BufReader<ChildStdout>,
+    /// What ffmpeg says is wrong.
+    errors: File,
 }
 
 impl Video {
@@ -63,13 +69,17 @@ impl Video {
     pub fn open(path: &Path, fps: u32, width: usize, height: usize) -> Result<Self, FootageError> {
         check(path)?;
         let scale = format!(
-            "fps={fps},scale='min({width},iw)':'min({height},ih)':force_original_aspect_ratio=decrease:flags=area"
+            "fps={fps},{SQUARE_PIXELS},\
+             scale='min({width},iw)':'min({height},ih)':force_original_aspect_ratio=decrease:flags=area"
         );
+        // A pipe that nobody reads would fill up and stop the decoder.
+        let failed = |error: std::io::Error| FootageError::unreadable(path, format!("no temporary file: {error}"));
+        let errors = tempfile::tempfile().map_err(failed)?;
 
         let mut decoder = ffmpeg(path)
             .args(["-an", "-vf", &scale, "-f", "image2pipe", "-c:v", "ppm", "-"])
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(errors.try_clone().map_err(failed)?)
             .spawn()
             .map_err(FootageError::NoDecoder)?;
 
@@ -77,7 +87,19 @@ impl Video {
             return Err(FootageError::unreadable(path, "ffmpeg gives no output"));
         };
 
-        Ok(Self { decoder, pictures: BufReader::with_capacity(1 << 20, pictures) })
+        Ok(Self { decoder, pictures: BufReader::with_capacity(1 << 20, pictures), errors })
+    }
+
+    /// What ffmpeg said last, if anything was wrong. To be asked when no more pictures come.
+    pub fn damage(&mut self) -> Option<String> {
+        // It has ended, unless it wrote what is not a picture.
+        let _ = self.decoder.kill();
+        let _ = self.decoder.wait();
+
+        let mut text = Vec::new();
+        self.errors.rewind().ok()?;
+        (&self.errors).take(1 << 20).read_to_end(&mut text).ok()?;
+        String::from_utf8_lossy(&text).lines().last().map(str::to_owned)
     }
 }
 
@@ -116,11 +138,15 @@ fn check(path: &Path) -> Result<(), FootageError> {
 /// The decoder with the file at `path` as its input; the caller adds what to do with it.
 #[must_use]
 pub fn ffmpeg(path: &Path) -> Command {
-    // The decoder would treat anything before a colon in a bare name as a protocol.
+    let mut command = Command::new("ffmpeg");
+    command.args(["-v", "error", "-nostdin", "-i"]).arg(input(path)).stdin(Stdio::null());
+    command
+}
+
+/// The file at `path` as ffmpeg's programs take it: they would treat anything before a colon in a bare name as a
+/// protocol.
+pub(super) fn input(path: &Path) -> OsString {
     let mut name = OsString::from("file:");
     name.push(path);
-
-    let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-nostdin", "-i"]).arg(name).stdin(Stdio::null());
-    command
+    name
 }

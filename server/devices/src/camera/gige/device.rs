@@ -1,5 +1,6 @@
 //! One connection to a camera: opened, set up, streaming.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -9,13 +10,20 @@ use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, GvDevice, Stream, gl
 
 use gio::prelude::*;
 
-use super::pixels::PixelFormat;
 use crate::camera::{Adjustable, CameraError, Setting};
 use parfocal_base::options::{BadOptions, Options};
-use parfocal_imaging::CELL;
+use parfocal_imaging::{CELL, PixelFormat};
 
 /// Size of the sensor this program is made for.
 const SENSOR: (i32, i32) = (2048, 1088);
+/// Sides of a picture that can be asked for, pixels; the camera knows its own limits.
+const SIDES: RangeInclusive<i32> = 1..=65_535;
+/// Sizes of a packet that can be asked for, bytes.
+const PACKETS: RangeInclusive<i32> = 1..=65_535;
+/// Exposure times that can be asked for, microseconds: up to an hour.
+const EXPOSURES: RangeInclusive<f64> = 0.001..=3.6e9;
+/// Gains that can be asked for, in whatever unit the camera has.
+const GAINS: RangeInclusive<f64> = -1e6..=1e6;
 /// Frames that may be in transfer between camera and thread.
 const BUFFERS: usize = 8;
 /// Packet size for Aravis's fake camera: it cannot negotiate, and its loopback takes packets of any
@@ -48,16 +56,22 @@ impl Setup {
         let setup = Self {
             id: id.to_owned(),
             format: options.take("format").map_err(bad)?,
-            width: options.take("width").map_err(bad)?,
-            height: options.take("height").map_err(bad)?,
-            packet: options.take("packet").map_err(bad)?,
-            exposure: options.take("exposure").map_err(bad)?,
-            gain: options.take("gain").map_err(bad)?,
+            width: options.take_within("width", SIDES, " pixels").map_err(bad)?,
+            height: options.take_within("height", SIDES, " pixels").map_err(bad)?,
+            packet: options.take_within("packet", PACKETS, " bytes").map_err(bad)?,
+            exposure: options.take_within("exposure", EXPOSURES, " microseconds").map_err(bad)?,
+            gain: options.take_within("gain", GAINS, "").map_err(bad)?,
             fps,
         };
 
         options.finish().map_err(bad)?;
         Ok(setup)
+    }
+
+    /// Width and height to expect of a camera that is not there yet: those asked for, otherwise the sensor's.
+    pub fn expected_size(&self) -> (usize, usize) {
+        let side = |given: Option<i32>, usual: i32| usize::try_from(given.unwrap_or(usual)).unwrap_or_default();
+        (side(self.width, SENSOR.0), side(self.height, SENSOR.1))
     }
 }
 
@@ -83,6 +97,9 @@ pub struct Device {
 /// Why a camera cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
+    /// It does not answer.
+    #[error("{0}")]
+    Away(glib::Error),
     /// Aravis reports an error.
     #[error("{0}")]
     Aravis(#[from] glib::Error),
@@ -104,7 +121,7 @@ pub enum Arrival {
 impl Device {
     /// Connects to the camera of `setup`, sets it up and starts it.
     pub fn open(setup: &Setup) -> Result<Self, DeviceError> {
-        let camera = connect(&setup.id)?;
+        let camera = connect(&setup.id).map_err(DeviceError::Away)?;
 
         let vendor = camera.vendor_name()?;
         let model = camera.model_name()?;

@@ -5,7 +5,6 @@
 
 mod device;
 mod numbers;
-mod pixels;
 mod session;
 mod shared;
 mod timestamps;
@@ -17,7 +16,7 @@ use std::time::Duration;
 
 use ::aravis::Aravis;
 
-use self::device::{Device, Setup};
+use self::device::{Device, DeviceError, Setup};
 use self::shared::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 use parfocal_base::clock::Moment;
@@ -39,6 +38,19 @@ impl GigeCamera {
     /// [`CameraError::BadSource`], with the reason, if it cannot be used right now. It recovers from later failures by
     /// itself.
     pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
+        Self::opened(source, settings, false)
+    }
+
+    /// The same, except that a camera that does not answer is treated like one that was lost: it is looked for until it
+    /// is there.
+    ///
+    /// # Errors
+    /// [`CameraError::BadSource`], with the reason, if the source is invalid, or the camera answers and cannot be used.
+    pub fn open_or_await(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
+        Self::opened(source, settings, true)
+    }
+
+    fn opened(source: &str, settings: CameraSettings, patient: bool) -> Result<Self, CameraError> {
         let setup = Setup::parse(source, settings.fps)?;
         if setup.id == "list" {
             return Err(CameraError::BadSource(listing()));
@@ -50,16 +62,25 @@ impl GigeCamera {
             .spawn(move || {
                 // Opened here, so that Aravis's thread that receives packets inherits the priority.
                 parfocal_base::priority::raise_with_children(Place::Wire);
-                match Device::open(&setup) {
-                    Ok(device) => {
-                        let shared = Arc::new(Shared::new(settings.clock, &device));
-                        let _ = tell.send(Ok(((device.width, device.height), Arc::clone(&shared))));
-                        worker::run(&shared, &setup, device);
-                    }
+                let named = |error: DeviceError| format!("{}: {error}; {}", setup.id, listing());
+                let (device, trouble) = match Device::open(&setup) {
+                    Ok(device) => (Some(device), String::new()),
+                    Err(error @ DeviceError::Away(_)) if patient => (None, named(error)),
                     Err(error) => {
-                        let _ = tell.send(Err(format!("{}: {error}; {}", setup.id, listing())));
+                        let _ = tell.send(Err(named(error)));
+                        return;
                     }
+                };
+
+                let size =
+                    device.as_ref().map_or_else(|| setup.expected_size(), |device| (device.width, device.height));
+                let shared = Arc::new(Shared::missing(settings.clock, &format!("camera {}", setup.id), &trouble));
+                match &device {
+                    Some(device) => shared.found(device),
+                    None => tracing::warn!("{trouble}; looking for it"),
                 }
+                let _ = tell.send(Ok((size, Arc::clone(&shared))));
+                worker::run(&shared, &setup, device, size);
             })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
 

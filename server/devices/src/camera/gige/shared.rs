@@ -32,20 +32,28 @@ struct State {
 }
 
 impl Shared {
-    /// State for a camera that was just opened.
-    pub fn new(clock: Arc<dyn Clock>, device: &Device) -> Self {
+    /// State for a camera by the name `name` that is not there yet, with the reason.
+    pub fn missing(clock: Arc<dyn Clock>, name: &str, trouble: &str) -> Self {
         let state = State {
             frame: None,
             taken: None,
-            name: Arc::from(device.name.as_str()),
-            fake: device.fake,
-            condition: Ok(words(device)),
+            name: Arc::from(name),
+            fake: false,
+            condition: Err(Arc::from(trouble)),
             delivered: VecDeque::new(),
             lost: 0,
             stop: false,
         };
 
         Self { clock, controls: Controls::default(), state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    /// Records that the camera is there.
+    pub fn found(&self, device: &Device) {
+        let mut state = self.state();
+        state.name = Arc::from(device.name.as_str());
+        state.fake = device.fake;
+        state.condition = Ok(words(device));
     }
 
     /// Takes the latest frame, waiting for it at most `timeout`.

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::{HEADER, Header, Image, POSES, Pose, ScanError, ScanFolder};
 use parfocal_base::FocalPower;
-use parfocal_base::files::{replace, write_through};
+use parfocal_base::files::{is_systems_own, replace, write_through};
 use parfocal_imaging::{GrayImage, PatchArea};
 
 /// A scan that is being recorded, by one process at a time.
@@ -50,7 +50,7 @@ impl Recording {
 
         let occupied = || -> io::Result<bool> {
             let mut entries = fs::read_dir(path)?.filter_map(Result::ok);
-            Ok(entries.any(|entry| !is_ours(&entry.file_name().to_string_lossy())))
+            Ok(entries.any(|entry| !is_systems_own(&entry.file_name())))
         };
 
         if !path.join(HEADER).exists() {
@@ -173,11 +173,6 @@ fn unwritable(path: &Path, kept: usize, error: io::Error) -> ScanError {
 
 fn is_partial(name: &str) -> bool {
     name.starts_with(".pose") && name.ends_with(".partial")
-}
-
-/// Whether a recording that was killed may have left `name` before it had a header.
-fn is_ours(name: &str) -> bool {
-    name.starts_with('.') && name.ends_with(".partial")
 }
 
 /// Compares two headers; the error names the first difference.

@@ -32,6 +32,25 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// Checks that each range has its lower end below its upper end.
+    pub(super) fn check(&self) -> Result<(), LensError> {
+        let (low, high) = self.temperatures;
+        if low >= high {
+            return Err(LensError::BadSpec(format!(
+                "the lowest temperature must be below the highest, but low is {low} °C and high is {high} °C"
+            )));
+        }
+
+        match (self.min_dioptre, self.max_dioptre) {
+            (Some(min), Some(max)) if min >= max => Err(LensError::BadSpec(format!(
+                "the least dioptres must be below the most, but min is {min} dpt and max is {max} dpt"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Prepares the device behind `link` for commands.
 pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
     greet(link, path)?;

@@ -21,9 +21,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 pub use handshake::Settings;
-use shared::Shared;
+use port::Address;
+use shared::{Device, Shared};
 
-use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
@@ -32,8 +33,8 @@ use parfocal_base::priority::{self, Place};
 /// The simulated lens's figures, used until the lens is measured on the bench.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
-/// Prefix of the serial numbers of emulated units (see [`super::emulator`]), which have no real lens.
-const EMULATED: &str = "EMUL";
+/// Dioptres that a specification may give: all that the driver has numbers for.
+const DIOPTRES: std::ops::RangeInclusive<f64> = -160.0..=160.0;
 
 /// Longest wait for a device to identify itself. Long enough for a bad line with many repetitions.
 const CONNECT: Duration = Duration::from_secs(4);
@@ -64,12 +65,22 @@ pub fn let_go_of_all() {
     }
 }
 
+/// How a lens is opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Opening {
+    /// It must be there now.
+    Now,
+    /// It must be there now, keeps its state, and stays where it is when it is dropped.
+    ToStay,
+    /// It is looked for until it is there.
+    OrAwait,
+}
+
 /// A lens at a serial port.
 pub struct OptotuneLens {
     shared: Arc<Shared>,
     name: Arc<str>,
     thread: Option<JoinHandle<()>>,
-    emulated: bool,
 }
 
 impl OptotuneLens {
@@ -79,31 +90,38 @@ impl OptotuneLens {
     /// If the lens cannot be used right now. The error says why and what to do. The lens recovers from later failures
     /// by itself.
     pub fn connect(path: &Path, settings: Settings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+        let (lens, first) = Self::start(Address::Port(path.to_owned()), settings, clock)?;
+        first.map(|_| lens)
+    }
+
+    /// Starts the thread that connects to the driver at `address`. Returns the lens and the outcome of the first attempt.
+    fn start(
+        address: Address,
+        settings: Settings,
+        clock: Arc<dyn Clock>,
+    ) -> Result<(Self, Result<Device, LensError>), LensError> {
         let response = Arc::new(Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE));
         let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
         let shared = Arc::new(Shared::new(clock, response).map_err(system)?);
+        let name = match &address {
+            Address::Port(path) => format!("Optotune lens at {}", path.display()).into(),
+            Address::Any => Arc::from("Optotune lens"),
+        };
 
         let theirs = shared.clone();
-        let path_of_thread = path.to_owned();
         OPEN.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::downgrade(&shared));
         let thread = std::thread::Builder::new()
             .name("lens".into())
             .spawn(move || {
                 priority::raise(Place::Wire);
-                worker::run(&theirs, &path_of_thread, &settings);
+                worker::run(&theirs, &address, &settings);
                 theirs.ended();
             })
             .map_err(system)?;
 
-        let mut lens = Self {
-            shared,
-            name: format!("Optotune lens at {}", path.display()).into(),
-            thread: Some(thread),
-            emulated: false,
-        };
-
-        lens.emulated = lens.shared.wait_connected(CONNECT)?.serial.starts_with(EMULATED);
-        Ok(lens)
+        let lens = Self { shared, name, thread: Some(thread) };
+        let first = lens.shared.wait_connected(CONNECT);
+        Ok((lens, first))
     }
 
     /// Opens the lens of a specification. `device` is a path, or `auto` for the one driver that is plugged in. Options
@@ -111,21 +129,42 @@ impl OptotuneLens {
     pub(super) fn open(
         device: &str,
         mut options: Options,
-        keep: bool,
+        opening: Opening,
         clock: Arc<dyn Clock>,
     ) -> Result<Self, LensError> {
         let (low, high) = Settings::default().temperatures;
         let settings = Settings {
-            min_dioptre: options.take("min")?,
-            max_dioptre: options.take("max")?,
-            temperatures: (options.take("low")?.unwrap_or(low), options.take("high")?.unwrap_or(high)),
-            keep,
+            min_dioptre: options.take_within("min", DIOPTRES, " dpt")?,
+            max_dioptre: options.take_within("max", DIOPTRES, " dpt")?,
+            temperatures: (
+                options.take_within("low", CELSIUS, " °C")?.unwrap_or(low),
+                options.take_within("high", CELSIUS, " °C")?.unwrap_or(high),
+            ),
+            keep: opening == Opening::ToStay,
         };
 
         options.finish()?;
+        settings.check()?;
 
-        let path = if device == "auto" { port::find(Path::new(port::BY_ID))? } else { PathBuf::from(device) };
-        Self::connect(&path, settings, clock)
+        let address = match device {
+            // More than one driver is an error at once, and so is none unless it is waited for.
+            "auto" => match port::find(Path::new(port::BY_ID)) {
+                Ok(path) => Address::Port(path),
+                Err(LensError::Gone(_)) if opening == Opening::OrAwait => Address::Any,
+                Err(error) => return Err(error),
+            },
+            path => Address::Port(PathBuf::from(path)),
+        };
+
+        let (lens, first) = Self::start(address, settings, clock)?;
+        match first {
+            Ok(_) => Ok(lens),
+            Err(error @ LensError::Gone(_)) if opening == Opening::OrAwait => {
+                tracing::warn!("{error}; looking for it");
+                Ok(lens)
+            }
+            Err(error) => Err(error),
+        }
     }
 }
 
@@ -163,7 +202,7 @@ impl Lens for OptotuneLens {
 
         LensHealth {
             name: self.name.clone(),
-            simulated: self.emulated,
+            simulated: state.emulated,
             working,
             caution,
             message,

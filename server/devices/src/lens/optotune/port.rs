@@ -71,6 +71,28 @@ impl Drop for Port {
     }
 }
 
+/// Where a lens driver is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Address {
+    /// At this port.
+    Port(PathBuf),
+    /// At whatever port the one driver is that is plugged in.
+    Any,
+}
+
+impl Address {
+    /// The port at which the driver is now.
+    ///
+    /// # Errors
+    /// If any port will do, and there is no driver, or more than one.
+    pub fn path(&self) -> Result<PathBuf, LensError> {
+        match self {
+            Self::Port(path) => Ok(path.clone()),
+            Self::Any => find(Path::new(BY_ID)),
+        }
+    }
+}
+
 /// The one lens driver listed in `folder` (usually [`BY_ID`]).
 ///
 /// # Errors

@@ -17,6 +17,9 @@ use parfocal_base::clock::{Clock, Moment};
 /// If a command has waited in the slot longer than this, commands are not being carried out.
 const STALLED: Duration = Duration::from_millis(250);
 
+/// Prefix of the serial numbers of emulated units (see [`crate::lens::emulator`]), which have no real lens.
+const EMULATED: &str = "EMUL";
+
 /// Shared by both sides. The lock is never held during input or output.
 pub struct Shared {
     /// The clock for deadlines and time stamps.
@@ -31,6 +34,7 @@ pub struct Shared {
 }
 
 /// Everything known about the device.
+#[allow(clippy::struct_excessive_bools, reason = "each is told of the device by itself; no two make a state")]
 pub struct State {
     /// The slot: the latest command not yet sent, and the time since which the slot has been full.
     wanted: Option<(FocalPower, Moment)>,
@@ -44,6 +48,8 @@ pub struct State {
     pub message: Arc<str>,
     /// Why commands are not carried out although the device is connected.
     pub refusal: Option<Arc<str>>,
+    /// Whether the device, or the last one that was connected, is an emulated unit.
+    pub emulated: bool,
     /// Whether a lens driver has ever replied to the greeting on this port.
     pub greeted: bool,
     /// Progress of the thread.
@@ -108,6 +114,7 @@ impl Shared {
             tried: false,
             message: Arc::default(),
             refusal: None,
+            emulated: false,
             greeted: false,
             progress: Progress::Serving,
             refresh: false,
@@ -169,6 +176,7 @@ impl Shared {
     /// Records that the device is connected.
     pub fn connected(&self, device: Device, message: Arc<str>) {
         let mut state = self.state();
+        state.emulated = device.serial.starts_with(EMULATED);
         state.device = Ok(device);
         state.message = message;
         state.refusal = None;

@@ -1,14 +1,14 @@
 //! The thread that talks to the driver: connects, sends commands, takes readings between them, and reconnects.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use super::codec::{Reply, Request};
 use super::handshake::{self, Settings};
 use super::link::{Link, SentCommand};
-use super::port::Port;
+use super::port::{Address, Port};
 use super::shared::{Device, Shared};
 use super::trouble::Trouble;
 use crate::lens::LensError;
@@ -32,28 +32,40 @@ const GAP: Duration = Duration::from_millis(5);
 /// How often a command is sent again before it counts as refused.
 const RESENDS: u32 = 2;
 
-/// Serves the device at `path` until it must stop. Then removes the lens's current.
-pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
+/// Serves the device at `address` until it must stop. Then removes the lens's current.
+pub fn run(shared: &Shared, address: &Address, settings: &Settings) {
     let mut backoff = BACKOFF_FIRST;
+    // Once a port is found it stays the same, so that no other driver takes this one's place.
+    let mut found = None;
     loop {
         let mut link = None;
-        let trouble = catch_unwind(AssertUnwindSafe(|| attend(shared, path, settings, &mut link, &mut backoff)))
+        let attempt = || match located(address, &mut found) {
+            Ok(path) => attend(shared, &path, settings, &mut link, &mut backoff),
+            Err(error) => error.into(),
+        };
+        let trouble = catch_unwind(AssertUnwindSafe(attempt))
             .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
         shared.lost(trouble.into());
 
         // If the end was requested while the port was open, the open connection is used to remove the current.
         if shared.stop_within(Duration::ZERO) {
-            return let_go(shared, path, settings, link);
+            return let_go(shared, found.as_deref(), settings, link);
         }
 
         // Close the port, so that others and the next attempt can open it.
         drop(link);
         if shared.stop_within(backoff) {
-            return let_go(shared, path, settings, None);
+            return let_go(shared, found.as_deref(), settings, None);
         }
 
         backoff = (backoff * 2).min(BACKOFF_MOST);
     }
+}
+
+/// The port at `address`, which is kept in `found`.
+fn located(address: &Address, found: &mut Option<PathBuf>) -> Result<PathBuf, LensError> {
+    let path = found.take().map_or_else(|| address.path(), Ok)?;
+    Ok(found.insert(path).clone())
 }
 
 /// Connects and sends commands until that fails. Leaves the connection in `link`.
@@ -79,7 +91,7 @@ fn attend<'a>(
 }
 
 /// Sets zero current at the end, unless the lens must stay where it is. `link` is the connection, if it is still open.
-fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>) {
+fn let_go(shared: &Shared, path: Option<&Path>, settings: &Settings, link: Option<Link>) {
     // Never send anything to a device that is not a lens driver.
     if settings.keep || !shared.state().greeted {
         return;
@@ -88,6 +100,7 @@ fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>)
         return;
     }
 
+    let Some(path) = path else { return };
     // A new connection may still work, and the lens may still be under current.
     let afresh = Port::open(path).map_err(|error| error.to_string());
     if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {

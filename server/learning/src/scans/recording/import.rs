@@ -6,16 +6,20 @@ use std::path::{Path, PathBuf};
 use super::import_error::ImportError;
 use super::{PosePictures, shot};
 use parfocal_base::FocalPower;
-use parfocal_devices::camera::footage::picture_reader;
+use parfocal_base::files::is_systems_own;
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::footage::picture_head;
 use parfocal_devices::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
-use parfocal_imaging::{DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
+use parfocal_imaging::{GrayImage, PatchArea, Picture, PictureFile, Reconstructor, SENSOR_SIZE, content_area};
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
 pub struct Imported {
     poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>>,
+    /// Bits of the samples in 16-bit files, if the caller knows them.
+    bits: Option<u8>,
 }
 
 impl Imported {
@@ -55,7 +59,7 @@ impl Imported {
             return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
         }
 
-        let imported = Self { poses };
+        let imported = Self { poses, bits: None };
         imported.check_powers()?;
         Ok(imported)
     }
@@ -80,6 +84,13 @@ impl Imported {
         powers.sort_by(|a, b| a.get().total_cmp(&b.get()));
         powers.dedup();
         powers
+    }
+
+    /// Takes the samples of 16-bit files as numbers of so many bits. If it is `None`, the fewest bits that hold the
+    /// largest sample of all pictures.
+    #[must_use]
+    pub fn of_bits(self, bits: Option<u8>) -> Self {
+        Self { bits, ..self }
     }
 
     /// Number of poses.
@@ -115,9 +126,10 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         focal_powers: imported.powers(),
     };
 
-    let mut reader = Reader { reconstructor: Reconstructor::default(), first: None };
+    let mut reader = Reader { reconstructor: Reconstructor::default(), first: None, largest: None, scale: 1.0 };
     // Checks all sizes before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
+    reader.set_scale(imported.bits)?;
 
     let mut recording = Recording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
@@ -166,18 +178,52 @@ fn patch(pictures: &[GrayImage]) -> Option<PatchArea> {
 struct Reader {
     reconstructor: Reconstructor,
     first: Option<(PathBuf, (usize, usize))>,
+    /// The largest sample of all 16-bit pictures, and the file that holds it.
+    largest: Option<(u16, PathBuf)>,
+    /// Factor for gray levels of 16-bit pictures, whose white is 65535 until the bits of their samples are known.
+    scale: f32,
 }
 
 impl Reader {
-    /// Compares a picture's size with the first one's. Reads only the beginning of the file.
+    /// Compares a picture's size with the first one's. Reads only the beginning of the file, except of one with 16-bit
+    /// samples, whose largest counts.
     fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
-        let damaged = |error: image::ImageError| ImportError::Picture {
-            path: path.to_owned(),
-            error: DecodeError::Damaged(error.to_string()),
-        };
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
-        let (width, height) = picture_reader(path).map_err(unreadable)?.into_dimensions().map_err(damaged)?;
-        self.check(path, (width as usize, height as usize))
+        let head = picture_head(path).map_err(unreadable)?;
+        let size = PictureFile::open(&head).and_then(|file| file.single()?.size(0));
+        let picture = |error| ImportError::Picture { path: path.to_owned(), error };
+        let size = size.map_err(picture)?;
+        self.check(path, size)?;
+
+        // A mosaic's counts have the scale of its calibration.
+        if size != SENSOR_SIZE && PictureFile::open(&head).map_err(picture)?.is_wide() {
+            let bytes = std::fs::read(path).map_err(unreadable)?;
+            let sample = PictureFile::open(&bytes).and_then(|file| file.largest_sample(0)).map_err(picture)?;
+            if self.largest.as_ref().is_none_or(|(largest, _)| sample > *largest) {
+                self.largest = Some((sample, path.to_owned()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets what is white in 16-bit pictures, one for the whole scan.
+    fn set_scale(&mut self, given: Option<u8>) -> Result<(), ImportError> {
+        let Some((largest, path)) = self.largest.clone() else { return Ok(()) };
+        let needed = (16 - largest.leading_zeros() as u8).max(8);
+        let bits = given.unwrap_or(needed);
+        if bits < needed {
+            return Err(ImportError::Bits { path, largest, bits, needed });
+        }
+
+        let white = u16::MAX >> (16 - bits.min(16));
+        self.scale = f32::from(u16::MAX) / f32::from(white);
+        if given.is_none() && bits < 16 {
+            tell(format_args!(
+                "note: the samples of the 16-bit pictures reach {largest}, so they are read as {bits} bit: {white} is \
+                 white; --bits says otherwise"
+            ));
+        }
+        Ok(())
     }
 
     fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), ImportError> {
@@ -200,8 +246,18 @@ impl Reader {
     fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let picture = decode(&bytes, false).map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
-        Ok(picture.into_gray(&mut self.reconstructor))
+        let opened = PictureFile::open(&bytes).and_then(PictureFile::single);
+        let wide = opened.as_ref().is_ok_and(PictureFile::is_wide);
+        let picture = opened.and_then(|file| file.read(0, false));
+        let picture = picture.map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+
+        // A mosaic's counts have the scale of its calibration.
+        let scaled = wide && !matches!(picture, Picture::Mosaic(_));
+        let mut gray = picture.into_gray(&mut self.reconstructor);
+        if scaled {
+            gray.data.iter_mut().for_each(|level| *level *= self.scale);
+        }
+        Ok(gray)
     }
 }
 
@@ -218,6 +274,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
         files.extend(entries(&folder)?);
     }
 
+    // An operating system's own file may have the name of a picture: `._pose0001_f0.350.png`.
+    files.retain(|file| !file.file_name().is_some_and(is_systems_own));
     files.sort();
     Ok(files)
 }

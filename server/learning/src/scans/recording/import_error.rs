@@ -87,6 +87,19 @@ pub enum ImportError {
         /// Why it cannot be decoded.
         error: DecodeError,
     },
+    /// A sample larger than its bits allow.
+    #[error("{} holds a sample of {largest}, which is more than {bits} bit; give --bits {needed} or more",
+            path.display())]
+    Bits {
+        /// Path of the file.
+        path: PathBuf,
+        /// The sample.
+        largest: u16,
+        /// Bits that a sample was said to have.
+        bits: u8,
+        /// Bits that it needs.
+        needed: u8,
+    },
     /// The scan cannot be stored.
     #[error(transparent)]
     Record(#[from] RecordError),

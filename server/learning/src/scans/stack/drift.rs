@@ -18,7 +18,7 @@ use parfocal_autofocus::mgm;
 use parfocal_base::FocalPower;
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::{Motion, Walk};
-use parfocal_imaging::{PATCH_SIDE, View};
+use parfocal_imaging::{PATCH_SIDE, Patch, View};
 
 /// Frames of a scan: 20 s at 25 a second.
 pub const FRAMES: usize = 500;
@@ -107,13 +107,25 @@ struct Playing {
     frame: usize,
 }
 
+impl Playing {
+    /// The patch's corner, and the position of the focal plane in the stack.
+    fn place(&self, focal_power: FocalPower) -> ((usize, usize), f64) {
+        let Moment { corner, first_plane, .. } = self.course.frames[self.frame];
+        (corner, first_plane as f64 + focal_power.get() * (self.course.planes - 1) as f64)
+    }
+}
+
 impl FocalTimeScan for Playing {
     fn observe(&mut self, focal_power: FocalPower) -> View {
-        let Moment { corner, first_plane, .. } = self.course.frames[self.frame];
-        let position = first_plane as f64 + focal_power.get() * (self.course.planes - 1) as f64;
+        let (corner, position) = self.place(focal_power);
         let mut view = self.course.stack.view(corner, position);
         view.patch.0.iter_mut().for_each(|value| *value = value.round());
         view
+    }
+
+    fn patch(&mut self, focal_power: FocalPower) -> Patch {
+        let (corner, position) = self.place(focal_power);
+        Patch(self.course.stack.patch(corner, position).0.map(f32::round))
     }
 
     fn optimum(&self) -> FocalPower {

@@ -3,12 +3,13 @@
 pub mod check;
 pub mod drift;
 pub mod optics;
+mod pages;
 pub mod source;
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use parfocal_devices::camera::footage::{self, pictures_in};
+use parfocal_devices::camera::footage::{self, is_raw, pictures_in, read_picture};
 use parfocal_imaging::{DecodeError, GrayImage, Reconstructor, decode, in_blocks};
 
 /// Least number of pictures in which a peak and an order can be recognised.
@@ -17,6 +18,11 @@ pub const LEAST_PLANES: usize = 5;
 const MOST_POSITIONS: usize = 1001;
 /// How far a position may be from its place on the regular grid, in steps.
 const TOLERANCE: f64 = 0.25;
+
+/// How many times the usual distance two pictures may be apart for planes between them to be interpolated.
+const WIDEST: f64 = 2.5;
+/// How far from a plane's place a picture may have been taken to be used as it is, in steps.
+const NEAR: f64 = 0.05;
 
 /// One picture of a stack.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +62,14 @@ pub enum StackError {
         path: PathBuf,
         /// Why it cannot be decoded.
         source: DecodeError,
+    },
+    /// The pages of a file are not a stack.
+    #[error("{}: {reason}", path.display())]
+    Pages {
+        /// Path of the file.
+        path: PathBuf,
+        /// What is wrong with them.
+        reason: String,
     },
     /// The list of positions makes no sense.
     #[error("{}: {reason}", path.display())]
@@ -136,21 +150,27 @@ impl FocalStack {
 
     /// Reads the pictures in `folder`, made smaller by blocks of `scale` x `scale` pixels. Positions are
     /// those of `list` (lines of `name,position`), else the one number in which the names differ, else
-    /// the natural order of names.
+    /// the natural order of names. `folder` may also be a TIFF with a page for each position, which `list` counts
+    /// from 1.
     ///
     /// # Errors
     /// If a picture or the list cannot be read, or the pictures are not a stack.
     pub fn load(folder: &Path, list: Option<&Path>, scale: usize) -> Result<Self, StackError> {
-        let files = pictures_in(folder)?;
+        if folder.is_file() {
+            return Self::new(pages::planes(folder, list, scale)?);
+        }
+
+        let files = pictures_or_mosaics_in(folder)?;
         let placed = match list {
-            Some(list) => listed(folder, list)?,
+            Some(list) => listed(list)?.into_iter().map(|(name, at)| (folder.join(name), at)).collect(),
             None => named(files),
         };
 
         let mut reconstructor = Reconstructor::default();
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
-            let picture = decode(&bytes, false).map_err(|source| StackError::Picture { path: path.clone(), source })?;
+            let picture = if is_raw(&path) { read_picture(&path, &bytes, false) } else { decode(&bytes, false) };
+            let picture = picture.map_err(|source| StackError::Picture { path: path.clone(), source })?;
             let gray = picture.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
@@ -170,12 +190,17 @@ impl FocalStack {
         self.planes.first().map_or((0, 0), |plane| (plane.picture.width, plane.picture.height))
     }
 
-    /// The stack at even distances, and the number of gaps that are filled by a mix of the two pictures around. The
-    /// distance is the least between two of the stack's pictures.
+    /// The stack at even distances, and what was done to make it so. Where the positions are on a grid whose step is
+    /// the least distance between two pictures, a mix of the two pictures around fills each gap. Otherwise the step is
+    /// the usual distance, and planes between two pictures are mixed from them.
     ///
     /// # Errors
-    /// If most places would have no picture, or positions are too far from the grid.
-    pub fn even(&self) -> Result<(Self, usize), StackError> {
+    /// If pictures are too far apart to say how sharp it is between them.
+    pub fn even(&self) -> Result<(Self, Option<String>), StackError> {
+        self.on_grid().or_else(|uneven| self.interpolated().ok_or(uneven))
+    }
+
+    fn on_grid(&self) -> Result<(Self, Option<String>), StackError> {
         let position = |index: usize| self.planes[index].position;
         let last = self.planes.len() - 1;
         let distances = self.planes.windows(2).map(|pair| pair[1].position - pair[0].position);
@@ -205,7 +230,45 @@ impl FocalStack {
         if (0..planes.len()).any(off_grid) {
             return Err(uneven(steps.round() as usize + 1));
         }
-        Ok((Self { planes }, gaps))
+
+        let of = planes.len();
+        let note = format!("{gaps} of {of} planes are missing and are mixed from their neighbours");
+        Ok((Self { planes }, (gaps > 0).then_some(note)))
+    }
+
+    /// Planes at the usual distance; `None` if two pictures are too far apart, or fewer than [`LEAST_PLANES`] remain.
+    fn interpolated(&self) -> Option<(Self, Option<String>)> {
+        let mut distances: Vec<f64> = self.planes.windows(2).map(|pair| pair[1].position - pair[0].position).collect();
+        distances.sort_by(f64::total_cmp);
+        let step = distances[distances.len() / 2];
+        if distances.last().is_none_or(|largest| *largest > WIDEST * step) {
+            return None;
+        }
+
+        let first = self.planes.first()?.position;
+        let range = self.planes.last()?.position - first;
+        let count = ((range / step + NEAR) as usize + 1).min(MOST_POSITIONS);
+        let mut planes = Vec::new();
+        let mut made = 0;
+        for index in 0..count {
+            let position = first + index as f64 * step;
+            let after = self.planes.partition_point(|plane| plane.position < position - NEAR * step);
+            let high = self.planes.get(after).or(self.planes.last())?;
+            if (high.position - position).abs() <= NEAR * step {
+                planes.push(Plane { position, ..high.clone() });
+            } else {
+                let low = self.planes.get(after.checked_sub(1)?)?;
+                planes.push(mixed(low, high, (position - low.position) / (high.position - low.position)));
+                made += 1;
+            }
+        }
+
+        let note = format!(
+            "the positions are uneven, so the planes stand {step} apart: {} are pictures as they were taken, {made} \
+             are mixed from the two pictures around them",
+            count - made
+        );
+        (count >= LEAST_PLANES).then_some((Self { planes }, Some(note)))
     }
 }
 
@@ -219,12 +282,22 @@ fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
     }
 }
 
+/// The pictures in a folder, or if it has none, its raw mosaics.
+fn pictures_or_mosaics_in(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
+    pictures_in(folder).or_else(|error| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| is_raw(path)).collect();
+        files.sort();
+        if files.is_empty() { Err(error.into()) } else { Ok(files) }
+    })
+}
+
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Files and positions from a list of `name,position`; a first line without a number is a heading.
-fn listed(folder: &Path, list: &Path) -> Result<Vec<(PathBuf, f64)>, StackError> {
+/// Names and positions from a list of `name,position`; a first line without a number is a heading.
+fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
     let wrong = |reason: String| StackError::List { path: list.to_owned(), reason };
     let text = std::fs::read_to_string(list).map_err(|error| wrong(format!("cannot read the list: {error}")))?;
     let mut placed = Vec::new();
@@ -232,7 +305,7 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<(PathBuf, f64)>, StackError>
     for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()) {
         let entry = line.rsplit_once(',').map(|(name, position)| (name.trim(), position.trim().parse::<f64>()));
         match entry {
-            Some((name, Ok(position))) if position.is_finite() => placed.push((folder.join(name), position)),
+            Some((name, Ok(position))) if position.is_finite() => placed.push((name.to_owned(), position)),
             Some((_, Err(_))) if number == 1 => {}
             _ => return Err(wrong(format!("line {number} must be a file's name, a comma and a position"))),
         }
@@ -358,11 +431,33 @@ mod tests {
     fn gaps_are_filled_with_a_mix_and_counted() {
         let levels = [(0.0, 10.0), (1.0, 20.0), (2.0, 30.0), (4.0, 50.0), (5.0, 60.0)];
         let stack = FocalStack::new(levels.map(|(position, level)| plane(position, level)).to_vec()).unwrap();
-        let (even, gaps) = stack.even().unwrap();
+        let (even, note) = stack.even().unwrap();
         let found: Vec<(f64, f32)> = even.planes.iter().map(|plane| (plane.position, plane.picture.data[0])).collect();
-        assert_eq!((gaps, &found[2..5]), (1, &[(2.0, 30.0), (3.0, 40.0), (4.0, 50.0)][..]));
+        assert_eq!(&found[2..5], &[(2.0, 30.0), (3.0, 40.0), (4.0, 50.0)][..]);
+        assert_eq!(note.unwrap(), "1 of 6 planes are missing and are mixed from their neighbours");
         let uneven = [0.0, 1.0, 10.0, 20.0, 21.5].map(|position| plane(position, 0.0)).to_vec();
         assert!(FocalStack::new(uneven).unwrap().even().unwrap_err().to_string().contains("too uneven"));
+    }
+
+    #[test]
+    fn uneven_positions_are_interpolated_where_pictures_are_near() {
+        // The level is ten times the position, so a mix is known.
+        let at = |positions: &[f64]| {
+            let planes = positions.iter().map(|&position| plane(position, 10.0 * position as f32)).collect();
+            FocalStack::new(planes).unwrap().even()
+        };
+        let (even, note) = at(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.5]).unwrap();
+        assert_eq!(even.planes.len(), 6);
+        for (plane, position) in even.planes.iter().zip(1_u8..) {
+            assert!((plane.position - f64::from(position)).abs() < 1e-9, "{}", plane.position);
+            assert!((plane.picture.data[0] - 10.0 * f32::from(position)).abs() < 1e-3, "{}", plane.picture.data[0]);
+        }
+        let note = note.unwrap();
+        assert!(note.contains("stand 1 apart: 5 are pictures as they were taken, 1 are mixed"), "{note}");
+
+        let (even, _) = at(&[0.0, 1.3, 2.1, 3.0, 4.4, 5.0, 6.2]).unwrap();
+        assert!(even.planes.iter().all(|plane| (plane.picture.data[0] - 10.0 * plane.position as f32).abs() < 1e-3));
+        assert!(at(&[0.0, 1.0, 2.0, 3.0, 7.5, 8.5, 9.25]).is_err(), "nobody knows what lies between 3 and 7.5");
     }
 
     #[test]

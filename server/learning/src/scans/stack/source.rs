@@ -41,10 +41,11 @@ pub enum UnfitStack {
     },
 }
 
-/// A focal stack's folder, and how many of its pictures make the range 0..=1 of a scan.
+/// A focal stack's folder or file, and how many of its pictures make the range 0..=1 of a scan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StackSource {
-    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
+    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus. Or a TIFF with
+    /// several pages.
     pub folder: PathBuf,
     /// Planes of the range; if it is `None`, two fifths of the stack's, but at least 6.
     pub planes: Option<usize>,
@@ -96,7 +97,19 @@ impl StackSource {
     /// If the stack cannot be read, or its pictures are not a stack.
     pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
         let stack = FocalStack::load(&self.folder, None, 1)?;
-        let doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
+        let mut doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
+        let stack = match stack.even() {
+            Ok((even, note)) => {
+                doubts.extend(note);
+                even
+            }
+            // Numbers in names need not be positions.
+            Err(error) => {
+                doubts.push(format!("{error}; they are taken as if they stood at even distances"));
+                stack
+            }
+        };
+
         let planes = self.planes.unwrap_or((2 * stack.planes().len() / 5).max(LEAST_PLANES)).max(1);
         let (width, _) = stack.size();
 

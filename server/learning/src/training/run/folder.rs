@@ -32,7 +32,7 @@ impl RunFolder {
 
         let foreign = |entry: fs::DirEntry| {
             let name = entry.file_name();
-            name != LOCK && !files::is_partial(&name.to_string_lossy())
+            name != LOCK && !files::is_systems_own(&name)
         };
 
         if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {

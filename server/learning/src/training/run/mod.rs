@@ -121,7 +121,7 @@ impl Run {
         let material = Material::again(&checkpoint, &request.sources, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
 
-        let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
+        let version = checkpoint.notes.get("version").map_or("another version", String::as_str);
         run.other_version = (version != VERSION).then(|| version.to_owned());
         run.best = checkpoint.number("best")?;
         run.origin = checkpoint.notes.get("origin").cloned();

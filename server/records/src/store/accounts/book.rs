@@ -2,13 +2,14 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::sqlite::SqliteConnection;
 
 use super::{AccountEvent, ChangedBy, PassphraseHash};
+use crate::store::insert::Insert;
 use crate::store::schema::DATABASE;
-use crate::store::values::{begin, drop_if_failed, nanoseconds};
+use crate::store::values::{begin, nanoseconds};
+use crate::store::writer::Writer;
 use crate::store::{Reader, Store, StoreError, chain};
 use parfocal_base::clock::Clock;
 use parfocal_trial::account::{Account, AccountChange, AccountName};
@@ -16,17 +17,9 @@ use parfocal_trial::account::{Account, AccountChange, AccountName};
 /// Writes accounts, each change with its row in the chain. Clone freely.
 #[derive(Clone)]
 pub struct AccountBook {
-    way: Backend,
+    writer: Writer,
     reader: Reader,
     clock: Arc<dyn Clock>,
-}
-
-#[derive(Clone)]
-enum Backend {
-    /// Within the server.
-    Server(Store),
-    /// From the command line, whether or not a server runs.
-    CommandLine(SqlitePool),
 }
 
 /// What is written with an event, in one transaction.
@@ -43,7 +36,7 @@ impl AccountBook {
     /// The account book of the server.
     #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>) -> Self {
-        Self { way: Backend::Server(store.clone()), reader: store.reader().clone(), clock }
+        Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), clock }
     }
 
     /// Opens data folder `folder` for a command, whether or not a server has it open.
@@ -52,14 +45,7 @@ impl AccountBook {
     /// If there is no database, it is of another version, or it cannot be written.
     pub async fn open(folder: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
         let reader = Reader::open(folder).await?;
-        let options = SqliteConnectOptions::new()
-            .filename(folder.join(DATABASE))
-            .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5))
-            .pragma("wal_autocheckpoint", "0")
-            .synchronous(SqliteSynchronous::Full);
-        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
-        Ok(Self { way: Backend::CommandLine(pool), reader, clock })
+        Ok(Self { writer: Writer::of_command(&folder.join(DATABASE)).await?, reader, clock })
     }
 
     /// The reader of the same database.
@@ -70,10 +56,7 @@ impl AccountBook {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Backend::CommandLine(pool) = &self.way {
-            self.reader.close().await;
-            pool.close().await;
-        }
+        self.writer.close(&self.reader).await;
     }
 
     /// Creates `account`. It is on disk when this returns.
@@ -142,16 +125,16 @@ impl AccountBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn note_use(&self, token_sha256: &str) -> Result<(), StoreError> {
-        let (pool, _turn) = match &self.way {
-            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Backend::CommandLine(pool) => (pool, None),
-        };
-        sqlx::query("UPDATE sign_ins SET used = ? WHERE token_sha256 = ?")
-            .bind(self.clock.wall().to_string())
-            .bind(token_sha256)
-            .execute(pool)
-            .await?;
-        Ok(())
+        self.writer
+            .write(async |connection| {
+                sqlx::query("UPDATE sign_ins SET used = ? WHERE token_sha256 = ?")
+                    .bind(self.clock.wall().to_string())
+                    .bind(token_sha256)
+                    .execute(connection)
+                    .await?;
+                Ok(())
+            })
+            .await
     }
 
     async fn write(
@@ -161,15 +144,8 @@ impl AccountBook {
         by: ChangedBy<'_>,
         write: Write<'_>,
     ) -> Result<(), StoreError> {
-        let (pool, run, _turn) = match &self.way {
-            Backend::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
-            Backend::CommandLine(pool) => (pool, None, None),
-        };
-
-        let mut connection = pool.acquire().await?;
-        let written = self.write_on(&mut connection, run, account, event, by, write).await;
-        drop_if_failed(connection, &written);
-        written
+        let run = self.writer.run();
+        self.writer.write(async |connection| self.write_on(connection, run, account, event, by, write).await).await
     }
 
     async fn write_on(
@@ -187,19 +163,16 @@ impl AccountBook {
             apply(&mut transaction, account, &wall, write).await?;
         }
 
-        let done = sqlx::query(
-            "INSERT INTO account_events (run, wall, monotonic_ns, account, kind, done_by, detail)
-             VALUES (?, ?, ?, ?, ?, ?, ?)",
-        )
-        .bind(run)
-        .bind(&wall)
-        .bind(run.map(|_| nanoseconds(self.clock.now())))
-        .bind(account.map(AccountName::as_str))
-        .bind(event.name())
-        .bind(by.map(AccountName::as_str))
-        .bind(event.detail())
-        .execute(&mut *transaction)
-        .await?;
+        let done = Insert::into("account_events")
+            .set("run", run)
+            .set("wall", &wall)
+            .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
+            .set("account", account.map(AccountName::as_str))
+            .set("kind", event.name())
+            .set("done_by", by.map(AccountName::as_str))
+            .set("detail", event.detail())
+            .execute(&mut transaction)
+            .await?;
 
         let number = done.last_insert_rowid().to_string();
         chain::append(&mut transaction, "account-event", &number, &wall).await?;
@@ -216,20 +189,17 @@ async fn apply(
     let name = account.as_str();
     match write {
         Write::Insert(new, hash) => {
-            sqlx::query(
-                "INSERT INTO accounts (account, display, role, disabled, memory_kib, passes, salt, hash)
-                 VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-            )
-            .bind(name)
-            .bind(&new.display)
-            .bind(new.role.name())
-            .bind(new.disabled)
-            .bind(hash.memory_kib)
-            .bind(hash.passes)
-            .bind(hex::encode(&hash.salt))
-            .bind(hex::encode(&hash.hash))
-            .execute(connection)
-            .await?;
+            Insert::into("accounts")
+                .set("account", name)
+                .set("display", &new.display)
+                .set("role", new.role.name())
+                .set("disabled", new.disabled)
+                .set("memory_kib", hash.memory_kib)
+                .set("passes", hash.passes)
+                .set("salt", hex::encode(&hash.salt))
+                .set("hash", hex::encode(&hash.hash))
+                .execute(connection)
+                .await?;
         }
         Write::Change(AccountChange::Role(role)) => {
             let query = sqlx::query("UPDATE accounts SET role = ? WHERE account = ?");
@@ -257,11 +227,11 @@ async fn apply(
             end_sign_ins(connection, name).await?;
         }
         Write::SignIn { token_sha256 } => {
-            sqlx::query("INSERT INTO sign_ins (token_sha256, account, began, used) VALUES (?, ?, ?, ?)")
-                .bind(token_sha256)
-                .bind(name)
-                .bind(wall)
-                .bind(wall)
+            Insert::into("sign_ins")
+                .set("token_sha256", token_sha256)
+                .set("account", name)
+                .set("began", wall)
+                .set("used", wall)
                 .execute(connection)
                 .await?;
         }

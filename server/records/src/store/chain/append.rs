@@ -7,6 +7,7 @@ use super::form::{Entry, Head, link, sealed};
 use super::kinds::{Kind, kind};
 use super::records::{Record, one};
 use crate::store::StoreError;
+use crate::store::insert::Insert;
 
 /// A row to be written.
 pub struct NewRow<'a> {
@@ -18,8 +19,6 @@ pub struct NewRow<'a> {
     pub key: &'a str,
     /// The record's session; empty if it has none.
     pub session: &'a str,
-    /// Whether the record is older than the chain.
-    pub adopted: bool,
     /// Hash of the sealed columns.
     pub sealed: String,
     /// Salt of `sealed`; empty if the kind has no sealed columns.
@@ -37,7 +36,7 @@ pub async fn append(
 ) -> Result<Head, StoreError> {
     let kind = kind(name).ok_or_else(|| StoreError::Damaged(format!("no records are called '{name}'")))?;
     let record = one(connection, kind, key).await?;
-    append_record(connection, kind, key, &record, wall, false).await
+    append_record(connection, kind, key, &record, wall).await
 }
 
 /// Appends the row of `record`, which has this key.
@@ -47,7 +46,6 @@ pub async fn append_record(
     key: &str,
     record: &Record,
     wall: &str,
-    adopted: bool,
 ) -> Result<Head, StoreError> {
     let mut sealed_salt = String::new();
     let mut hidden = String::new();
@@ -58,7 +56,7 @@ pub async fn append_record(
 
     let content = record.content(kind, &hidden);
     let session = &record.session;
-    let row = NewRow { wall, kind: kind.name, key, session, adopted, sealed: hidden, sealed_salt, content };
+    let row = NewRow { wall, kind: kind.name, key, session, sealed: hidden, sealed_salt, content };
     insert(connection, row).await
 }
 
@@ -76,7 +74,6 @@ pub async fn insert(connection: &mut SqliteConnection, row: NewRow<'_>) -> Resul
         key: row.key.to_owned(),
         session: row.session.to_owned(),
         place,
-        adopted: row.adopted,
         salt: salt()?,
         sealed: row.sealed,
         content: row.content,
@@ -84,31 +81,23 @@ pub async fn insert(connection: &mut SqliteConnection, row: NewRow<'_>) -> Resul
 
     let number = before.number + 1;
     let hash = link(number, &before.hash, &entry.hash());
-    sqlx::query(
-        "INSERT INTO chain (number, wall, kind, key, session, place, adopted, salt, sealed, content, previous, hash)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(number)
-    .bind(&entry.wall)
-    .bind(&entry.kind)
-    .bind(&entry.key)
-    .bind(Some(&entry.session).filter(|session| !session.is_empty()))
-    .bind(entry.place)
-    .bind(entry.adopted)
-    .bind(&entry.salt)
-    .bind(&entry.sealed)
-    .bind(&entry.content)
-    .bind(&before.hash)
-    .bind(&hash)
-    .execute(&mut *connection)
-    .await?;
+    Insert::into("chain")
+        .set("number", number)
+        .set("wall", &entry.wall)
+        .set("kind", &entry.kind)
+        .set("key", &entry.key)
+        .set("session", Some(&entry.session).filter(|session| !session.is_empty()))
+        .set("place", entry.place)
+        .set("salt", &entry.salt)
+        .set("sealed", &entry.sealed)
+        .set("content", &entry.content)
+        .set("previous", &before.hash)
+        .set("hash", &hash)
+        .execute(connection)
+        .await?;
 
     if !row.sealed_salt.is_empty() {
-        sqlx::query("INSERT INTO chain_salts (number, salt) VALUES (?, ?)")
-            .bind(number)
-            .bind(&row.sealed_salt)
-            .execute(connection)
-            .await?;
+        Insert::into("chain_salts").set("number", number).set("salt", &row.sealed_salt).execute(connection).await?;
     }
 
     Ok(Head { number, hash })

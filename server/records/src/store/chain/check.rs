@@ -36,7 +36,6 @@ pub struct Walk {
     records: BTreeMap<(&'static str, String), Record>,
     expected: Option<Head>,
     last: Head,
-    adopted: usize,
     /// Rows with a whole entry.
     whole: usize,
     /// Records whose sealed columns could not be checked.
@@ -71,7 +70,6 @@ impl Walk {
             records,
             expected,
             last: Head::none(),
-            adopted: 0,
             whole: 0,
             withheld: 0,
             erased_rows: 0,
@@ -124,7 +122,6 @@ impl Walk {
     fn record(&mut self, entry: &Entry, salt: Option<&String>) -> Result<Option<BlockToCheck>, String> {
         let number = self.last.number;
         self.whole += 1;
-        self.adopted += usize::from(entry.adopted);
 
         if !entry.session.is_empty() {
             let place = self.places.entry(entry.session.clone()).or_default();
@@ -226,9 +223,6 @@ impl Walk {
         }
 
         let mut said = vec![format!("{} rows, {} of them whole; head {}", self.last.number, self.whole, self.last)];
-        if self.adopted > 0 {
-            said.push(format!("{} were recorded before there was a chain", self.adopted));
-        }
         if self.erased_rows > 0 {
             said.push(format!("{} have erased words", self.erased_rows));
         }

@@ -9,6 +9,9 @@ use sha2::{Digest, Sha256};
 /// Stands in the first row for the hash of the row before.
 pub const GENESIS: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
+/// A field of every entry, kept free for a later version.
+const RESERVED: &str = "false";
+
 /// Hexadecimal digits of a hash that are shown to people: 128 bits, enough that nobody can forge a match.
 const SHOWN: usize = 32;
 
@@ -96,8 +99,6 @@ pub struct Entry {
     pub session: String,
     /// Number of the row among those of its session, from 1; `None` without a session.
     pub place: Option<i64>,
-    /// Whether the record is older than the chain.
-    pub adopted: bool,
     /// Random. Keeps an entry that is shown only as a hash from being guessed.
     pub salt: String,
     /// Hash of the record's sealed columns; empty if its kind has none.
@@ -117,7 +118,7 @@ impl Entry {
             .and(&self.key)
             .and(&self.session)
             .and(&place)
-            .and(if self.adopted { "true" } else { "false" })
+            .and(RESERVED)
             .and(&self.sealed)
             .and(&self.content)
             .hex()

@@ -1,4 +1,13 @@
-//! The kinds of records that the chain has rows for: where each is kept, and which of its columns are hashed.
+//! The kinds of records that the chain has rows for: where each is kept, and which of its columns are hashed. Most kinds
+//! have a table in exports, whose description says so of each column.
+
+use std::sync::LazyLock;
+
+use crate::store::export::description::{
+    AccessRow, ActorRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RunRow,
+    SessionRow, StudyEventRow, StudyRow, StudySessionRow, VoicePieceRow,
+};
+use crate::store::export::table::{Column, Proof, Row, Table, Type, means};
 
 /// A kind of record.
 #[derive(Debug)]
@@ -7,297 +16,174 @@ pub struct Kind {
     pub name: &'static str,
     /// Name of its table in exports.
     pub table: &'static str,
-    /// Columns that an export never withholds.
-    pub open: &'static [&'static str],
+    /// The columns whose texts, divided by slashes, are a record's key.
+    pub key: &'static [&'static str],
+    /// Whether its records belong to sessions.
+    pub of_session: bool,
+    /// Columns that an export never withholds, in the order in which they are hashed.
+    pub open: Vec<&'static str>,
     /// Columns that can be withheld or erased. They are hashed with a salt of their own.
-    pub sealed: &'static [&'static str],
-    /// SQL that selects `chain_key`, `chain_session`, `chain_order` and every column as exports have it.
-    pub select: &'static str,
-    /// SQL condition that picks one record by its key. The parts of the key, divided by slashes, are its parameters.
-    pub one: &'static str,
-    /// SQL expression for the order in which records are kept.
-    pub order: &'static str,
+    pub sealed: Vec<&'static str>,
+    /// SQL that selects `chain_key`, `chain_session`, `chain_order` and every hashed column as exports have it.
+    pub select: String,
+    /// SQL condition that picks one record. The parts of its key are the parameters.
+    pub one: String,
 }
 
-const RUN: Kind = Kind {
-    name: "run",
-    table: "runs",
-    open: &["run", "wall", "monotonic_ns", "version", "camera", "lens", "calibration", "blur"],
-    sealed: &["weights", "seed"],
-    select: "SELECT CAST(run AS TEXT) AS chain_key, NULL AS chain_session, run AS chain_order, * FROM runs",
-    one: "run = ?",
-    order: "run",
+/// How a kind is kept in the database.
+struct Kept {
+    name: &'static str,
+    /// Its table in exports.
+    table: Table,
+    /// Its table in the database.
+    from: &'static str,
+    of_session: bool,
+    /// SQL expression that orders the records of a session as they are kept.
+    order: &'static str,
+    /// SQL of the columns that the database has in another form.
+    sql: &'static [(&'static str, &'static str)],
+    /// Hashed columns that the table in exports does not have.
+    more: &'static [(&'static str, Proof)],
+}
+
+/// A kind that is kept as exports have it, in a table of the same name.
+const fn kept(name: &'static str, table: Table) -> Kept {
+    Kept { name, table, from: table.name, of_session: true, order: "number", sql: &[], more: &[] }
+}
+
+impl Kept {
+    const fn outside_sessions(self) -> Self {
+        Self { of_session: false, ..self }
+    }
+
+    fn kind(&self) -> Kind {
+        let columns = || {
+            let of_table = self.table.columns.iter().map(|column| (column.name, column.proof, column.kind));
+            of_table.chain(self.more.iter().map(|&(name, proof)| (name, proof, Type::String)))
+        };
+        let hashed = |proof: Proof| -> Vec<&'static str> {
+            columns().filter(move |column| column.1 == proof).map(|column| column.0).collect()
+        };
+
+        let selected = columns().filter(|column| column.1 != Proof::None).map(|(name, _, kind)| {
+            match self.sql.iter().find(|(known, _)| *known == name) {
+                Some((_, sql)) => format!("{sql} AS {name}"),
+                None if kind == Type::Boolean => format!("iif({name}, 'true', 'false') AS {name}"),
+                None => name.to_owned(),
+            }
+        });
+        let selected: Vec<String> = selected.collect();
+
+        let key: Vec<String> = self.table.key.iter().map(|column| format!("CAST({column} AS TEXT)")).collect();
+        let one: Vec<String> = self.table.key.iter().map(|column| format!("{column} = ?")).collect();
+        Kind {
+            name: self.name,
+            table: self.table.name,
+            key: self.table.key,
+            of_session: self.of_session,
+            open: hashed(Proof::Open),
+            sealed: hashed(Proof::Sealed),
+            select: format!(
+                "SELECT {} AS chain_key, {} AS chain_session, {} AS chain_order, {} FROM {}",
+                key.join(" || '/' || "),
+                if self.of_session { "session" } else { "NULL" },
+                self.order,
+                selected.join(", "),
+                self.from,
+            ),
+            one: one.join(" AND "),
+        }
+    }
+}
+
+/// Participants. Of them an export has only the session's code.
+const PARTICIPANTS: Table = Table {
+    name: "participants",
+    description: "",
+    columns: &[hidden("code", Type::String), hidden("wall", Type::Datetime)],
+    key: &["code"],
 };
 
-const PARTICIPANT: Kind = Kind {
-    name: "participant",
-    table: "participants",
-    open: &["code", "wall"],
-    sealed: &[],
-    select: "SELECT code AS chain_key, NULL AS chain_session, 0 AS chain_order, * FROM participants",
-    one: "code = ?",
-    order: "wall, code",
-};
-
-const SESSION: Kind = Kind {
-    name: "session",
-    table: "sessions",
-    open: &[
-        "session",
-        "participant",
-        "protocol",
-        "protocol_sha256",
-        "practice",
-        "algorithm",
-        "commitment",
-        "wall",
-        "run",
-        "monotonic_ns",
-        "segments",
+/// What happens to accounts, which no export has.
+const ACCOUNT_EVENTS: Table = Table {
+    name: "account_events",
+    description: "",
+    columns: &[
+        hidden("number", Type::Integer),
+        hidden("run", Type::Integer),
+        hidden("wall", Type::Datetime),
+        hidden("monotonic_ns", Type::Integer),
+        hidden("account", Type::String),
+        hidden("kind", Type::String),
+        hidden("done_by", Type::String),
+        hidden("detail", Type::String),
     ],
-    sealed: &[],
-    select:
-        "SELECT session AS chain_key, session AS chain_session, rowid AS chain_order, session, participant, protocol,
-         protocol_sha256, iif(practice, 'true', 'false') AS practice, algorithm, commitment, wall, run, monotonic_ns,
-         (SELECT group_concat(segment, ',') FROM (
-             SELECT segment FROM segments AS g WHERE g.session = sessions.session ORDER BY setting)) AS segments
-         FROM sessions",
-    one: "session = ?",
-    order: "rowid",
+    key: &["number"],
 };
 
-// Two columns hold the kind of an event. If they differ, neither is believed.
-const EVENT: Kind = Kind {
-    name: "event",
-    table: "events",
-    open: &["session", "number", "wall", "run", "monotonic_ns", "role", "kind", "segment", "inspected_ms", "emergency"],
-    sealed: &["reason"],
-    select: "SELECT session || '/' || number AS chain_key, session AS chain_session, number AS chain_order, session,
-         number, wall, run, monotonic_ns, role, iif(kind IS payload ->> 'kind', kind, 'unclear') AS kind,
-         payload ->> 'segment' AS segment, payload ->> 'inspected_ms' AS inspected_ms,
-         CASE payload ->> 'emergency' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END AS emergency,
-         payload ->> 'reason' AS reason FROM events",
-    one: "session = ? AND number = ?",
-    order: "(SELECT s.rowid FROM sessions AS s WHERE s.session = events.session), events.number",
-};
-
-const COMMENT: Kind = Kind {
-    name: "comment",
-    table: "comments",
-    open: &[
-        "key",
-        "session",
-        "segment",
-        "kind",
-        "frame",
-        "frame_run",
-        "wall",
-        "run",
-        "monotonic_ns",
-        "client_millis",
-        "waited_ms",
-        "waited_by",
-        "device",
-        "sequence",
-        "late",
-    ],
-    sealed: &["text"],
-    select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, kind,
-         iif(frame < 0, format('%u', frame), frame) AS frame, frame_run, wall, run, monotonic_ns, client_millis,
-         iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
-         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
-         iif(late, 'true', 'false') AS late, text FROM comments",
-    one: "key = ?",
-    order: "number",
-};
-
-const ANSWER: Kind = Kind {
-    name: "answer",
-    table: "answers",
-    open: &[
-        "key",
-        "session",
-        "segment",
-        "question",
-        "wall",
-        "run",
-        "monotonic_ns",
-        "client_millis",
-        "waited_ms",
-        "waited_by",
-        "device",
-        "sequence",
-        "late",
-    ],
-    sealed: &["given_value"],
-    select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, question,
-         wall, run, monotonic_ns, client_millis, iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
-         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
-         iif(late, 'true', 'false') AS late, value AS given_value FROM answers",
-    one: "key = ?",
-    order: "number",
-};
-
-const DEVICE: Kind = Kind {
-    name: "device",
-    table: "devices",
-    open: &["number", "wall", "run", "monotonic_ns", "device", "working", "message"],
-    sealed: &[],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, number, wall, run,
-         monotonic_ns, device, iif(working, 'true', 'false') AS working, message FROM device_events",
-    one: "number = ?",
-    order: "number",
-};
-
-const ACCESS: Kind = Kind {
-    name: "access",
-    table: "accesses",
-    open: &["number", "wall", "run", "monotonic_ns", "role", "kind", "session", "detail"],
-    sealed: &[],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
-         FROM accesses",
-    one: "number = ?",
-    order: "number",
-};
-
-const CORRECTION: Kind = Kind {
-    name: "correction",
-    table: "corrections",
-    open: &["number", "session", "subject", "record", "field", "role", "wall", "run", "monotonic_ns"],
-    sealed: &["old_value", "new_value", "reason"],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
-         FROM corrections",
-    one: "number = ?",
-    order: "number",
-};
-
-const CONSENT: Kind = Kind {
-    name: "consent",
-    table: "consents",
-    open: &["number", "session", "text_version", "given_on", "medium", "role", "wall", "run", "monotonic_ns"],
-    sealed: &["obtained_by"],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
-         FROM consents",
-    one: "number = ?",
-    order: "number",
-};
-
-const ERASURE: Kind = Kind {
-    name: ERASED,
-    table: "erasures",
-    open: &["number", "session", "subject", "record", "role", "wall", "run", "monotonic_ns"],
-    sealed: &["reason"],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
-         FROM erasures",
-    one: "number = ?",
-    order: "number",
-};
-
-const STUDY: Kind = Kind {
-    name: "study",
-    table: "studies",
-    open: &["study", "definition_sha256", "sites", "wall"],
-    sealed: &[],
-    select: "SELECT study AS chain_key, NULL AS chain_session, rowid AS chain_order, study, definition_sha256, sites,
-         wall FROM studies",
-    one: "study = ?",
-    order: "rowid",
-};
-
-const STUDY_EVENT: Kind = Kind {
-    name: "study-event",
-    table: "study_events",
-    open: &["study", "number", "wall", "run", "monotonic_ns", "role", "person", "kind", "about_session", "commitment"],
-    sealed: &["reason"],
-    select: "SELECT study || '/' || number AS chain_key, NULL AS chain_session, 0 AS chain_order, study, number, wall,
-         run, monotonic_ns, role, person, kind, session AS about_session, commitment, reason FROM study_events",
-    one: "study = ? AND number = ?",
-    order: "study, number",
-};
-
-const STUDY_SESSION: Kind = Kind {
-    name: "study-session",
-    table: "study_sessions",
-    open: &["session", "study", "site", "protocol", "place"],
-    sealed: &[],
-    select: "SELECT session AS chain_key, session AS chain_session, 0 AS chain_order, session, study, site, protocol,
-         place FROM study_sessions",
-    one: "session = ?",
-    order: "session",
-};
-
-const ACCOUNT_EVENT: Kind = Kind {
-    name: "account-event",
-    table: "account_events",
-    open: &["number", "run", "wall", "monotonic_ns", "account", "kind", "done_by", "detail"],
-    sealed: &[],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, *
-         FROM account_events",
-    one: "number = ?",
-    order: "number",
-};
-
-const ACTOR: Kind = Kind {
-    name: "actor",
-    table: "actors",
-    open: &["number", "kind", "record", "session", "account", "display"],
-    sealed: &[],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, * FROM actors",
-    one: "number = ?",
-    order: "number",
-};
-
-// The sound itself is in none of these columns. Its hash is, and stays when the sound is erased.
-const VOICE_PIECE: Kind = Kind {
-    name: "voice-piece",
-    table: "voice_pieces",
-    open: &[
-        "number",
-        "session",
-        "comment",
-        "piece",
-        "media_type",
-        "through_ms",
-        "ended",
-        "bytes",
-        "sha256",
-        "wall",
-        "run",
-        "monotonic_ns",
-    ],
-    sealed: &[],
-    select:
-        "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, number, session,
-         comment, piece, media_type, through_ms, ended, bytes, sha256, wall, run, monotonic_ns FROM voice_pieces",
-    one: "number = ?",
-    order: "number",
-};
+const fn hidden(name: &'static str, kind: Type) -> Column {
+    means("").open().column(name, kind)
+}
 
 /// Every kind except telemetry, which is chained in blocks.
-pub const KINDS: [Kind; 17] = [
-    RUN,
-    PARTICIPANT,
-    SESSION,
-    EVENT,
-    COMMENT,
-    ANSWER,
-    DEVICE,
-    ACCESS,
-    CORRECTION,
-    CONSENT,
-    ERASURE,
-    STUDY,
-    STUDY_EVENT,
-    STUDY_SESSION,
-    ACCOUNT_EVENT,
-    ACTOR,
-    VOICE_PIECE,
+const ALL: [Kept; 17] = [
+    Kept {
+        order: "run",
+        more: &[("weights", Proof::Sealed), ("seed", Proof::Sealed)],
+        ..kept("run", RunRow::TABLE).outside_sessions()
+    },
+    Kept { order: "0", ..kept("participant", PARTICIPANTS).outside_sessions() },
+    Kept {
+        order: "rowid",
+        sql: &[(
+            "segments",
+            "(SELECT group_concat(segment, ',') FROM (
+                 SELECT segment FROM segments AS g WHERE g.session = sessions.session ORDER BY setting))",
+        )],
+        more: &[("segments", Proof::Open)],
+        ..kept("session", SessionRow::TABLE)
+    },
+    Kept {
+        sql: &[
+            // Two columns hold the kind of an event. If they differ, neither is believed.
+            ("kind", "iif(kind IS payload ->> 'kind', kind, 'unclear')"),
+            ("segment", "payload ->> 'segment'"),
+            ("inspected_ms", "payload ->> 'inspected_ms'"),
+            ("emergency", "CASE payload ->> 'emergency' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END"),
+            ("reason", "payload ->> 'reason'"),
+        ],
+        ..kept("event", EventRow::TABLE)
+    },
+    // SQLite's integers have a sign, so a very large frame number is kept as a negative one.
+    Kept { sql: &[("frame", "iif(frame < 0, format('%u', frame), frame)")], ..kept("comment", CommentRow::TABLE) },
+    Kept { sql: &[("given_value", "value")], ..kept("answer", AnswerRow::TABLE) },
+    Kept { from: "device_events", ..kept("device", DeviceRow::TABLE).outside_sessions() },
+    kept("access", AccessRow::TABLE),
+    kept("correction", CorrectionRow::TABLE),
+    kept("consent", ConsentRow::TABLE),
+    kept(ERASED, ErasureRow::TABLE),
+    Kept { order: "rowid", ..kept("study", StudyRow::TABLE).outside_sessions() },
+    Kept {
+        order: "0",
+        sql: &[("about_session", "session")],
+        ..kept("study-event", StudyEventRow::TABLE).outside_sessions()
+    },
+    Kept { order: "0", ..kept("study-session", StudySessionRow::TABLE) },
+    kept("account-event", ACCOUNT_EVENTS).outside_sessions(),
+    kept("actor", ActorRow::TABLE),
+    // The sound itself is in none of the columns. Its hash is, and stays when the sound is erased.
+    kept("voice-piece", VoicePieceRow::TABLE),
 ];
+
+/// Every kind except telemetry.
+pub fn kinds() -> &'static [Kind] {
+    static KINDS: LazyLock<Vec<Kind>> = LazyLock::new(|| ALL.iter().map(Kept::kind).collect());
+    &KINDS
+}
 
 /// The kind called `name`.
 pub fn kind(name: &str) -> Option<&'static Kind> {
-    static ALL: [Kind; KINDS.len()] = KINDS;
-    ALL.iter().find(|kind| kind.name == name)
+    kinds().iter().find(|kind| kind.name == name)
 }
 
 /// The kind of a block of telemetry: consecutive steps of a segment. Its key is `SEGMENT/FIRST/LAST`, counted from 1

@@ -2,7 +2,6 @@
 //! again finds any record that was changed, lost, inserted or put elsewhere. `docs/evidence.md` has the form and its
 //! limits.
 
-mod adopt;
 mod append;
 pub mod check;
 mod form;
@@ -11,9 +10,8 @@ mod reading;
 mod records;
 mod telemetry;
 
-pub use adopt::adopt;
 pub use append::append;
 pub use form::{Entry, Fields, Head, begin_sealed, netstring};
-pub use kinds::{KINDS, Kind, UNBLINDED};
+pub use kinds::{Kind, UNBLINDED, kinds};
 pub use records::{Record, all};
 pub use telemetry::{Block, OPEN, SEALED, begin_open, hashes, seal, unsealed};

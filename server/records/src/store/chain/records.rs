@@ -7,7 +7,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow, SqliteValueRef};
 use sqlx::{AssertSqlSafe, Row, TypeInfo, ValueRef};
 
 use super::form::content;
-use super::kinds::{KINDS, Kind};
+use super::kinds::{Kind, kinds};
 use crate::store::StoreError;
 
 /// A record, with each column as the CSV files have it.
@@ -42,20 +42,13 @@ pub async fn one(connection: &mut SqliteConnection, kind: &Kind, key: &str) -> R
     Ok(record(kind, &row)?.1)
 }
 
-/// The keys of all records of `kind`, in the order in which they are kept.
-pub async fn keys(connection: &mut SqliteConnection, kind: &Kind) -> Result<Vec<String>, StoreError> {
-    let sql = format!("{} ORDER BY {}", kind.select, kind.order);
-    let rows = sqlx::query(AssertSqlSafe(sql)).fetch_all(connection).await?;
-    Ok(rows.iter().map(|row| row.try_get("chain_key")).collect::<Result<_, _>>()?)
-}
-
 /// Every record except telemetry, by kind and key.
 pub async fn all(connection: &mut SqliteConnection) -> Result<BTreeMap<(&'static str, String), Record>, StoreError> {
     let mut found = BTreeMap::new();
-    for kind in KINDS {
-        let mut rows = sqlx::query(kind.select).fetch(&mut *connection);
+    for kind in kinds() {
+        let mut rows = sqlx::query(AssertSqlSafe(kind.select.clone())).fetch(&mut *connection);
         while let Some(row) = rows.try_next().await? {
-            let (key, record) = record(&kind, &row)?;
+            let (key, record) = record(kind, &row)?;
             found.insert((kind.name, key), record);
         }
     }
@@ -69,8 +62,8 @@ fn record(kind: &Kind, row: &SqliteRow) -> Result<(String, Record), StoreError> 
     let record = Record {
         session: cell(row.try_get_raw("chain_session")?)?,
         order: row.try_get("chain_order")?,
-        open: columns(kind.open)?,
-        sealed: Some(columns(kind.sealed)?),
+        open: columns(&kind.open)?,
+        sealed: Some(columns(&kind.sealed)?),
     };
     Ok((row.try_get("chain_key")?, record))
 }

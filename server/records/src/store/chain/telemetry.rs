@@ -110,12 +110,7 @@ fn add(list: &mut Fields, row: &SqliteRow, from: usize, count: usize) -> Result<
 }
 
 /// Chains the steps of `session` that have no block yet. Returns how many there were.
-pub async fn seal(
-    connection: &mut SqliteConnection,
-    session: &str,
-    wall: &str,
-    adopted: bool,
-) -> Result<i64, StoreError> {
+pub async fn seal(connection: &mut SqliteConnection, session: &str, wall: &str) -> Result<i64, StoreError> {
     let mut sealed_now = 0;
     for (segment, steps, sealed) in unsealed(connection, session).await? {
         let mut first = sealed + 1;
@@ -128,7 +123,6 @@ pub async fn seal(
                 kind: TELEMETRY,
                 key: &block.key(),
                 session,
-                adopted,
                 content: block.content(&hashes.open, &hashes.sealed),
                 sealed: hashes.sealed,
                 sealed_salt,

@@ -1,9 +1,9 @@
 //! The blinded part of an export. Its types have no field for a policy, the order, the seed, or a reason that may name
 //! them.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
 use super::ExportError;
@@ -15,22 +15,23 @@ use super::folder::Folder;
 use super::scores::Scored;
 use super::study::ExportedStudy;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
-use crate::store::remarks::said_columns;
+use crate::store::remarks::{said_columns, withdrawn};
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
-    Answer, Comment, DeviceEvent, Erasure, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
+    Answer, Comment, DeviceEvent, Erased, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
     StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
 };
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::grace::Grace;
-use parfocal_trial::instruments::sus;
+use parfocal_trial::instruments::sus_score;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
-use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::question::QuestionKind;
 use parfocal_trial::remark::WaitClock;
+use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::standing::Standing;
 
 /// The beginning of an export's description of itself.
@@ -58,6 +59,7 @@ pub struct Blinded {
     pub(super) corrections: Vec<StoredCorrection>,
     consents: Vec<StoredConsent>,
     erasures: Vec<StoredErasure>,
+    pub(super) erased: Erased,
     withdrawals: Vec<Withdrawal>,
     clocks: RunClocks,
     grace: Grace,
@@ -68,11 +70,11 @@ impl Blinded {
     /// The blinded part of `stored`.
     pub async fn of(reader: &Reader, stored: StoredSession) -> Result<Self, StoreError> {
         let session = stored.made.session;
-        let lines = reader.sessions(true).await?;
-        let line = lines.into_iter().find(|line| line.session == session);
+        let line = reader.session_line(session).await?;
         let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
 
         let clocks = reader.run_clocks().await?;
+        let erasures = reader.erasures(session).await?;
 
         // Nothing that reveals the policies gets past this point.
         let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
@@ -95,7 +97,8 @@ impl Blinded {
             answers: reader.answers(session).await?,
             corrections: reader.corrections(session).await?,
             consents: reader.consents(session).await?,
-            erasures: reader.erasures(session).await?,
+            erased: Erased::by(&erasures),
+            erasures,
             withdrawals: reader.withdrawals(session).await?,
             study: ExportedStudy::of(reader, session).await?,
         })
@@ -240,20 +243,21 @@ impl Blinded {
     }
 
     fn segment_rows(&self) -> Vec<SegmentRow> {
+        let inspections = inspections(self.events.iter().map(|(_, event)| (event, &event.kind)));
         let row = |(&segment, setting): (&SegmentId, usize)| {
-            let events = self.events.iter().map(|(_, event)| event);
-            let of_it = || events.clone().filter(move |event| event.kind.segment() == Some(segment));
-            let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
-            let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
+            let inspection = inspections.iter().find(|inspection| inspection.segment == segment);
+            let finished = inspection.and_then(Inspection::finished);
 
             SegmentRow {
                 session: self.session(),
                 setting,
                 segment,
-                started: started.map(|event| event.wall),
+                started: inspection.map(|inspection| inspection.began.wall),
                 finished: finished.map(|event| event.wall),
                 finished_by: finished.map(|event| event.by),
-                inspected_seconds: finished.and_then(|event| event.kind.inspected_ms()).map(seconds),
+                inspected_seconds: inspection
+                    .and_then(|inspection| inspection.inspected)
+                    .map(|time| time.as_secs_f64()),
             }
         };
 
@@ -261,6 +265,7 @@ impl Blinded {
     }
 
     fn comment_rows(&self) -> Vec<CommentRow> {
+        let withdrawn = withdrawn(&self.comments);
         let row = |((run, comment), number): (&(i64, Comment), usize)| {
             let (kind, text) = said_columns(&comment.said);
 
@@ -271,7 +276,7 @@ impl Blinded {
                 setting: self.setting(comment.segment),
                 segment: comment.segment,
                 kind,
-                text: text.map(str::to_owned),
+                text: text.map(Cow::into_owned),
                 frame: comment.frame,
                 frame_run: comment.frame_run,
                 wall: comment.stamp.wall,
@@ -283,7 +288,8 @@ impl Blinded {
                 device: comment.origin.device,
                 sequence: comment.origin.sequence,
                 late: comment.late,
-                erased: self.erased(Erasable::Comment, &comment.key.to_string()),
+                erased: self.erased.at(Erasable::Comment, &comment.key),
+                withdrawn: withdrawn.get(&comment.key).copied(),
             }
         };
 
@@ -295,11 +301,6 @@ impl Blinded {
         let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), usize)| {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
-            let sus_score = match (kind, &standing.value) {
-                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
-                _ => None,
-            };
-
             AnswerRow {
                 number,
                 key: answer.key,
@@ -313,7 +314,7 @@ impl Blinded {
                 counts: standing.counts,
                 value: serde_json::to_string(&standing.value).ok(),
                 given_value: serde_json::to_string(&answer.value).ok(),
-                sus_score,
+                sus_score: sus_score(kind, &standing.value),
                 wall: answer.stamp.wall,
                 run: *run,
                 monotonic_ns: nanoseconds(answer.stamp.at),
@@ -325,18 +326,11 @@ impl Blinded {
                 sequence: answer.origin.sequence,
                 late: answer.late,
                 disagrees: standing.disagrees,
-                erased: self.erased(Erasable::Answer, &answer.key.to_string()),
+                erased: self.erased.at(Erasable::Answer, &answer.key),
             }
         };
 
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
-    }
-
-    /// When the words of a record were erased; `None` if they were not.
-    pub(super) fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
-        let mut erasures = self.erasures.iter().map(|stored| &stored.erasure);
-        let its_own = |erasure: &&Erasure| erasure.subject == subject && erasure.record == record;
-        erasures.find(its_own).map(|erasure| erasure.stamp.wall)
     }
 
     fn score_rows(&self) -> Vec<ScoreRow> {
@@ -367,7 +361,7 @@ impl Blinded {
             wall: correction.stamp.wall,
             run: *run,
             monotonic_ns: nanoseconds(correction.stamp.at),
-            erased: self.erased(Erasable::Correction, &number.to_string()),
+            erased: self.erased.at(Erasable::Correction, &number),
         };
         self.corrections.iter().map(row).collect()
     }
@@ -418,6 +412,7 @@ impl Blinded {
         let row = |(run, event): &(i64, Event)| {
             let (reason, emergency) = match &event.kind {
                 EventKind::Paused { reason, .. }
+                | EventKind::ReasonGiven { reason, .. }
                 | EventKind::Aborted { reason, .. }
                 | EventKind::Withdrawn { reason } => (Some(reason), None),
                 EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),
@@ -493,8 +488,4 @@ fn device_rows(events: Vec<(i64, i64, DeviceEvent)>) -> Vec<DeviceRow> {
     };
 
     events.into_iter().map(row).collect()
-}
-
-fn seconds(milliseconds: u64) -> f64 {
-    std::time::Duration::from_millis(milliseconds).as_secs_f64()
 }

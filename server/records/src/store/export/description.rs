@@ -1,5 +1,5 @@
 //! The data dictionary: every table of an export, with a struct for its rows. A new column is a new field here, and the
-//! compiler shows where its value is still missing.
+//! compiler shows where its value is still missing. `open()` and `sealed()` say which columns the chain hashes, and how.
 
 use jiff::Timestamp;
 
@@ -15,30 +15,23 @@ const SEGMENT: Meaning = means("Segment's random id, never shared by two segment
 const WALL: Meaning = means("When it was recorded, by the server's wall clock").in_unit("UTC");
 const RUN: Meaning = means("Start of the server that recorded it; see runs");
 const MONOTONIC: Meaning = means("When it was recorded, by the monotonic clock; comparable within a run").in_unit("ns");
-const DEVICE: Meaning =
-    means("Random id of the surgeon's device, kept by its browser; empty where the page told none").since(2);
+const DEVICE: Meaning = means("Random id of the surgeon's device, kept by its browser; empty where the page told none");
 const SEQUENCE: Meaning =
-    means("Counts up with everything that was said on the device, in whatever tab; gaps mean nothing").since(2);
+    means("Counts up with everything that was said on the device, in whatever tab; gaps mean nothing");
 const WAITED_BY: Meaning = means(
     "Clock that measured waited_ms: page-clock, which nobody can set; or wall-clock, the device's, \
      which may have been set meanwhile, where the page was loaded anew or the device slept before \
      sending",
-)
-.since(2);
+);
 const CLIENT_MILLIS: Meaning =
     means("The browser's clock when it was said, milliseconds since 1970-01-01 UTC").in_unit("ms");
 const WAITED: Meaning =
     means("Time between saying and sending, on the surgeon's device: said at wall less this").in_unit("ms");
-const LATE: Meaning = means(
-    "Whether it arrived after counts_until of sessions.csv; always false of what was kept by a version \
-     without that time",
-)
-.since(2);
+const LATE: Meaning = means("Whether it arrived after counts_until of sessions.csv");
 const FRAME: Meaning = means("Frame's number within the run");
 const EXPOSED: Meaning = means("End of the exposure, by the monotonic clock").in_unit("ns");
-const ERASED: Meaning = means("When its words were erased, by the server's wall clock; by whom and why is in erasures")
-    .in_unit("UTC")
-    .since(5);
+const ERASED: Meaning =
+    means("When its words were erased, by the server's wall clock; by whom and why is in erasures").in_unit("UTC");
 const KEY: Meaning = means("Key by which the browser could send it again without it counting twice");
 
 table! {
@@ -51,17 +44,16 @@ table! {
     /// A start of the server.
     #[derive(Debug, Clone)]
     RunRow {
-        run: i64 = means("Start of the server, counting from 1"),
-        wall: Timestamp = means("The wall clock at the start").in_unit("UTC"),
-        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns"),
-        version: String = means("Version of parfocal"),
-        camera: String = means("The camera"),
-        lens: String = means("The lens"),
-        calibration: String = means("The sensor's calibration: name, unit, version and date"),
+        run: i64 = means("Start of the server, counting from 1").open(),
+        wall: Timestamp = means("The wall clock at the start").in_unit("UTC").open(),
+        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns").open(),
+        version: String = means("Version of parfocal").open(),
+        camera: String = means("The camera").open(),
+        lens: String = means("The lens").open(),
+        calibration: String = means("The sensor's calibration: name, unit, version and date").open(),
         blur: Option<f64> =
             means("How fast the optic blurs a unit of focal power, as the policies were told; else empty")
-                .in_unit("px")
-                .since(3),
+                .in_unit("px").open(),
     }
 }
 
@@ -73,29 +65,28 @@ table! {
     /// A session.
     #[derive(Debug, Clone)]
     SessionRow {
-        session: SessionId = SESSION,
-        participant: String = means("Participant's code"),
-        protocol: String = means("Protocol's name; its text is protocol.toml"),
-        protocol_sha256: String = means("SHA-256 of protocol.toml"),
-        practice: bool = means("Whether it is practice, never to be mixed with real data"),
-        algorithm: &'static str = means("Algorithm that drew the order from the seed"),
+        session: SessionId = SESSION.open(),
+        participant: String = means("Participant's code").open(),
+        protocol: String = means("Protocol's name; its text is protocol.toml").open(),
+        protocol_sha256: String = means("SHA-256 of protocol.toml").open(),
+        practice: bool = means("Whether it is practice, never to be mixed with real data").open(),
+        algorithm: &'static str = means("Algorithm that drew the order from the seed").open(),
         commitment: String =
-            means("SHA-256 published when the session was made; commits to seed and order"),
-        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC"),
-        run: i64 = means("Start of the server that made it; see runs"),
+            means("SHA-256 published when the session was made; commits to seed and order").open(),
+        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC").open(),
+        run: i64 = means("Start of the server that made it; see runs").open(),
         status: SessionStatus = means("under-way, completed or aborted"),
         settings: i64 = means("Settings in all"),
         finished_settings: i64 = means("Settings inspected to the end"),
         comments: i64 = means("Comments kept"),
-        monotonic_ns: i64 = MONOTONIC.since(4),
+        monotonic_ns: i64 = MONOTONIC.open(),
         unblinded: &'static str =
             means("no; after-end; emergency-after-end; or while-under-way, which is emergency unblinding, too"),
         counts_until: Option<Timestamp> = means(
             "Deadline for what counts: the session's end plus the protocol's grace_minutes, or unblinding \
              if that came first; empty while the session is under way",
         )
-        .in_unit("UTC")
-        .since(2),
+        .in_unit("UTC"),
     }
 }
 
@@ -133,26 +124,31 @@ table! {
     #[derive(Debug, Clone)]
     CommentRow {
         number: usize = means("Order of the comment in the session, from 1"),
-        key: IdempotencyKey = KEY,
-        session: SessionId = SESSION,
+        key: IdempotencyKey = KEY.open(),
+        session: SessionId = SESSION.open(),
         setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT,
+        segment: Option<SegmentId> = SEGMENT.open(),
         kind: &'static str = means(
-            "text (typed), quick (one tap), mark (\"mark this moment\") or voice (said aloud; see voice)",
-        ),
-        text: Option<String> = means("What was said, as it was said; empty for a mark and for voice"),
-        frame: Option<u64> = means("Number of the frame on the surgeon's screen"),
-        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        client_millis: Option<i64> = CLIENT_MILLIS,
-        waited_ms: Option<i64> = WAITED,
-        waited_by: Option<&'static str> = WAITED_BY,
-        device: Option<DeviceId> = DEVICE,
-        sequence: Option<i64> = SEQUENCE,
-        late: bool = LATE,
+            "text (typed), quick (one tap), mark (\"mark this moment\"), voice (said aloud; see voice) or withdrawal \
+                (takes another comment back)",
+        ).open(),
+        text: Option<String> = means(
+            "What was said, as it was said; empty for a mark and for voice; of a withdrawal the key of the other comment",
+        ).sealed(),
+        frame: Option<u64> = means("Number of the frame on the surgeon's screen").open(),
+        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        client_millis: Option<i64> = CLIENT_MILLIS.open(),
+        waited_ms: Option<i64> = WAITED.open(),
+        waited_by: Option<&'static str> = WAITED_BY.open(),
+        device: Option<DeviceId> = DEVICE.open(),
+        sequence: Option<i64> = SEQUENCE.open(),
+        late: bool = LATE.open(),
         erased: Option<Timestamp> = ERASED,
+        withdrawn: Option<Timestamp> =
+            means("When the surgeon took it back, by the server's wall clock; empty if not").in_unit("UTC"),
     }
 }
 
@@ -165,11 +161,11 @@ table! {
     #[derive(Debug, Clone)]
     AnswerRow {
         number: usize = means("Order of the answer in the session, from 1"),
-        key: IdempotencyKey = KEY,
-        session: SessionId = SESSION,
+        key: IdempotencyKey = KEY.open(),
+        session: SessionId = SESSION.open(),
         setting: Option<usize> = means("Setting asked about, from 1; empty for a closing question"),
-        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
-        question: String = means("Question's id in the protocol"),
+        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question").open(),
+        question: String = means("Question's id in the protocol").open(),
         question_text: Option<String> = means("The question as the surgeon read it"),
         kind: Option<&'static str> = means(
             "text, likert, visual-analogue, ranking, sus, nasa-tlx, surg-tlx or recognition",
@@ -188,29 +184,26 @@ table! {
         ),
         given_value: Option<String> = means(
             "JSON: what was given this time, before items of a questionnaire given earlier were joined to it",
-        )
-        .since(4),
+        ).sealed(),
         sus_score: Option<f64> = means("System Usability Scale score, 0..100").in_unit("points"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
         given: Timestamp = means(
             "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one \
              device are ordered by sequence all the same",
         )
-        .in_unit("UTC")
-        .since(2),
-        client_millis: Option<i64> = CLIENT_MILLIS.since(2),
-        waited_ms: Option<i64> = WAITED.since(2),
-        waited_by: Option<&'static str> = WAITED_BY,
-        device: Option<DeviceId> = DEVICE,
-        sequence: Option<i64> = SEQUENCE,
-        late: bool = LATE,
+        .in_unit("UTC"),
+        client_millis: Option<i64> = CLIENT_MILLIS.open(),
+        waited_ms: Option<i64> = WAITED.open(),
+        waited_by: Option<&'static str> = WAITED_BY.open(),
+        device: Option<DeviceId> = DEVICE.open(),
+        sequence: Option<i64> = SEQUENCE.open(),
+        late: bool = LATE.open(),
         disagrees: bool = means(
             "Whether it is its device's last answer to the question, and another device's last answer \
              differs",
-        )
-        .since(2),
+        ),
         erased: Option<Timestamp> = ERASED,
     }
 }
@@ -225,23 +218,22 @@ table! {
     /// An item or a score of an answer.
     #[derive(Debug, Clone)]
     ScoreRow {
-        session: SessionId = SESSION.since(5),
+        session: SessionId = SESSION,
         setting: Option<usize> =
-            means("Setting asked about, from 1; empty for a closing question").since(5),
-        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question").since(5),
-        question: String = means("Question's id in the protocol").since(5),
-        kind: &'static str = means("Kind of the question, as in answers").since(5),
+            means("Setting asked about, from 1; empty for a closing question"),
+        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
+        question: String = means("Question's id in the protocol"),
+        kind: &'static str = means("Kind of the question, as in answers"),
         measure: String = means(
             "Name of the item or score: item-1..10 and sus-score; the names of the scales, 0..100, raw-tlx \
              (nasa-tlx), raw-surg-tlx, weight-of-..., 0..5, and weighted-surg-tlx (surg-tlx); point (likert); \
              position (visual-analogue); rank-of-setting-N, 1 for the best, ties sharing their ranks (ranking); \
              recognised (recognition)",
-        )
-        .since(5),
-        label: String = means("The same for reading").since(5),
-        value: Option<f64> = means("The number; empty where it is missing").since(5),
-        computed: bool = means("Whether it is computed from other items").since(5),
-        corrected: bool = means("Whether the answer was corrected; see corrections").since(5),
+        ),
+        label: String = means("The same for reading"),
+        value: Option<f64> = means("The number; empty where it is missing"),
+        computed: bool = means("Whether it is computed from other items"),
+        corrected: bool = means("Whether the answer was corrected; see corrections"),
     }
 }
 
@@ -255,21 +247,20 @@ table! {
     /// A correction.
     #[derive(Debug, Clone)]
     CorrectionRow {
-        number: i64 = means("Order of the record in the database").since(5),
-        session: SessionId = SESSION.since(5),
-        subject: &'static str = means("What was corrected: session, answer or comment").since(5),
-        record: String = means("The key of the answer or comment, or the session's id").since(5),
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        subject: &'static str = means("What was corrected: session, answer or comment").open(),
+        record: String = means("The key of the answer or comment, or the session's id").open(),
         field: &'static str = means(
             "What of it: participant, value (of an answer, JSON), or note (beside an answer or a comment)",
-        )
-        .since(5),
-        old_value: String = means("What stood there so far").since(5),
-        new_value: String = means("What is right").since(5),
-        reason: String = means("Why, as the researcher said").since(5),
-        role: Role = means("Who did it: researcher").since(5),
-        wall: Timestamp = WALL.since(5),
-        run: i64 = RUN.since(5),
-        monotonic_ns: i64 = MONOTONIC.since(5),
+        ).open(),
+        old_value: String = means("What stood there so far").sealed(),
+        new_value: String = means("What is right").sealed(),
+        reason: String = means("Why, as the researcher said").sealed(),
+        role: Role = means("Who did it: researcher").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
         erased: Option<Timestamp> = ERASED,
     }
 }
@@ -282,16 +273,16 @@ table! {
     /// A consent.
     #[derive(Debug, Clone)]
     ConsentRow {
-        number: i64 = means("Order of the record in the database").since(5),
-        session: SessionId = SESSION.since(5),
-        text_version: String = means("Version of the text").since(5),
-        given_on: String = means("The day on which it was given, YYYY-MM-DD").since(5),
-        obtained_by: String = means("Who obtained it: initials or a code").since(5),
-        medium: &'static str = means("paper or screen").since(5),
-        role: Role = means("Who recorded it: operator").since(5),
-        wall: Timestamp = WALL.since(5),
-        run: i64 = RUN.since(5),
-        monotonic_ns: i64 = MONOTONIC.since(5),
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        text_version: String = means("Version of the text").open(),
+        given_on: String = means("The day on which it was given, YYYY-MM-DD").open(),
+        obtained_by: String = means("Who obtained it: initials or a code").sealed(),
+        medium: &'static str = means("paper or screen").open(),
+        role: Role = means("Who recorded it: operator").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 
@@ -303,15 +294,15 @@ table! {
     /// An erasure.
     #[derive(Debug, Clone)]
     ErasureRow {
-        number: i64 = means("Order of the record in the database").since(5),
-        session: SessionId = SESSION.since(5),
-        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event").since(5),
-        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER").since(5),
-        reason: String = means("Why, as the researcher said").since(5),
-        role: Role = means("Who did it: researcher").since(5),
-        wall: Timestamp = WALL.since(5),
-        run: i64 = RUN.since(5),
-        monotonic_ns: i64 = MONOTONIC.since(5),
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event").open(),
+        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER").open(),
+        reason: String = means("Why, as the researcher said").sealed(),
+        role: Role = means("Who did it: researcher").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 
@@ -324,14 +315,13 @@ table! {
     /// A withdrawn session.
     #[derive(Debug, Clone)]
     WithdrawalRow {
-        session: SessionId = SESSION.since(5),
-        protocol: String = means("Protocol's name").since(5),
+        session: SessionId = SESSION,
+        protocol: String = means("Protocol's name"),
         place: i64 = means(
             "Place among the sessions of the protocol, in the order in which they were made, from 1",
-        )
-        .since(5),
-        wall: Timestamp = means("When it was withdrawn, by the server's wall clock").in_unit("UTC").since(5),
-        role: String = means("Who recorded that: operator or researcher").since(5),
+        ),
+        wall: Timestamp = means("When it was withdrawn, by the server's wall clock").in_unit("UTC"),
+        role: String = means("Who recorded that: operator or researcher"),
     }
 }
 
@@ -343,24 +333,25 @@ table! {
     /// An event.
     #[derive(Debug, Clone)]
     EventRow {
-        session: SessionId = SESSION,
-        number: u32 = means("Order of the event in the session, from 1"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
+        session: SessionId = SESSION.open(),
+        number: u32 = means("Order of the event in the session, from 1").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)").open(),
         kind: &'static str = means(
-            "created, started, segment-started, segment-finished, questions-finished, paused, resumed, \
-             server-restarted, completed, aborted, withdrawn or unblinded",
-        ),
+            "created, started, segment-started, segment-finished, questions-finished, paused, reason-given, \
+             focused-by-hand, tablet-away, tablet-back, pictures-seen, resumed, server-restarted, completed, aborted, \
+             withdrawn or unblinded",
+        ).open(),
         setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT,
+        segment: Option<SegmentId> = SEGMENT.open(),
         inspected_ms: Option<u64> =
-            means("Time inspected in the segment by then, without pauses").in_unit("ms"),
+            means("Time inspected in the segment by then, without pauses").in_unit("ms").open(),
         reason: Option<String> = means(
             "Reason given; that of an unblinding is only in allocation.json, as it may name a policy",
-        ),
-        emergency: Option<bool> = means("For an unblinding: whether the session was still under way"),
+        ).sealed(),
+        emergency: Option<bool> = means("For an unblinding: whether the session was still under way").open(),
     }
 }
 
@@ -376,13 +367,13 @@ table! {
     /// A change in the state of camera or lens.
     #[derive(Debug, Clone)]
     DeviceRow {
-        number: i64 = means("Order of the record in the database"),
-        wall: Timestamp = WALL,
-        run: i64 = RUN,
-        monotonic_ns: i64 = MONOTONIC,
-        device: String = means("camera or lens"),
-        working: bool = means("Whether it worked from then on"),
-        message: String = means("What it said of itself, or what was changed"),
+        number: i64 = means("Order of the record in the database").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
+        device: String = means("camera or lens").open(),
+        working: bool = means("Whether it worked from then on").open(),
+        message: String = means("What it said of itself, or what was changed").open(),
     }
 }
 
@@ -395,27 +386,26 @@ table! {
     /// A recording of the session.
     #[derive(Debug, Clone)]
     RecordingRow {
-        session: SessionId = SESSION.since(5),
-        name: String = means("Name of the recording").since(5),
-        path: String = means("Its folder, relative to the data folder").since(5),
+        session: SessionId = SESSION,
+        name: String = means("Name of the recording"),
+        path: String = means("Its folder, relative to the data folder"),
         kind: Option<&'static str> =
-            means("mosaic (raw mosaics in Zarr v3) or view (JPEG pictures); empty where it cannot be read").since(5),
-        run: Option<i64> = means("Start of the server that recorded it; see runs").since(5),
+            means("mosaic (raw mosaics in Zarr v3) or view (JPEG pictures); empty where it cannot be read"),
+        run: Option<i64> = means("Start of the server that recorded it; see runs"),
         started: Option<Timestamp> =
-            means("When it began, by the server's wall clock; its frames count from then").in_unit("UTC").since(5),
+            means("When it began, by the server's wall clock; its frames count from then").in_unit("UTC"),
         monotonic_ns: Option<i64> =
-            means("The same by the monotonic clock; comparable within a run").in_unit("ns").since(5),
-        first_ns: Option<i64> = means("End of the first frame's exposure, since it began").in_unit("ns").since(5),
-        last_ns: Option<i64> = means("End of the last frame's exposure, since it began").in_unit("ns").since(5),
-        frames: Option<usize> = means("Frames that it holds").since(5),
+            means("The same by the monotonic clock; comparable within a run").in_unit("ns"),
+        first_ns: Option<i64> = means("End of the first frame's exposure, since it began").in_unit("ns"),
+        last_ns: Option<i64> = means("End of the last frame's exposure, since it began").in_unit("ns"),
+        frames: Option<usize> = means("Frames that it holds"),
         lost: Option<u64> = means(
             "Frames that the recorder was too slow for; empty of a view, which has the frames that viewers could get",
-        )
-        .since(5),
+        ),
         ended: Option<String> =
-            means("How it ended: stopped, or why it stopped by itself; empty if it was cut short or goes on").since(5),
-        description_sha256: Option<String> = means("SHA-256 of its zarr.json or view.json").since(5),
-        problem: Option<String> = means("Why it cannot be read, where it cannot").since(5),
+            means("How it ended: stopped, or why it stopped by itself; empty if it was cut short or goes on"),
+        description_sha256: Option<String> = means("SHA-256 of its zarr.json or view.json"),
+        problem: Option<String> = means("Why it cannot be read, where it cannot"),
     }
 }
 
@@ -427,15 +417,15 @@ table! {
     /// A look at the evidence.
     #[derive(Debug, Clone)]
     AccessRow {
-        number: i64 = means("Order of the record in the database").since(4),
-        wall: Timestamp = WALL.since(4),
+        number: i64 = means("Order of the record in the database").open(),
+        wall: Timestamp = WALL.open(),
         run: Option<i64> =
-            means("Start of the server that recorded it; empty for the command line").since(4),
-        monotonic_ns: Option<i64> = MONOTONIC.since(4),
-        role: String = means("Who: researcher, or command-line").since(4),
-        kind: String = means("path-viewed, recording-viewed or exported").since(4),
-        session: SessionId = SESSION.since(4),
-        detail: Option<String> = means("Of an export: blinded or unblinded").since(4),
+            means("Start of the server that recorded it; empty for the command line").open(),
+        monotonic_ns: Option<i64> = MONOTONIC.open(),
+        role: String = means("Who: researcher, or command-line").open(),
+        kind: String = means("path-viewed, recording-viewed or exported").open(),
+        session: SessionId = SESSION.open(),
+        detail: Option<String> = means("Of an export: blinded or unblinded").open(),
     }
 }
 
@@ -447,14 +437,14 @@ table! {
     /// A study.
     #[derive(Debug, Clone)]
     StudyRow {
-        study: String = means("The study's name: the same at every site").since(5),
-        title: String = means("Its title").since(5),
-        definition_sha256: String = means("SHA-256 of study.toml: the same at every site").since(5),
-        sites: String = means("JSON: the names of its sites that this database runs").since(5),
-        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC").since(5),
-        stage: &'static str = means("planned, open, closed, locked or unblinded").since(5),
+        study: String = means("The study's name: the same at every site").open(),
+        title: String = means("Its title"),
+        definition_sha256: String = means("SHA-256 of study.toml: the same at every site").open(),
+        sites: String = means("JSON: the names of its sites that this database runs").open(),
+        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC").open(),
+        stage: &'static str = means("planned, open, closed, locked or unblinded"),
         commitment: Option<String> =
-            means("SHA-256 published when it was first opened; commits to the orders of all its places here").since(5),
+            means("SHA-256 published when it was first opened; commits to the orders of all its places here"),
     }
 }
 
@@ -466,11 +456,11 @@ table! {
     /// The place of a session in a study.
     #[derive(Debug, Clone)]
     StudySessionRow {
-        session: SessionId = SESSION.since(5),
-        study: String = means("The study's name").since(5),
-        site: String = means("The site's name").since(5),
-        protocol: String = means("The protocol's name").since(5),
-        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order").since(5),
+        session: SessionId = SESSION.open(),
+        study: String = means("The study's name").open(),
+        site: String = means("The site's name").open(),
+        protocol: String = means("The protocol's name").open(),
+        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order").open(),
     }
 }
 
@@ -484,21 +474,20 @@ table! {
     /// An event of a study.
     #[derive(Debug, Clone)]
     StudyEventRow {
-        study: String = means("The study's name").since(5),
-        number: i64 = means("Order of the event in the study, from 1").since(5),
-        wall: Timestamp = WALL.since(5),
-        run: Option<i64> = means("Start of the server that recorded it; empty for the command line").since(5),
-        monotonic_ns: Option<i64> = MONOTONIC.since(5),
-        role: String = means("How it was recorded: researcher (on the page), or command-line").since(5),
-        person: String = means("Who, as the person said").since(5),
+        study: String = means("The study's name").open(),
+        number: i64 = means("Order of the event in the study, from 1").open(),
+        wall: Timestamp = WALL.open(),
+        run: Option<i64> = means("Start of the server that recorded it; empty for the command line").open(),
+        monotonic_ns: Option<i64> = MONOTONIC.open(),
+        role: String = means("How it was recorded: researcher (on the page), or command-line").open(),
+        person: String = means("Who, as the person said").open(),
         kind: String = means(
             "planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded, which is \
              emergency unblinding of one session",
-        )
-        .since(5),
-        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study").since(5),
-        commitment: Option<String> = means("Of the first opening: commits to all orders").since(5),
-        reason: String = means("Reason given").since(5),
+        ).open(),
+        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study").open(),
+        commitment: Option<String> = means("Of the first opening: commits to all orders").open(),
+        reason: String = means("Reason given").sealed(),
     }
 }
 
@@ -511,12 +500,12 @@ table! {
     /// The account behind a record.
     #[derive(Debug, Clone, sqlx::FromRow)]
     ActorRow {
-        number: i64 = means("Order of the row in the database").since(6),
-        kind: String = means("Kind of the record, as in chain.csv").since(6),
-        record: String = means("Key of the record, as in chain.csv").since(6),
-        session: String = means("Session id").since(6),
-        account: String = means("The account's name").since(6),
-        display: String = means("The person's name then").since(6),
+        number: i64 = means("Order of the row in the database").open(),
+        kind: String = means("Kind of the record, as in chain.csv").open(),
+        record: String = means("Key of the record, as in chain.csv").open(),
+        session: String = means("Session id").open(),
+        account: String = means("The account's name").open(),
+        display: String = means("The person's name then").open(),
     }
 }
 
@@ -528,29 +517,27 @@ table! {
     /// The recording of a voice comment.
     #[derive(Debug, Clone)]
     VoiceRow {
-        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").since(7),
-        session: SessionId = SESSION.since(7),
-        setting: Option<usize> = SETTING.since(7),
+        comment: IdempotencyKey = means("Key of the comment, as in comments.csv"),
+        session: SessionId = SESSION,
+        setting: Option<usize> = SETTING,
         file: Option<String> =
-            means("The file; empty where nothing of the recording arrived, or its sound was erased").since(7),
-        media_type: Option<&'static str> = means("What the file is, as the browser recorded it").since(7),
-        seconds: f64 = means("How long the recording is, as the page told").in_unit("s").since(7),
-        pieces: usize = means("Pieces that arrived; see voice_pieces").since(7),
-        missing: usize = means("Pieces that did not arrive, though later ones did").since(7),
-        bytes: i64 = means("Length of the pieces that arrived").since(7),
-        sha256: Option<String> = means("SHA-256 of the file").since(7),
+            means("The file; empty where nothing of the recording arrived, or its sound was erased"),
+        media_type: Option<&'static str> = means("What the file is, as the browser recorded it"),
+        seconds: f64 = means("How long the recording is, as the page told").in_unit("s"),
+        pieces: usize = means("Pieces that arrived; see voice_pieces"),
+        missing: usize = means("Pieces that did not arrive, though later ones did"),
+        bytes: i64 = means("Length of the pieces that arrived"),
+        sha256: Option<String> = means("SHA-256 of the file"),
         ended: Option<&'static str> = means(
             "Why it ended: released (the surgeon let go), limit (after two minutes), microphone-lost or left (the \
              page went out of sight); empty where it was cut off",
-        )
-        .since(7),
-        complete: bool = means("Whether it has its end and all its pieces").since(7),
+        ),
+        complete: bool = means("Whether it has its end and all its pieces"),
         transcript: Option<String> =
-            means("What was said, typed out by a researcher; by whom and when is in corrections").since(7),
+            means("What was said, typed out by a researcher; by whom and when is in corrections"),
         erased: Option<Timestamp> =
             means("When its sound was erased, by the server's wall clock; by whom and why is in erasures")
-                .in_unit("UTC")
-                .since(7),
+                .in_unit("UTC"),
     }
 }
 
@@ -562,18 +549,18 @@ table! {
     /// A piece of a recording.
     #[derive(Debug, Clone)]
     VoicePieceRow {
-        number: i64 = means("Order of the record in the database").since(7),
-        session: SessionId = SESSION.since(7),
-        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").since(7),
-        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another").since(7),
-        media_type: &'static str = means("What it is, as the browser recorded it").since(7),
-        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms").since(7),
-        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice").since(7),
-        bytes: i64 = means("Its length").since(7),
-        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased").since(7),
-        wall: Timestamp = WALL.since(7),
-        run: i64 = RUN.since(7),
-        monotonic_ns: i64 = MONOTONIC.since(7),
+        number: i64 = means("Order of the record in the database").open(),
+        session: SessionId = SESSION.open(),
+        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").open(),
+        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another").open(),
+        media_type: &'static str = means("What it is, as the browser recorded it").open(),
+        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms").open(),
+        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice").open(),
+        bytes: i64 = means("Its length").open(),
+        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased").open(),
+        wall: Timestamp = WALL.open(),
+        run: i64 = RUN.open(),
+        monotonic_ns: i64 = MONOTONIC.open(),
     }
 }
 
@@ -587,26 +574,24 @@ table! {
     /// A row of the chain.
     #[derive(Debug, Clone, Default)]
     ChainRow {
-        number: i64 = means("Order of the row, from 1, without gaps").since(4),
-        entry: String = means("SHA-256 of the columns from wall to content").since(4),
-        hash: String = means("SHA-256 of number, the hash of the row before, and entry").since(4),
-        wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC").since(4),
+        number: i64 = means("Order of the row, from 1, without gaps"),
+        entry: String = means("SHA-256 of the columns from wall to content"),
+        hash: String = means("SHA-256 of number, the hash of the row before, and entry"),
+        wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC"),
         kind: Option<String> =
             means(
             "Kind of the record: run, participant, session, event, comment, answer, device, access, \
              correction, consent, erasure, telemetry, study, study-event, study-session, account-event, \
              actor or voice-piece",
-        )
-        .since(4),
-        key: Option<String> = means("The record's key").since(4),
-        session: Option<String> = means("The record's session; empty for runs and devices").since(4),
-        place: Option<i64> = means("Order of the row among those of the session, from 1").since(4),
-        adopted: Option<bool> = means("Whether it was recorded before there was a chain").since(4),
-        salt: Option<String> = means("Random; keeps entry from being guessed").since(4),
-        sealed: Option<String> = means("SHA-256 of the record's sealed columns, with sealed_salt").since(4),
+        ),
+        key: Option<String> = means("The record's key"),
+        session: Option<String> = means("The record's session; empty for runs and devices"),
+        place: Option<i64> = means("Order of the row among those of the session, from 1"),
+        salt: Option<String> = means("Random; keeps entry from being guessed"),
+        sealed: Option<String> = means("SHA-256 of the record's sealed columns, with sealed_salt"),
         sealed_salt: Option<String> =
-            means("Random; empty where the sealed columns are withheld; see chain_salts.csv").since(4),
-        content: Option<String> = means("SHA-256 of the record").since(4),
+            means("Random; empty where the sealed columns are withheld; see chain_salts.csv"),
+        content: Option<String> = means("SHA-256 of the record"),
     }
 }
 
@@ -618,8 +603,8 @@ table! {
     /// The salt of a row's sealed columns.
     #[derive(Debug, Clone, sqlx::FromRow)]
     ChainSaltRow {
-        number: i64 = means("The row of chain.csv").since(4),
-        salt: String = means("Random").since(4),
+        number: i64 = means("The row of chain.csv"),
+        salt: String = means("Random"),
     }
 }
 

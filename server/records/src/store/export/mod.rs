@@ -2,14 +2,14 @@
 //! blinded, unless the policies are asked for after unblinding. The blinded files are the same in both kinds.
 
 mod blinded;
-mod description;
+pub(in crate::store) mod description;
 mod destination;
 mod error;
 mod folder;
 mod recordings;
 mod scores;
 mod study;
-mod table;
+pub(in crate::store) mod table;
 mod unblinded;
 pub mod verify;
 mod voice;
@@ -26,14 +26,14 @@ pub use self::destination::ZipStream;
 pub use self::error::ExportError;
 pub use self::folder::Folder;
 pub use self::table::{Cell, Meaning, Row, means, table};
-pub use self::table::{Column, FORMAT, TEXTS_IN_CSV, Table, Type};
+pub use self::table::{Column, FORMAT, Proof, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
 use self::description::RecordingRow;
 pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
 pub use self::verify::ExportFiles;
-use super::{Access, Head, Reader, Recorder, StoreError};
+use super::{Access, Head, Reader, Recorder, StoreError, StoredSession};
 use parfocal_base::ids::SessionId;
 
 /// How often an export is recorded at most, if something else is recorded at the same moment each time.
@@ -75,7 +75,7 @@ impl Export {
     /// If there is no such session, its participant withdrew, or the policies are asked for before unblinding.
     pub async fn prepare(recorder: &Recorder, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
-        read(recorder.reader(), session, unblinded).await?;
+        may_export(recorder.reader(), session, unblinded).await?;
         // Read only once, because a long recording takes a while to open.
         let recordings = recordings::rows(recorder.folder(), session).await;
 
@@ -106,7 +106,8 @@ impl Export {
         session: SessionId,
         unblinded: bool,
     ) -> Result<Option<Self>, ExportError> {
-        let (blinded, telling) = read(snapshot, session, unblinded).await?;
+        let (stored, telling) = may_export(snapshot, session, unblinded).await?;
+        let blinded = Blinded::of(snapshot, stored).await?;
         if snapshot.head().await? != head || !blinded.under_way() && snapshot.has_unsealed(session).await? {
             return Ok(None);
         }
@@ -155,11 +156,12 @@ impl Export {
     }
 }
 
-async fn read(
+/// The session and, if `unblinded`, what unblinding adds, or the reason why it may not be exported.
+async fn may_export(
     reader: &Reader,
     session: SessionId,
     unblinded: bool,
-) -> Result<(Blinded, Option<Unblinded>), ExportError> {
+) -> Result<(StoredSession, Option<Unblinded>), ExportError> {
     let Some(stored) = reader.session(session).await? else {
         return Err(ExportError::NoSession { session, known: known_sessions(reader).await? });
     };
@@ -175,7 +177,7 @@ async fn read(
         None => None,
     };
 
-    Ok((Blinded::of(reader, stored).await?, telling))
+    Ok((stored, telling))
 }
 
 /// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or

@@ -36,14 +36,23 @@ pub struct Column {
     pub unit: &'static str,
     /// What it means.
     pub description: &'static str,
-    /// The first format of exports that has it.
-    pub since: u64,
+    /// Whether and how the chain hashes it.
+    pub proof: Proof,
 }
 
-/// The format of exports that this version writes. Each format added something. 7: voice comments. 6: personal
-/// accounts. 5: recordings, studies, corrections, scores, consents, withdrawals and erasures. 4: the chain. 3: what the
-/// policies knew about the optic. 2: what was said late, and on which device. 1: did not yet state its format.
-pub const FORMAT: u64 = 7;
+/// Whether and how the chain hashes a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Proof {
+    /// Not at all: it follows from other columns or from other records.
+    None,
+    /// Openly: no export withholds it.
+    Open,
+    /// With a salt: it can be withheld or erased.
+    Sealed,
+}
+
+/// The format of exports that this version writes. A change of the tables or their columns gives it another number.
+pub const FORMAT: u64 = 1;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]
@@ -164,13 +173,13 @@ impl<T: Cell> Cell for Option<T> {
 pub struct Meaning {
     unit: &'static str,
     description: &'static str,
-    since: u64,
+    proof: Proof,
 }
 
-/// A column that means `description`, has no unit, and has been there since the first format.
+/// A column that means `description`, has no unit, and is not hashed.
 #[must_use]
 pub const fn means(description: &'static str) -> Meaning {
-    Meaning { unit: "", description, since: 1 }
+    Meaning { unit: "", description, proof: Proof::None }
 }
 
 impl Meaning {
@@ -180,16 +189,22 @@ impl Meaning {
         Self { unit, ..self }
     }
 
-    /// The same in a column that exports have since `format`.
+    /// The same in a column that the chain hashes openly.
     #[must_use]
-    pub const fn since(self, format: u64) -> Self {
-        Self { since: format, ..self }
+    pub const fn open(self) -> Self {
+        Self { proof: Proof::Open, ..self }
+    }
+
+    /// The same in a column that the chain hashes with a salt.
+    #[must_use]
+    pub const fn sealed(self) -> Self {
+        Self { proof: Proof::Sealed, ..self }
     }
 
     /// The column called `name`.
     #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
-        Column { name, kind, unit: self.unit, description: self.description, since: self.since }
+        Column { name, kind, unit: self.unit, description: self.description, proof: self.proof }
     }
 }
 
@@ -292,17 +307,6 @@ impl Table {
         self.columns.iter().map(|column| column.name)
     }
 
-    /// The first format of exports that has it.
-    #[must_use]
-    pub fn since(&self) -> u64 {
-        self.columns.iter().map(|column| column.since).min().unwrap_or(1)
-    }
-
-    /// The columns that it had in exports of format `format`.
-    pub fn columns_of(&self, format: u64) -> impl Iterator<Item = &'static Column> {
-        self.columns.iter().filter(move |column| column.since <= format)
-    }
-
     /// Its Frictionless schema.
     pub fn schema(&self) -> Value {
         let fields: Vec<Value> = self.columns.iter().map(Column::field).collect();
@@ -348,11 +352,10 @@ impl Column {
         }
     }
 
-    /// Whether `csv`, in this column of a CSV file, stands for `cell`. Earlier versions wrote texts without an
-    /// apostrophe.
+    /// Whether `csv`, in this column of a CSV file, stands for `cell`.
     #[must_use]
     pub fn tells(&self, csv: &str, cell: &Value) -> bool {
-        csv == self.csv(cell) || csv == plain(cell)
+        csv == self.csv(cell)
     }
 }
 
@@ -382,7 +385,7 @@ mod tests {
     use super::*;
 
     fn column(kind: Type) -> Column {
-        Column { name: "text", kind, unit: "", description: "", since: 1 }
+        Column { name: "text", kind, unit: "", description: "", proof: Proof::None }
     }
 
     #[test]
@@ -406,7 +409,7 @@ mod tests {
         #[derive(Debug)]
         MarkRow {
             number: u32 = means("Order"),
-            at: Option<Timestamp> = means("When").in_unit("UTC").since(2),
+            at: Option<Timestamp> = means("When").in_unit("UTC"),
             text: Option<String> = means("What"),
         }
     }
@@ -416,19 +419,17 @@ mod tests {
         let columns: Vec<_> = MarkRow::TABLE
             .columns
             .iter()
-            .map(|column| (column.name, column.kind, column.unit, column.description, column.since))
+            .map(|column| (column.name, column.kind, column.unit, column.description))
             .collect();
 
         let expected = [
-            ("number", Type::Integer, "", "Order", 1),
-            ("at", Type::Datetime, "UTC", "When", 2),
-            ("text", Type::String, "", "What", 1),
+            ("number", Type::Integer, "", "Order"),
+            ("at", Type::Datetime, "UTC", "When"),
+            ("text", Type::String, "", "What"),
         ];
 
         assert_eq!(columns, expected);
         assert_eq!(MarkRow::TABLE.key, ["number", "at"]);
-        let first: Vec<_> = MarkRow::TABLE.columns_of(1).map(|column| column.name).collect();
-        assert_eq!(first, ["number", "text"]);
 
         let row = MarkRow { number: 3, at: Some(Timestamp::UNIX_EPOCH), text: None };
         assert_eq!(row.cells(), [json!(3), json!("1970-01-01T00:00:00Z"), Value::Null]);
@@ -486,9 +487,9 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_earlier_versions_are_known() {
+    fn a_cell_stands_for_its_text_as_it_is_written() {
         let text = column(Type::String);
-        assert!(text.tells("'=1+1", &json!("=1+1")) && text.tells("=1+1", &json!("=1+1")));
+        assert!(text.tells("'=1+1", &json!("=1+1")) && !text.tells("=1+1", &json!("=1+1")));
         assert!(!text.tells("'1+1", &json!("1+1")) && !text.tells("'=1+1", &json!("'=1+1 ")));
     }
 }

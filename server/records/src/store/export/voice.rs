@@ -63,7 +63,7 @@ impl Blinded {
             ended: ended.map(Ending::name),
             complete: ended.is_some() && recorded.missing() == 0,
             transcript: None,
-            erased: self.erased(Erasable::Comment, &comment.key.to_string()),
+            erased: self.erased.at(Erasable::Comment, &comment.key),
         }
     }
 

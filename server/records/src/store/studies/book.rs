@@ -2,38 +2,29 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
-
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
 use super::writing::{change_study, insert_study};
 use super::{NewStudy, StudyChange};
 use crate::store::lock::FolderLock;
 use crate::store::schema::DATABASE;
-use crate::store::values::drop_if_failed;
+use crate::store::writer::Writer;
 use crate::store::{Reader, Store, StoreError};
 use parfocal_trial::study::definition::StudyName;
 
 /// Writes studies. Clone freely.
 #[derive(Clone)]
 pub struct StudyBook {
-    way: Backend,
+    writer: Writer,
     reader: Reader,
-}
-
-#[derive(Clone)]
-enum Backend {
-    /// Within the server.
-    Server(Store),
-    /// From the command line. The lock keeps servers out, so that no server decides on data that is being changed.
-    CommandLine { pool: SqlitePool, _lock: Arc<FolderLock> },
+    /// Keeps servers out while a command writes, so that no server decides on data that is being changed.
+    _lock: Option<Arc<FolderLock>>,
 }
 
 impl StudyBook {
     /// The book of the server.
     #[must_use]
     pub fn of_server(store: &Store) -> Self {
-        Self { way: Backend::Server(store.clone()), reader: store.reader().clone() }
+        Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), _lock: None }
     }
 
     /// Opens the book of data folder `folder` for a command.
@@ -48,22 +39,13 @@ impl StudyBook {
 
         let lock = Arc::new(FolderLock::of(folder)?);
         let reader = Reader::open(folder).await?;
-        let options = SqliteConnectOptions::new()
-            .filename(&file)
-            .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5))
-            .synchronous(SqliteSynchronous::Full);
-        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
-        Ok(Self { way: Backend::CommandLine { pool, _lock: lock }, reader })
+        Ok(Self { writer: Writer::of_command(&file).await?, reader, _lock: Some(lock) })
     }
 
     /// The run of the server that writes in it; `None` for a command.
     #[must_use]
     pub fn run(&self) -> Option<i64> {
-        match &self.way {
-            Backend::Server(store) => Some(store.run()),
-            Backend::CommandLine { .. } => None,
-        }
+        self.writer.run()
     }
 
     /// The reader of the same database.
@@ -77,15 +59,7 @@ impl StudyBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn plan(&self, new: &NewStudy, planned: &StudyChange) -> Result<(), StoreError> {
-        let (pool, _turn) = match &self.way {
-            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Backend::CommandLine { pool, .. } => (pool, None),
-        };
-
-        let mut connection = pool.acquire().await?;
-        let done = insert_study(&mut connection, self.run(), new, planned).await;
-        drop_if_failed(connection, &done);
-        done
+        self.writer.write(async |connection| insert_study(connection, self.run(), new, planned).await).await
     }
 
     /// Writes all of `change` of `study`, or nothing. It is on disk when this returns.
@@ -93,22 +67,11 @@ impl StudyBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
-        let (pool, _turn) = match &self.way {
-            Backend::Server(store) => (&store.inner.trial, Some(store.turn().await)),
-            Backend::CommandLine { pool, .. } => (pool, None),
-        };
-
-        let mut connection = pool.acquire().await?;
-        let done = change_study(&mut connection, self.run(), study, change).await;
-        drop_if_failed(connection, &done);
-        done
+        self.writer.write(async |connection| change_study(connection, self.run(), study, change).await).await
     }
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        if let Backend::CommandLine { pool, .. } = &self.way {
-            self.reader.close().await;
-            pool.close().await;
-        }
+        self.writer.close(&self.reader).await;
     }
 }

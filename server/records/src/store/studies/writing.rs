@@ -4,6 +4,7 @@ use sqlx::sqlite::SqliteConnection;
 
 use super::{Enrolment, NewStudy, StudyChange};
 use crate::store::actors::name_actor;
+use crate::store::insert::Insert;
 use crate::store::session_events::insert_event;
 use crate::store::values::{begin, nanoseconds};
 use crate::store::{StoreError, chain};
@@ -22,21 +23,21 @@ pub(super) async fn insert_study(
     let sites = serde_json::to_string(&new.sites).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
     let mut transaction = begin(connection).await?;
-    sqlx::query("INSERT INTO studies (study, wall, definition, definition_sha256, sites) VALUES (?, ?, ?, ?, ?)")
-        .bind(study.as_str())
-        .bind(&wall)
-        .bind(&*new.definition.source)
-        .bind(new.definition.sha256())
-        .bind(sites)
-        .execute(&mut *transaction)
+    Insert::into("studies")
+        .set("study", study.as_str())
+        .set("wall", &wall)
+        .set("definition", &*new.definition.source)
+        .set("definition_sha256", new.definition.sha256())
+        .set("sites", sites)
+        .execute(&mut transaction)
         .await?;
 
     for protocol in &new.definition.protocols {
-        sqlx::query("INSERT INTO study_protocols (study, protocol, protocol_toml) VALUES (?, ?, ?)")
-            .bind(study.as_str())
-            .bind(&protocol.name)
-            .bind(&*protocol.source)
-            .execute(&mut *transaction)
+        Insert::into("study_protocols")
+            .set("study", study.as_str())
+            .set("protocol", &protocol.name)
+            .set("protocol_toml", &*protocol.source)
+            .execute(&mut transaction)
             .await?;
     }
 
@@ -64,33 +65,25 @@ async fn insert_change(
     change: &StudyChange,
 ) -> Result<(), StoreError> {
     if let Some(seed) = change.seed {
-        sqlx::query("INSERT INTO study_seeds (study, seed) VALUES (?, ?)")
-            .bind(study.as_str())
-            .bind(seed.to_hex())
-            .execute(&mut *connection)
-            .await?;
+        Insert::into("study_seeds").set("study", study.as_str()).set("seed", seed.to_hex()).execute(connection).await?;
     }
 
     let event = &change.event;
     let wall = event.wall.to_string();
-    sqlx::query(
-        "INSERT INTO study_events
-         (study, number, run, wall, monotonic_ns, role, person, reason, kind, session, commitment)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(study.as_str())
-    .bind(event.number)
-    .bind(run)
-    .bind(&wall)
-    .bind(change.at.map(nanoseconds))
-    .bind(event.way.name())
-    .bind(&event.signature.person)
-    .bind(&event.signature.reason)
-    .bind(event.kind.name())
-    .bind(event.kind.session().map(|session| session.to_string()))
-    .bind(event.kind.commitment())
-    .execute(&mut *connection)
-    .await?;
+    Insert::into("study_events")
+        .set("study", study.as_str())
+        .set("number", event.number)
+        .set("run", run)
+        .set("wall", &wall)
+        .set("monotonic_ns", change.at.map(nanoseconds))
+        .set("role", event.way.name())
+        .set("person", &event.signature.person)
+        .set("reason", &event.signature.reason)
+        .set("kind", event.kind.name())
+        .set("session", event.kind.session().map(|session| session.to_string()))
+        .set("commitment", event.kind.commitment())
+        .execute(connection)
+        .await?;
     let key = format!("{study}/{}", event.number);
     chain::append(connection, "study-event", &key, &wall).await?;
     name_actor(connection, event.signature.account.as_ref(), "study-event", &key, None, &wall).await?;
@@ -111,13 +104,13 @@ pub(in crate::store) async fn enrol(
     enrolment: &Enrolment,
     wall: &str,
 ) -> Result<(), StoreError> {
-    sqlx::query("INSERT INTO study_sessions (session, study, site, protocol, place) VALUES (?, ?, ?, ?, ?)")
-        .bind(session.to_string())
-        .bind(&enrolment.study)
-        .bind(&enrolment.site)
-        .bind(&enrolment.protocol)
-        .bind(i64::try_from(enrolment.place).unwrap_or(i64::MAX))
-        .execute(&mut *connection)
+    Insert::into("study_sessions")
+        .set("session", session.to_string())
+        .set("study", &enrolment.study)
+        .set("site", &enrolment.site)
+        .set("protocol", &enrolment.protocol)
+        .set("place", i64::try_from(enrolment.place).unwrap_or(i64::MAX))
+        .execute(connection)
         .await?;
     chain::append(connection, "study-session", &session.to_string(), wall).await?;
     Ok(())

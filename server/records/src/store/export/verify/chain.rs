@@ -11,7 +11,7 @@ use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
 use crate::store::chain::{
-    Block, Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, netstring,
+    Block, Entry, Fields, Head, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
 };
 use crate::store::export::description::{ALL, ChainRow};
 use crate::store::export::table::Row;
@@ -19,10 +19,10 @@ use crate::store::export::table::Row;
 /// A row of a table: its cells by column, as they were recorded.
 type Cells = BTreeMap<String, String>;
 
-/// Checks the chain of an export of this format; `expected` is a head known from elsewhere.
-pub(super) fn chain(export: &ExportFiles, format: u64, expected: Option<&Head>) -> Outcome {
+/// Checks the chain of an export; `expected` is a head known from elsewhere.
+pub(super) fn chain(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
     let salts = salts(export)?;
-    let mut walk = Walk::new(records(export, format)?, expected.cloned());
+    let mut walk = Walk::new(records(export)?, expected.cloned());
     let steps = Steps::read(export)?;
     let mut last = None;
 
@@ -69,21 +69,8 @@ fn ends_with_itself(export: &ExportFiles, last: Option<FoundEntry>, head: &Head)
 struct ChainColumns([Option<usize>; CHAIN.len()]);
 
 /// The columns of chain.csv that are read.
-const CHAIN: [&str; 13] = [
-    "number",
-    "hash",
-    "entry",
-    "wall",
-    "kind",
-    "key",
-    "session",
-    "place",
-    "adopted",
-    "salt",
-    "sealed",
-    "content",
-    "sealed_salt",
-];
+const CHAIN: [&str; 12] =
+    ["number", "hash", "entry", "wall", "kind", "key", "session", "place", "salt", "sealed", "content", "sealed_salt"];
 
 impl ChainColumns {
     fn of(export: &ExportFiles) -> Result<Self, String> {
@@ -93,8 +80,7 @@ impl ChainColumns {
 
     fn read(&self, row: &StringRecord, salts: &BTreeMap<String, String>) -> Result<FoundRow, String> {
         let cells = self.0.map(|place| place.and_then(|place| row.get(place)).unwrap_or_default());
-        let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] =
-            cells;
+        let [number, hash, hashed, wall, kind, key, session, place, salt, sealed, content, sealed_salt] = cells;
         if kind.is_empty() {
             let entry = FoundEntry::Hash(hashed.to_owned());
             return Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() });
@@ -106,7 +92,6 @@ impl ChainColumns {
             key: as_recorded("key", key),
             session: as_recorded("session", session),
             place: place.parse().ok(),
-            adopted: adopted == "true",
             salt: as_recorded("salt", salt),
             sealed: as_recorded("sealed", sealed),
             content: as_recorded("content", content),
@@ -158,29 +143,20 @@ fn rows(export: &ExportFiles, name: &str) -> Result<Vec<Cells>, String> {
     Ok(rows)
 }
 
-/// The records of the tables that exports of this format have, by kind and key.
-fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, String), Record>, String> {
+/// The records of the tables of an export, by kind and key.
+fn records(export: &ExportFiles) -> Result<BTreeMap<(&'static str, String), Record>, String> {
     let unblinded = export.has("allocation.json");
     let allocation = if unblinded { export.json("allocation.json")? } else { Rc::new(Value::Null) };
     let unblinding = allocation.get("unblinding_reason").and_then(Value::as_str);
 
     let mut found = BTreeMap::new();
     // Some kinds have no table in exports: of participants, an export has only the session's code.
-    let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table && table.since() <= format);
-    for kind in KINDS.iter().filter(told) {
+    let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table);
+    for kind in kinds().iter().filter(told) {
         for mut row in rows(export, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
-            let key = match kind.name {
-                "run" => cell(&row, "run"),
-                "session" | "study-session" => cell(&row, "session"),
-                "event" => format!("{}/{}", cell(&row, "session"), cell(&row, "number")),
-                "device" | "access" | "correction" | "consent" | "erasure" | "actor" | "voice-piece" => {
-                    cell(&row, "number")
-                }
-                "study" => cell(&row, "study"),
-                "study-event" => format!("{}/{}", cell(&row, "study"), cell(&row, "number")),
-                _ => cell(&row, "key"),
-            };
+            let key: Vec<String> = kind.key.iter().map(|column| cell(&row, column)).collect();
+            let key = key.join("/");
 
             if kind.name == "session" {
                 row.insert("segments".to_owned(), export.cells("segments.csv", "segment")?.join(","));
@@ -192,12 +168,12 @@ fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, 
             }
 
             let all = |columns: &[&str]| columns.iter().map(|column| cell(&row, column)).collect();
-            let session = if matches!(kind.name, "run" | "device") { String::new() } else { cell(&row, "session") };
+            let session = if kind.of_session { cell(&row, "session") } else { String::new() };
             let record = Record {
                 session,
                 order: cell(&row, "number").parse().unwrap_or_default(),
-                open: all(kind.open),
-                sealed: (!withheld).then(|| all(kind.sealed)),
+                open: all(&kind.open),
+                sealed: (!withheld).then(|| all(&kind.sealed)),
             };
             if found.insert((kind.name, key.clone()), record).is_some() {
                 return Err(format!("{}: {} {key} appears twice", kind.table, kind.name));

@@ -47,12 +47,16 @@ impl ExportFiles {
     }
 
     /// Whether the export has `file`.
-    pub(super) fn has(&self, file: &str) -> bool {
+    #[must_use]
+    pub fn has(&self, file: &str) -> bool {
         self.folder.join(file).exists()
     }
 
     /// The text of `file`.
-    pub(super) fn text(&self, file: &str) -> Result<String, String> {
+    ///
+    /// # Errors
+    /// If the file cannot be read. The error names the file.
+    pub fn text(&self, file: &str) -> Result<String, String> {
         std::fs::read_to_string(self.folder.join(file)).map_err(|error| format!("{file}: {error}"))
     }
 
@@ -66,13 +70,21 @@ impl ExportFiles {
         })
     }
 
-    /// The format of the export, which says what columns it has.
-    pub(super) fn format(&self) -> Result<u64, String> {
-        let format = self.json("datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
-        if format > FORMAT {
-            return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+    /// The number of the export's format.
+    ///
+    /// # Errors
+    /// If datapackage.json cannot be read or does not state it.
+    pub fn format(&self) -> Result<u64, String> {
+        let format = self.json("datapackage.json")?["parfocal"]["format"].as_u64();
+        format.ok_or_else(|| "datapackage.json does not state the format of the export".to_owned())
+    }
+
+    /// Refuses an export of another format, whose tables are not known here.
+    pub(super) fn check_format(&self) -> Result<(), String> {
+        match self.format()? {
+            FORMAT => Ok(()),
+            other => Err(format!("another version of parfocal wrote it (format {other}); verify it with that version")),
         }
-        Ok(format)
     }
 
     /// The names of the columns of CSV file `file`.
@@ -85,7 +97,10 @@ impl ExportFiles {
     }
 
     /// Passes each row of CSV file `file` to `take`, in order, until `take` returns an error.
-    pub(super) fn each_row(
+    ///
+    /// # Errors
+    /// If the file cannot be read, or `take` returned an error. The text names the file.
+    pub fn each_row(
         &self,
         file: &str,
         mut take: impl FnMut(&StringRecord) -> Result<(), String>,
@@ -103,7 +118,10 @@ impl ExportFiles {
     }
 
     /// The place of `column` among the columns of CSV file `file`, from 0.
-    pub(super) fn place(&self, file: &str, column: &str) -> Result<usize, String> {
+    ///
+    /// # Errors
+    /// If the file cannot be read or has no such column. The text names the file.
+    pub fn place(&self, file: &str, column: &str) -> Result<usize, String> {
         place_among(&self.headers(file)?, file, column)
     }
 

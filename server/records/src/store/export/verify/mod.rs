@@ -3,6 +3,7 @@
 mod allocation;
 mod chain;
 mod files;
+mod motions;
 mod study;
 mod verdict;
 mod voice;
@@ -29,6 +30,7 @@ use crate::store::export::table::{Row, Table};
 use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
+use parfocal_base::files::{is_systems_own, systems_own_below};
 use study::study;
 use verdict::Outcome;
 use voice::voice;
@@ -65,32 +67,15 @@ pub fn verify_files(export: &ExportFiles, expected: Option<&Head>) -> Vec<Check>
         check("columns", columns(export)),
         check("events", events(export)),
         check("said", said(export)),
-        check("voice", recorded(export)),
+        check("voice", voice(export)),
         check("copies", copies(export)),
         check("references", references(export)),
         check("protocol", protocol(export)),
         check("commitment", commitment(export)),
         check("schedule", schedule(export)),
         check("study", study(export)),
-        check("chain", chained(export, expected)),
+        check("chain", chain(export, expected)),
     ]
-}
-
-/// Checks the chain, which exports have since format 4.
-fn chained(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
-    let format = export.format()?;
-    match format {
-        ..4 => Ok(Verdict::NotChecked("an earlier version wrote the export, without a chain".to_owned())),
-        _ => chain(export, format, expected),
-    }
-}
-
-/// Checks the voice recordings, which exports have since format 7.
-fn recorded(export: &ExportFiles) -> Outcome {
-    match export.format()? {
-        ..7 => Ok(Verdict::Passed("an earlier version wrote the export, without voice".to_owned())),
-        _ => voice(export),
-    }
 }
 
 fn checksums(export: &ExportFiles) -> Outcome {
@@ -115,18 +100,35 @@ fn checksums(export: &ExportFiles) -> Outcome {
         }
     }
 
-    Ok(Verdict::Passed(format!("{} files are as they were exported", listed.len() - 1)))
+    let beside = not_part(export.folder())?;
+    Ok(Verdict::Passed(format!("{} files are as they were exported{beside}", listed.len() - 1)))
+}
+
+/// Names the files in `folder` that operating systems left there, in words to add to a verdict; empty if there are none.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn not_part(folder: &Path) -> Result<String, String> {
+    let found = systems_own_below(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    if found.is_empty() {
+        return Ok(String::new());
+    }
+    let names: Vec<String> = found.iter().map(|name| name.display().to_string()).collect();
+    Ok(format!("; not part of it, and not checked: {}", names.join(", ")))
 }
 
 /// The files of an export, including those in its folder of voice recordings.
 fn file_names(folder: &Path) -> Result<Vec<String>, String> {
     let names = |folder: &Path, before: &str| -> Result<Vec<String>, String> {
         let entries = std::fs::read_dir(folder).map_err(|error| error.to_string())?;
-        let name = |entry: std::io::Result<std::fs::DirEntry>| {
-            let entry = entry.map_err(|error| error.to_string())?;
-            Ok(format!("{before}{}", entry.file_name().to_string_lossy()))
-        };
-        entries.map(name).collect()
+        let mut found = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(|error| error.to_string())?.file_name();
+            if !is_systems_own(&name) {
+                found.push(format!("{before}{}", name.to_string_lossy()));
+            }
+        }
+        Ok(found)
     };
 
     let mut found = names(folder, "")?;
@@ -138,17 +140,16 @@ fn file_names(folder: &Path) -> Result<Vec<String>, String> {
 }
 
 fn columns(export: &ExportFiles) -> Outcome {
-    let format = export.format()?;
+    export.check_format()?;
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
-        let withheld = !export.has(&file) && UNBLINDED.iter().any(|(name, _)| *name == file);
-        if withheld || table.since() > format {
+        let withheld = !export.has(&file) && UNBLINDED.contains(&file.as_str());
+        if withheld {
             continue;
         }
 
-        let columns: Vec<_> = table.columns_of(format).collect();
-        if !export.headers(&file)?.iter().eq(columns.iter().map(|column| column.name)) {
+        if !export.headers(&file)?.iter().eq(table.header()) {
             return Err(format!("{file}: its columns are not those described"));
         }
 
@@ -156,7 +157,7 @@ fn columns(export: &ExportFiles) -> Outcome {
         export.each_row(&file, |row| {
             line += 1;
             rows += 1;
-            let mut cells = columns.iter().zip(row);
+            let mut cells = table.columns.iter().zip(row);
             match cells.find(|(column, cell)| !column.kind.accepts(cell)) {
                 Some((column, cell)) => Err(format!("{file}, row {line}: '{cell}' is not a valid {}", column.name)),
                 None => Ok(()),
@@ -183,9 +184,7 @@ fn said(export: &ExportFiles) -> Outcome {
     if told != comments.to_string() {
         return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {told}"));
     }
-    if export.format()? >= 2 {
-        counting(export)?;
-    }
+    counting(export)?;
     Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))
 }
 
@@ -220,14 +219,9 @@ fn numbered(export: &ExportFiles, file: &str) -> Result<usize, String> {
     }
 }
 
-/// Files that an unblinded export has and a blinded one must not have, each with the first format that has it.
-const UNBLINDED: [(&str, u64); 5] = [
-    ("allocation.csv", 1),
-    ("allocation.json", 1),
-    ("weights.csv", 1),
-    ("policy_steps.csv", 1),
-    ("chain_salts.csv", 4),
-];
+/// Files that an unblinded export has and a blinded one must not have.
+const UNBLINDED: [&str; 5] =
+    ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv", "chain_salts.csv"];
 
 /// Tables that session.json repeats.
 const COPIED: [Table; 20] = [
@@ -257,22 +251,19 @@ fn copies(export: &ExportFiles) -> Outcome {
     let package = export.json("datapackage.json")?;
     let blinded =
         package["parfocal"]["blinded"].as_bool().ok_or("datapackage.json does not say whether it is blinded")?;
-    let format = export.format()?;
-    let mut files = UNBLINDED.into_iter().filter(|(_, since)| *since <= format).map(|(file, _)| file);
-    if let Some(file) = files.find(|file| export.has(file) == blinded) {
+    if let Some(file) = UNBLINDED.into_iter().find(|file| export.has(file) == blinded) {
         let (is, has) = if blinded { ("", "there") } else { ("un", "missing") };
         return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
     }
 
     let session = export.json("session.json")?;
-    for table in COPIED.iter().filter(|table| table.since() <= format) {
+    for table in COPIED {
         let file = table.file();
         let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;
-        let columns: Vec<_> = table.columns_of(format).collect();
         let same = |object: &Value, row: &StringRecord| {
-            row.len() == columns.len()
-                && columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
+            row.len() == table.columns.len()
+                && table.columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
         };
 
         let mut objects = objects.iter();
@@ -286,7 +277,7 @@ fn copies(export: &ExportFiles) -> Outcome {
     }
 
     // Nothing else either: what is not compared could say anything.
-    let compared = |name: &str| COPIED.iter().any(|table| table.since() <= format && table.name == name);
+    let compared = |name: &str| COPIED.iter().any(|table| table.name == name);
     let tables = session.as_object().ok_or("session.json is not an object")?;
     if let Some(name) = tables.keys().find(|name| !compared(name)) {
         return Err(format!("session.json has '{name}', which is not a table of this format"));

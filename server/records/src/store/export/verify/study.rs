@@ -6,8 +6,6 @@ use sha2::{Digest, Sha256};
 
 use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
-use crate::store::export::description::StudySessionRow;
-use crate::store::export::table::Row;
 use parfocal_trial::allocation::Seed;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::lists::{List, commitment, in_words};
@@ -41,10 +39,6 @@ struct Place {
 /// Checks the study in the export.
 pub(super) fn study(export: &ExportFiles) -> Outcome {
     let outside = || Ok(Verdict::Passed("the session is outside any study".to_owned()));
-    // Earlier versions had no studies.
-    if export.format()? < StudySessionRow::TABLE.since() {
-        return outside();
-    }
     let Some(study) = export.cells("study_sessions.csv", "study")?.into_iter().next() else { return outside() };
 
     let cell = |column| {

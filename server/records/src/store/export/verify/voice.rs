@@ -9,6 +9,7 @@ use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
 use crate::store::export::voice::{FOLDER, file_name};
 use crate::store::voice::erased_words;
+use parfocal_base::files::is_systems_own;
 use parfocal_trial::voice::MediaType;
 
 /// A piece, as the tables describe it.
@@ -18,7 +19,7 @@ struct Piece {
     sha256: String,
 }
 
-/// Checks the recordings of an export whose format has them.
+/// Checks the recordings of an export.
 pub(super) fn voice(export: &ExportFiles) -> Outcome {
     let pieces = pieces(export)?;
     let erased = erased(export)?;
@@ -122,6 +123,9 @@ fn no_others(export: &ExportFiles, known: &BTreeSet<String>) -> Result<(), Strin
     let Ok(entries) = std::fs::read_dir(export.folder().join(FOLDER)) else { return Ok(()) };
     for entry in entries {
         let name = entry.map_err(|error| format!("{FOLDER}: {error}"))?.file_name();
+        if is_systems_own(&name) {
+            continue;
+        }
         let name = format!("{FOLDER}/{}", name.to_string_lossy());
         if !known.contains(&name) {
             return Err(format!("{name} belongs to no comment"));

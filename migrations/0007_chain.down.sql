@@ -1,3 +1,0 @@
-DROP TABLE accesses;
-DROP TABLE chain_salts;
-DROP TABLE chain;

@@ -1,0 +1,138 @@
+"""Exports as DataFrames: types, texts as they were said, and what is refused with which sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import parfocal
+
+from .conftest import SAID, Course
+
+
+def test_tables_have_the_types_units_and_missing_values_of_their_description(folder: Path) -> None:
+    export = parfocal.load(folder, verify="checksums")
+    package = json.loads((folder / "datapackage.json").read_text())
+    assert set(export) == {resource["name"] for resource in package["resources"]}
+
+    comments = export["comments"]
+    assert str(comments["monotonic_ns"].dtype) == "Int64"
+    assert isinstance(comments["wall"].dtype, pd.DatetimeTZDtype)
+    assert isinstance(comments["kind"].dtype, pd.CategoricalDtype)
+    assert comments["waited_ms"].isna().all()
+    assert str(comments["late"].dtype) == "boolean"
+
+    path = export["telemetry"]
+    assert path["asked"].dtype == np.float64
+    assert path["asked"].between(0, 1).all()
+    assert len(path) > 5
+    assert path.attrs["units"]["exposed_ns"] == "ns"
+    assert export.columns("telemetry").loc["exposed_ns", "unit"] == "ns"
+
+
+def test_texts_are_as_they_were_said(folder: Path) -> None:
+    assert list(parfocal.load(folder)["comments"]["text"]) == SAID
+
+
+def test_nanoseconds_are_not_rounded(folder: Path) -> None:
+    export = parfocal.load(folder)
+    raw = [line.split(",") for line in (folder / "telemetry.csv").read_text().splitlines()]
+    column = raw[0].index("exposed_ns")
+    assert [str(value) for value in export["telemetry"]["exposed_ns"]] == [row[column] for row in raw[1:]]
+
+
+def test_a_zip_file_reads_as_its_folder(archive: Path, folder: Path) -> None:
+    packed, unpacked = parfocal.load(archive, verify="checksums"), parfocal.load(folder)
+    assert packed.blinded
+    assert "blinded" in repr(packed)
+    for name in unpacked:
+        pd.testing.assert_frame_equal(packed[name], unpacked[name])
+
+
+def test_the_program_verifies_it(folder: Path) -> None:
+    checks = parfocal.load(folder, verify=True).verify()
+    assert set(checks["verdict"]) <= {"passed", "not-checked"}
+    assert "passed" in set(checks["verdict"])
+
+
+def damage(folder: Path, what: str) -> Any:
+    package = folder / "datapackage.json"
+    described = json.loads(package.read_text())
+    match what:
+        case "a table is gone":
+            (folder / "comments.csv").unlink()
+        case "a table is cut off":
+            content = (folder / "telemetry.csv").read_bytes()
+            (folder / "telemetry.csv").write_bytes(content[:-10])
+        case "a newer format":
+            described["parfocal"] |= {"format": 99, "version": "9.1.0"}
+            package.write_text(json.dumps(described))
+        case "another's package":
+            del described["parfocal"]
+            package.write_text(json.dumps(described))
+        case "the description is cut off":
+            package.write_text(package.read_text()[:500])
+        case "no description":
+            package.unlink()
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("a table is gone", "lacks the file comments.csv. The copy is not complete"),
+        ("a table is cut off", "telemetry.csv has .* bytes instead of .*cut off or changed"),
+        ("a newer format", "format 99 and was written by parfocal 9.1.0.*pip install --upgrade"),
+        ("another's package", "not one that parfocal wrote"),
+        ("the description is cut off", "datapackage.json is cut off or damaged.*Copy the export again"),
+        ("no description", "is not an export: it has no datapackage.json"),
+    ],
+)
+def test_what_cannot_be_loaded_is_refused_with_a_sentence(folder: Path, what: str, sentence: str) -> None:
+    damage(folder, what)
+    with pytest.raises(parfocal.BadExport, match=sentence):
+        parfocal.load(folder)
+
+
+def test_a_changed_value_loads_but_does_not_verify(folder: Path) -> None:
+    table = folder / "comments.csv"
+    changed = table.read_text().replace("blurred", "sharper")
+    table.write_text(changed)
+    assert "sharper à gauche" in set(parfocal.load(folder)["comments"]["text"])
+    with pytest.raises(parfocal.BadExport, match=r"does not verify: comments.csv was changed"):
+        parfocal.load(folder, verify="checksums")
+    with pytest.raises(parfocal.BadExport, match=r"does not verify.*Do not use it"):
+        parfocal.load(folder, verify=True)
+
+
+def test_a_file_that_does_not_belong_to_it_does_not_verify(folder: Path) -> None:
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(parfocal.BadExport, match=r"notes.txt does not belong"):
+        parfocal.load(folder, verify="checksums")
+
+
+def test_a_download_that_was_cut_off_is_no_export(archive: Path, tmp_path: Path) -> None:
+    part = tmp_path / "part.zip"
+    part.write_bytes(archive.read_bytes()[:-200])
+    with pytest.raises(parfocal.BadExport, match=r"download it again"):
+        parfocal.load(part)
+    with pytest.raises(parfocal.BadExport, match=r"There is no export at"):
+        parfocal.load(tmp_path / "nowhere")
+
+
+def test_a_table_that_is_not_there_is_named_with_those_that_are(folder: Path) -> None:
+    with pytest.raises(KeyError, match=r"no such table; it has .*telemetry"):
+        parfocal.load(folder)["ratings"]
+
+
+def test_the_description_of_an_unblinded_session_adds_policies(course: Course, tmp_path: Path) -> None:
+    course.researcher.researcher.unblind(course.session, reason="practice", despite_outstanding=True)
+    zipped = tmp_path / "unblinded.zip"
+    path = f"/api/researcher/sessions/{course.session}/export.zip?unblinded=true"
+    export = parfocal.load(course.researcher.download(path, zipped))
+    assert not export.blinded
+    assert set(export["policy_steps"]["policy"].cat.categories) == {"fixed", "mgm-hill-climber"}

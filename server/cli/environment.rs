@@ -1,0 +1,152 @@
+//! `parfocal environment`: simulated scans for a training in another program, over standard input and output.
+
+use std::io::{BufReader, BufWriter};
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use clap::builder::RangedU64ValueParser;
+
+use super::output::Failure;
+use parfocal_base::notices::tell;
+use parfocal_learning::scans::bench::BenchScenes;
+use parfocal_learning::scans::benchmark::FRAMES;
+use parfocal_learning::scans::footage;
+use parfocal_learning::scans::pictures::{Split, reference, varied};
+use parfocal_learning::scans::relief;
+use parfocal_learning::scans::scenery::Scenery;
+use parfocal_learning::scans::simulated::Scene;
+use parfocal_learning::scans::variety::Variety;
+use parfocal_learning::training::served::{Fleet, Shows, serve};
+
+/// Bytes that the pipes are read and written with at a time.
+const BUFFER: usize = 1 << 16;
+
+/// What a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Observation {
+    /// The patch.
+    Patch,
+    /// The patch, and those at two coarser scales around it.
+    View,
+}
+
+/// What the scenes are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Purpose {
+    /// To learn from.
+    Training,
+    /// To choose by.
+    Validation,
+    /// To report results: the scenes of the reference benchmark.
+    Test,
+}
+
+impl From<Purpose> for Split {
+    fn from(purpose: Purpose) -> Self {
+        match purpose {
+            Purpose::Training => Self::Training,
+            Purpose::Validation => Self::Validation,
+            Purpose::Test => Self::Test,
+        }
+    }
+}
+
+/// Arguments of `parfocal environment`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scans: `simulated` over drawn pictures, `relief` over scenes with relief, or the folder of a recorded scan or of
+    /// a focal stack (`DIR:K` makes K of its planes the range 0 to 1). Each gets the same share.
+    #[arg(long, value_name = "simulated|relief|DIR", num_args = 1.., default_value = "simulated")]
+    scans: Vec<String>,
+    /// A video (its first 1500 frames), an image or a folder of images instead of drawn pictures.
+    #[arg(long, value_name = "PATH")]
+    footage: Vec<PathBuf>,
+    /// What the scenes are for: each purpose has its own, and of five recordings or more every fifth is not for
+    /// training.
+    #[arg(long, value_enum, default_value = "training")]
+    split: Purpose,
+    /// Scenes of each kind to draw.
+    #[arg(long, value_name = "N", default_value = "32", value_parser = RangedU64ValueParser::<u64>::new().range(1..=10_000))]
+    scenes: u64,
+    /// Share of the scans that vary in speed, blur, noise, exposure, lens and what else is in view, 0 to 1. At 0 they
+    /// are those of the reference benchmark.
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = parse_share)]
+    variety: f64,
+    /// What is shown of a frame.
+    #[arg(long, value_enum, default_value = "patch")]
+    observation: Observation,
+    /// Environments side by side.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = RangedU64ValueParser::<usize>::new().range(1..=4096))]
+    count: usize,
+    /// Frames of a scan.
+    #[arg(long, value_name = "N", default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+}
+
+/// Serves environments until standard input is closed.
+///
+/// # Errors
+/// If the scenes cannot be used, a pipe fails, or the other program sends something that is no request.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let scenery = scenery(arguments)?;
+    let variety = Variety { share: arguments.variety };
+    let shows = match arguments.observation {
+        Observation::Patch => Shows::Patch,
+        Observation::View => Shows::View,
+    };
+
+    let mut fleet = Fleet::new(scenery, variety, shows, arguments.count, arguments.frames, arguments.seed);
+    let requests = BufReader::with_capacity(BUFFER, std::io::stdin().lock());
+    let answers = BufWriter::with_capacity(BUFFER, std::io::stdout().lock());
+    Ok(serve(&mut fleet, requests, answers)?)
+}
+
+fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
+    let split = Split::from(arguments.split);
+    let mut groups: Vec<Vec<Scene>> = Vec::new();
+    let mut folders = Vec::new();
+
+    for scans in &arguments.scans {
+        match scans.as_str() {
+            "simulated" => groups.push(flat(arguments, split)?),
+            "relief" => {
+                let scenes = relief::scenes(split, arguments.scenes)?;
+                groups.push(scenes.into_iter().map(Scene::Stack).collect());
+            }
+            folder => folders.push(folder.to_owned()),
+        }
+    }
+
+    if !folders.is_empty() {
+        let bench = BenchScenes::read(&folders)?;
+        for doubt in &bench.doubts {
+            tell(format_args!("note: {doubt}"));
+        }
+        groups.push(if arguments.split == Purpose::Training { bench.training } else { bench.validation });
+    }
+
+    Scenery::evenly(groups).ok_or_else(|| "there is nothing to scan; name scans with --scans".into())
+}
+
+/// Scenes with everything at one distance.
+fn flat(arguments: &Arguments, split: Split) -> Result<Vec<Scene>, Failure> {
+    let mut clips = Vec::new();
+    for path in &arguments.footage {
+        clips.extend(footage::clips(path)?);
+    }
+
+    if arguments.footage.is_empty() {
+        // Scans that are those of the reference benchmark are over its kind of pictures.
+        let draw = if arguments.variety > 0.0 { varied } else { reference };
+        clips = draw(split, arguments.scenes)?;
+    }
+    Ok(clips.into_iter().map(Scene::Flat).collect())
+}
+
+fn parse_share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| format!("must be a number from 0 to 1, not '{text}'"))
+}

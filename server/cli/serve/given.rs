@@ -1,0 +1,219 @@
+//! What `serve` was given, looked at before it takes its port. Everything that is wrong is reported at once.
+
+use std::io::ErrorKind;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+
+use tokio::net::TcpListener;
+
+use super::arguments::Arguments;
+use crate::cli::library::protocols;
+use crate::cli::output::Failure;
+use parfocal_autofocus::{Registry, scripted, shipped};
+use parfocal_base::PolicyName;
+use parfocal_base::clock::Clock;
+use parfocal_dashboard::http::keys::Keys;
+use parfocal_dashboard::tls::Certificates;
+use parfocal_devices::camera::{self, CameraSettings, calibration};
+use parfocal_devices::lens::{self, Lens, LensDynamics, LensInfo, MeasuredDynamics, Optics};
+use parfocal_imaging::{Calibration, Developer};
+use parfocal_pipeline::control::Rig;
+use parfocal_records::store::LockedFolder;
+use parfocal_session::conductor::Library;
+
+/// What the server starts with: read, opened and checked.
+pub(super) struct Given {
+    /// The data folder.
+    pub folder: LockedFolder,
+    /// The roles' keys.
+    pub keys: Keys,
+    /// The certificates; `None` without TLS.
+    pub certificates: Option<Arc<Certificates>>,
+    /// The sensor's calibration.
+    pub calibration: Arc<Calibration>,
+    /// Makes pictures by that calibration.
+    pub developer: Developer,
+    /// The protocols.
+    pub library: Library,
+    /// Camera, lens and policies.
+    pub rig: Rig,
+    /// The lens's description of itself, if it gave one.
+    pub lens_info: Option<LensInfo>,
+    /// How the lens moves, if that was measured.
+    pub dynamics: Option<LensDynamics>,
+    /// The port. Early visitors wait in its queue.
+    pub listener: TcpListener,
+}
+
+/// What is wrong with that which was given.
+#[derive(Default)]
+struct Problems(Vec<String>);
+
+impl Problems {
+    /// The value of `outcome`; its error is kept, to be reported with the others.
+    fn keep<T>(&mut self, outcome: Result<T, impl Into<Failure>>) -> Option<T> {
+        outcome.map_err(|error| self.0.push(error.into().to_string())).ok()
+    }
+
+    /// All problems in one message.
+    fn into_failure(self) -> Failure {
+        match <[String; 1]>::try_from(self.0) {
+            Ok([only]) => only.into(),
+            Err(all) => format!("the server cannot start, for {} reasons:\n- {}", all.len(), all.join("\n- ")).into(),
+        }
+    }
+}
+
+/// Looks at everything that `arguments` name, opens the devices and then takes the port. `seed` is for simulated
+/// devices.
+///
+/// # Errors
+/// If something cannot be used. The error names everything that cannot.
+pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u64) -> Result<Given, Failure> {
+    // Decided before anything is made or opened.
+    arguments.encryption.check(arguments.bind)?;
+
+    let mut problems = Problems::default();
+    let registry = registry(arguments, &mut problems);
+    let library = problems.keep(protocols(arguments.protocols.as_deref(), &registry));
+
+    let measured = arguments.lens_dynamics.as_deref().and_then(|path| problems.keep(measured(path)));
+    let mut lens = problems.keep(lens::open_or_await(&arguments.lens, Arc::clone(clock)));
+    let optics = lens.as_ref().map_or_else(|| stand_in(clock), |lens| Ok(lens.optics()))?;
+    let settings = CameraSettings { fps: arguments.fps.into(), seed, optics, clock: Arc::clone(clock) };
+    let camera = problems.keep(camera::open_or_await(&arguments.camera, settings));
+
+    // A camera that cannot be opened is reported once, and not again by the calibration that comes with it.
+    let own = camera::own_calibration(&arguments.camera).filter(|_| camera.is_some());
+    let path = arguments.calibration.as_deref().or(own.as_deref());
+    let calibration = problems.keep(calibration::read_or_default(path)).map(Arc::new);
+    if let (Some(calibration), Some(camera)) = (&calibration, &camera) {
+        problems.keep(calibration::check_camera(calibration, camera.mosaic_size()));
+    }
+
+    // Ask before the control loop takes the lens; nobody asks it again.
+    let lens_info = lens.as_deref_mut().and_then(described);
+    let dynamics = match (measured, &lens) {
+        (Some(measured), Some(_)) => problems.keep(dynamics(arguments, &measured, lens_info.as_ref())),
+        _ => None,
+    };
+
+    // After everything that only reads: a server that cannot start leaves the port alone.
+    let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error));
+    let listener = problems.keep(listener);
+
+    // A start that fails makes no new folder, and nothing in an empty one.
+    let is_due = problems.0.is_empty() || is_used(&arguments.data_dir);
+    let folder = if is_due { problems.keep(LockedFolder::of(&arguments.data_dir)) } else { None };
+    let keys = folder.as_ref().and_then(|_| problems.keep(Keys::load_or_create(&arguments.data_dir)));
+    let certificates = problems.keep(certificates(arguments, folder.is_some(), clock));
+
+    match (folder, keys, certificates, calibration, library, camera, lens, listener) {
+        (
+            Some(folder),
+            Some(keys),
+            Some(certificates),
+            Some(calibration),
+            Some(library),
+            Some(camera),
+            Some(lens),
+            Some(listener),
+        ) if problems.0.is_empty() => {
+            let developer = Developer::new(&calibration);
+            let reconstructor = developer.reconstructor().clone();
+            let rig = Rig { camera, lens, reconstructor, registry, clock: Arc::clone(clock) };
+            let certificates = certificates.map(Arc::new);
+            Ok(Given {
+                folder,
+                keys,
+                certificates,
+                calibration,
+                developer,
+                library,
+                rig,
+                lens_info,
+                dynamics,
+                listener,
+            })
+        }
+        _ => Err(problems.into_failure()),
+    }
+}
+
+/// The policies that ship and those from files. Each policy from a file is built once, to check it. A policy that
+/// cannot be used stays in the list, so that protocols are not reported for naming it.
+fn registry(arguments: &Arguments, problems: &mut Problems) -> Registry {
+    let mut registry = Registry::standard().knowing(arguments.blur);
+    if let Some(folder) = &arguments.weights {
+        registry = problems.keep(shipped::with_folder(registry.clone(), folder)).unwrap_or(registry);
+    }
+
+    for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
+        registry = scripted::with_file(registry, &name);
+        problems.keep(registry.build(&name));
+    }
+    registry
+}
+
+/// Whether there is something at `folder` besides an empty folder.
+fn is_used(folder: &Path) -> bool {
+    folder.exists() && folder.read_dir().map_or(true, |mut entries| entries.next().is_some())
+}
+
+/// The certificates; none without TLS. A local authority is kept in the data folder, so that must be `locked`.
+fn certificates(arguments: &Arguments, locked: bool, clock: &Arc<dyn Clock>) -> Result<Option<Certificates>, Failure> {
+    let encryption = &arguments.encryption;
+    if locked || encryption.is_given() {
+        encryption.certificates(&arguments.data_dir, arguments.bind.ip(), clock)
+    } else {
+        Ok(None)
+    }
+}
+
+/// The lens's description of itself, if it gives one.
+fn described(lens: &mut (dyn Lens + 'static)) -> Option<LensInfo> {
+    lens.info().inspect_err(|error| tracing::warn!(%error, "the lens did not describe itself")).ok()
+}
+
+/// Optics for a camera whose lens could not be opened, so that the camera's own problems are found too.
+fn stand_in(clock: &Arc<dyn Clock>) -> Result<Arc<dyn Optics>, Failure> {
+    Ok(lens::open("simulated", Arc::clone(clock))?.optics())
+}
+
+/// Reads measured lens dynamics from the file `path`.
+fn measured(path: &Path) -> Result<MeasuredDynamics, Failure> {
+    let named = |problem: String| format!("lens dynamics {}: {problem}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
+    Ok(MeasuredDynamics::from_toml(&text).map_err(named)?)
+}
+
+/// The dynamics that were `measured`, which must have been on this lens.
+fn dynamics(
+    arguments: &Arguments,
+    measured: &MeasuredDynamics,
+    info: Option<&LensInfo>,
+) -> Result<LensDynamics, Failure> {
+    let file = arguments.lens_dynamics.as_deref().map_or_else(String::new, |path| path.display().to_string());
+    let Some(info) = info else {
+        let problem = "the lens does not answer, so nobody knows whether they belong to it";
+        return Err(format!("lens dynamics {file}: {problem}; switch the lens on, or leave out --lens-dynamics").into());
+    };
+    if measured.serial != info.serial {
+        let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
+        return Err(format!("lens dynamics {file}: {problem}; measure it with `parfocal lens measure`").into());
+    }
+    Ok(measured.dynamics())
+}
+
+fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::AddrInUse => {
+            format!("{address} is in use by another program; stop it, or choose another address with --bind")
+        }
+        ErrorKind::AddrNotAvailable => {
+            format!("this machine does not have the address {address}; choose another with --bind")
+        }
+        _ => format!("cannot listen on {address}: {error}; choose another address with --bind"),
+    }
+}

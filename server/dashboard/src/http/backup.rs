@@ -1,0 +1,100 @@
+//! A backup of the database for a lead's browser: starts it, tells whether it is ready, and sends the file. A backup
+//! holds the policies of all sessions, so a lead confirms with the passphrase, and nobody else gets the file.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE};
+use axum::response::IntoResponse;
+use futures_util::stream;
+use serde::Deserialize;
+use tokio::io::AsyncReadExt;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::people::{Acting, PeerAddress, confirmed_lead, lead};
+use super::roles::Researcher;
+use parfocal_records::store::{BackupState, FinishedBackup};
+use parfocal_session::conductor::ConductError;
+
+/// Bytes of a backup that are read and sent at a time.
+const BLOCK: usize = 256 * 1024;
+
+/// A wish for a backup.
+#[derive(Deserialize, ToSchema)]
+struct MakeBackup {
+    /// The lead's own passphrase, entered again.
+    #[schema(min_length = 1)]
+    passphrase: String,
+}
+
+/// Begins to make a backup in the background, and records that. If one is being made already, no other begins.
+#[utoipa::path(post, path = "/api/researcher/backup", tag = "accounts", request_body = MakeBackup, responses(
+    (status = 200, body = BackupState),
+    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
+    (status = 422, description = "The passphrase is missing", body = ErrorBody),
+    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
+async fn start_backup(
+    by: Researcher,
+    State(app): State<AppState>,
+    PeerAddress(peer): PeerAddress,
+    JsonBody(wanted): JsonBody<MakeBackup>,
+) -> Result<Json<BackupState>, Error> {
+    let lead = confirmed_lead(&app, &by, Some(&wanted.passphrase), peer).await?;
+    Ok(Json(app.backups.start(app.conductor.recorder(by.actor()), lead.account.clone())))
+}
+
+/// The state of the latest backup that the lead who is signed in asked for. It is kept for 15 minutes, unless words are
+/// erased.
+#[utoipa::path(get, path = "/api/researcher/backup", tag = "accounts", responses(
+    (status = 200, body = BackupState),
+    (status = 403, description = "No lead is signed in", body = ErrorBody)))]
+async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Json<BackupState>, Error> {
+    let lead = lead(&by)?;
+    let state = app.backups.state(app.conductor.reader(), &lead.account).await;
+    Ok(Json(state.map_err(ConductError::from)?))
+}
+
+/// The backup as a file for `parfocal restore`.
+#[utoipa::path(get, path = "/api/researcher/backup.db", tag = "accounts", responses(
+    (status = 200, description = "The file", content_type = "application/vnd.sqlite3"),
+    (status = 403, description = "No lead is signed in", body = ErrorBody),
+    (status = 404, description = "The lead has no backup that is ready", body = ErrorBody)))]
+async fn backup_file(by: Researcher, State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
+    let lead = lead(&by)?;
+    let made = app.backups.made(app.conductor.reader(), &lead.account).await.map_err(ConductError::from)?;
+    let made = made.ok_or_else(|| Error::NotFound("No backup is ready. Make one on the page People.".to_owned()))?;
+
+    let name = format!("parfocal-{}.db", app.clock.wall().strftime("%Y%m%dT%H%M%SZ"));
+    let headers = [
+        (CONTENT_TYPE, "application/vnd.sqlite3".to_owned()),
+        (CONTENT_LENGTH, made.bytes.to_string()),
+        (CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
+    ];
+    Ok((headers, content(made).await?))
+}
+
+/// The file's content, no faster than the download takes it. The file stays until all of it is sent.
+async fn content(made: FinishedBackup) -> Result<Body, Error> {
+    let file = tokio::fs::File::open(&*made.file).await;
+    let file = file.map_err(|error| Error::Storage(format!("the backup cannot be read: {error}; make another")))?;
+    let kept = Arc::clone(&made.file);
+
+    let blocks = stream::try_unfold((file, kept), |(mut file, kept)| async move {
+        let mut block = vec![0; BLOCK];
+        let read = file.read(&mut block).await?;
+        block.truncate(read);
+        Ok::<_, std::io::Error>((read > 0).then(|| (Bytes::from(block), (file, kept))))
+    });
+    Ok(Body::from_stream(blocks))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(backup_state, start_backup)).routes(routes!(backup_file))
+}

@@ -1,0 +1,74 @@
+//! The page that a tablet opens once, and that tries what a trial needs of it. The operator's page tells the result.
+
+use askama::Template;
+use axum::Json;
+use axum::extract::State;
+use axum::http::header::USER_AGENT;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{Html, IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::roles::SurgeonsTablet;
+use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
+use crate::doctor::{TabletPart, TriedTablet};
+use parfocal_base::ids::DeviceId;
+
+#[derive(Template)]
+#[template(path = "tablet.html")]
+struct Page {
+    nonce: String,
+}
+
+/// The page that tries a tablet.
+#[utoipa::path(get, path = "/tablet", tag = "surgeon",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
+async fn tablet_page(_: SurgeonsTablet, Nonce(nonce): Nonce) -> Result<Response, Error> {
+    let html = Page { nonce }.render().map_err(|_| Error::Internal)?;
+    let mut response = Html(html).into_response();
+    response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);
+    Ok(response)
+}
+
+/// What a tablet found out about itself.
+#[derive(Debug, Deserialize, ToSchema)]
+struct TabletTrial {
+    /// The tablet.
+    device: DeviceId,
+    /// What was tried.
+    tried: Vec<TriedPart>,
+}
+
+/// One thing that was tried on a tablet.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
+struct TriedPart {
+    /// What was tried.
+    part: TabletPart,
+    /// Whether it works.
+    works: bool,
+}
+
+/// Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends.
+#[utoipa::path(post, path = "/api/surgeon/tablet-trials", tag = "surgeon", request_body = TabletTrial, responses(
+    (status = 200, description = "Noted", body = bool),
+    (status = 422, description = "Not what the page sends", body = ErrorBody)))]
+async fn tried(
+    _: SurgeonsTablet,
+    State(app): State<AppState>,
+    headers: HeaderMap,
+    JsonBody(trial): JsonBody<TabletTrial>,
+) -> Result<(StatusCode, Json<bool>), Error> {
+    let user_agent = headers.get(USER_AGENT).and_then(|agent| agent.to_str().ok()).unwrap_or_default().to_owned();
+    let failing = trial.tried.iter().filter(|tried| !tried.works).map(|tried| tried.part).collect();
+    app.tablet_trials.note(trial.device, TriedTablet { user_agent, at: app.clock.wall(), failing });
+    Ok((StatusCode::OK, Json(true)))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(tablet_page)).routes(routes!(tried))
+}

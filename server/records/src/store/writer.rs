@@ -1,0 +1,58 @@
+//! Who writes records: the server, or a command beside it.
+
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+
+use super::writes::write_on;
+use super::{Store, StoreError};
+
+/// Writes records. Clone freely.
+#[derive(Clone)]
+pub(super) enum Writer {
+    /// Within the server, in turns with everything else that it writes.
+    Server(Store),
+    /// From the command line, whether or not a server runs.
+    CommandLine(SqlitePool),
+}
+
+impl Writer {
+    /// Opens the database `file` for a command.
+    pub(super) async fn of_command(file: &Path) -> Result<Self, StoreError> {
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            .pragma("wal_autocheckpoint", "0")
+            .synchronous(SqliteSynchronous::Full);
+        Ok(Self::CommandLine(SqlitePoolOptions::new().max_connections(1).connect_with(options).await?))
+    }
+
+    /// The run of the server that writes; `None` for a command.
+    pub(super) fn run(&self) -> Option<i64> {
+        match self {
+            Self::Server(store) => Some(store.run()),
+            Self::CommandLine(_) => None,
+        }
+    }
+
+    /// Writes records. What `write` has committed is on disk when this returns.
+    pub(super) async fn write<T>(
+        &self,
+        write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        match self {
+            Self::Server(store) => store.write(write).await,
+            Self::CommandLine(pool) => write_on(pool, write).await,
+        }
+    }
+
+    /// Closes its connection and those of `reader`, unless they are the server's.
+    pub(super) async fn close(&self, reader: &super::Reader) {
+        if let Self::CommandLine(pool) = self {
+            reader.close().await;
+            pool.close().await;
+        }
+    }
+}

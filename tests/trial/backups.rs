@@ -1,0 +1,79 @@
+//! Backups by the command, to a file and to standard output; and what `verify` says of files that are no whole database.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use crate::exports::with_session;
+
+fn parfocal(arguments: &[&str], data: Option<&Path>) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.args(arguments).stdin(Stdio::null());
+    if let Some(data) = data {
+        command.arg("--data-dir").arg(data);
+    }
+    command.output().unwrap()
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[tokio::test]
+async fn a_backup_to_standard_output_is_a_database_that_verifies_and_restores() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let (trial, _) = with_session(&data).await;
+
+    let sent = parfocal(&["backup", "--out", "-", "--json"], Some(&data));
+    assert!(sent.status.success(), "{}", told(&sent));
+    let summary: serde_json::Value = serde_json::from_str(&told(&sent)).unwrap();
+    assert_eq!(summary["bytes"], sent.stdout.len());
+    assert!(sent.stdout.starts_with(b"SQLite format 3\0"));
+    let left = std::fs::read_dir(&data).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert!(!left.into_iter().any(|name| name.contains("backup")), "nothing is left in the data folder");
+    trial.store.close().await;
+
+    let file = folder.path().join("backup.db");
+    std::fs::write(&file, &sent.stdout).unwrap();
+    let head = summary["head"].as_str().unwrap();
+    let verified = parfocal(&["verify", file.to_str().unwrap(), "--head", head], None);
+    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let restored = parfocal(&["restore", file.to_str().unwrap()], Some(&folder.path().join("elsewhere")));
+    assert!(restored.status.success(), "{}", told(&restored));
+}
+
+#[tokio::test]
+async fn a_receiver_whose_disk_is_full_is_told_to_remove_what_arrived() {
+    let folder = tempfile::tempdir().unwrap();
+    let (trial, _) = with_session(folder.path()).await;
+    trial.store.close().await;
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    let command = command.args(["backup", "--out", "-", "--data-dir"]).arg(folder.path()).stdout(full);
+    let output = command.stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains("remove what arrived of it"), "{}", told(&output));
+}
+
+#[tokio::test]
+async fn verify_says_what_a_zip_file_and_a_database_without_its_log_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let (trial, _) = with_session(&data).await;
+
+    // The server runs, and everything is still in the log beside the database.
+    let copy = folder.path().join("copy.db");
+    std::fs::copy(data.join("parfocal.db"), &copy).unwrap();
+    let output = parfocal(&["verify", copy.to_str().unwrap()], None);
+    assert_eq!(output.status.code(), Some(1));
+    for said in ["has no tables", "ends in -wal", "parfocal backup"] {
+        assert!(told(&output).contains(said), "{}", told(&output));
+    }
+    trial.store.close().await;
+
+    let zip = folder.path().join("export.zip");
+    std::fs::write(&zip, b"PK\x03\x04 and so on").unwrap();
+    let output = parfocal(&["verify", zip.to_str().unwrap()], None);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains("export.zip is a ZIP file: unpack it"), "{}", told(&output));
+}

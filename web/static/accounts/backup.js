@@ -1,0 +1,74 @@
+// The backup of the database: started here, made by the server, and downloaded here. The page asks whether it is ready,
+// and may be closed meanwhile.
+
+import { get, post } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+
+const PATH = "/api/researcher/backup";
+
+/** Time between two questions whether the backup is ready. */
+const ASK_AGAIN_MS = 1000;
+
+/**
+ * A size for people.
+ *
+ * @param {number} bytes
+ */
+export function sizeWords(bytes) {
+  const megabytes = bytes / 1e6;
+  return megabytes < 1 ? `${Math.ceil(bytes / 1e3)} kB` : `${megabytes.toFixed(1)} MB`;
+}
+
+/** Shows the state of the backup, and starts one when the form is sent. */
+export function offerBackup() {
+  const trouble = byId("backup-trouble");
+  const go = byId("backup-go", HTMLButtonElement);
+  const passphrase = byId("backup-passphrase", HTMLInputElement);
+
+  byId("backup", HTMLFormElement).addEventListener("submit", async (event) => {
+    event.preventDefault();
+    go.disabled = true;
+    try {
+      show(await post(PATH, { passphrase: passphrase.value }));
+      passphrase.value = "";
+    } catch (error) {
+      go.disabled = false;
+      tellTrouble(trouble, error);
+    }
+  });
+
+  /** Asks until the backup is made. If the server does not answer, it is asked again. */
+  async function ask() {
+    try {
+      show(await get(PATH));
+    } catch (error) {
+      tellTrouble(trouble, error);
+      setTimeout(ask, ASK_AGAIN_MS);
+    }
+  }
+
+  /** @param {Api.BackupState} now */
+  function show(now) {
+    const isRunning = now.state === "running";
+    go.disabled = isRunning;
+    byId("backup-download").hidden = now.state !== "ready";
+    tell(trouble, now.state === "failed" ? `No backup was made: ${now.reason}.` : "");
+    setText(byId("backup-told"), words(now));
+    if (isRunning) setTimeout(ask, ASK_AGAIN_MS);
+  }
+
+  ask();
+}
+
+/** @param {Api.BackupState} now */
+function words(now) {
+  switch (now.state) {
+    case "running":
+      return "The backup is being made and verified.";
+    case "ready":
+      return `The backup is ready: ${sizeWords(now.bytes)}, chain ${now.head}. It is kept for 15 minutes.`;
+    default:
+      return "";
+  }
+}

@@ -1,0 +1,59 @@
+// What the surgeon says and takes back.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Comments } from "../static/surgeon/comments.js";
+import { Drafts } from "../static/surgeon/drafts.js";
+import { Origins } from "../static/surgeon/origin.js";
+import { Outbox } from "../static/surgeon/outbox.js";
+import { countedIds, FakeDisk, FakeServer, FakeTime, fakeStore, settle, VIEW } from "./around.js";
+
+/** A page in setting 2 of session s. */
+function openPage() {
+  const store = fakeStore();
+  const time = new FakeTime();
+  const newId = countedIds();
+  const server = new FakeServer();
+  const origins = new Origins(store, time, newId);
+  const spare = /** @type {FakeDisk<import("../static/surgeon/outbox.js").Entry>} */ (new FakeDisk());
+  const outbox = new Outbox({
+    store,
+    spare,
+    origins,
+    send: server.send,
+    newId,
+    wall: time.wall,
+    later: time.later,
+  });
+  const here = () => ({ session: "s", segment: "a", setting: 2, frame: 7, run: 1 });
+  const voice = { heldUp: 0, durable: true, trouble: null };
+  const comments = new Comments(outbox, new Drafts(store, origins, newId, "tab"), here, voice);
+  comments.follow(VIEW);
+  return { server, comments };
+}
+
+test("what is taken back stays in the record, and a withdrawal follows it", async () => {
+  const { server, comments } = openPage();
+  const said = comments.say({ kind: "quick", text: "Blurred" });
+  assert.ok(said);
+  comments.withdraw(said);
+  await settle();
+
+  const [first, second] = server.got.map(({ body }) => body);
+  assert.deepEqual([first.kind, first.text], ["quick", "Blurred"]);
+  assert.deepEqual([second.kind, second.text, second.segment], ["withdrawal", first.key, "a"]);
+  assert.notEqual(second.key, first.key);
+});
+
+test("without a network, what was taken back is no longer told as waiting", async () => {
+  const { server, comments } = openPage();
+  server.answers = Array.from({ length: 9 }, () => new TypeError("Failed to fetch"));
+  const slip = comments.say({ kind: "quick", text: "Blurred" });
+  comments.say({ kind: "mark" });
+  await settle();
+  assert.equal(comments.status.text, "Saved here: 2 comments. Sent when the network is back.");
+  assert.ok(slip);
+  comments.withdraw(slip);
+  assert.equal(comments.status.text, "Saved here: 1 comment. Sent when the network is back.");
+});
