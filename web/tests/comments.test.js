@@ -46,7 +46,7 @@ test("what is taken back stays in the record, and a withdrawal follows it", asyn
   assert.notEqual(second.key, first.key);
 });
 
-test("without a network, what was taken back is no longer told as waiting", async () => {
+test("without a network, a comment that was taken back is no longer counted as waiting", async () => {
   const { server, comments } = openPage();
   server.answers = Array.from({ length: 9 }, () => new TypeError("Failed to fetch"));
   const slip = comments.say({ kind: "quick", text: "Blurred" });

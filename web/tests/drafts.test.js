@@ -44,7 +44,7 @@ test("a draft is in one tab until the other takes it over, with its key", () => 
   assert.equal(there.take().key, offered.key);
 });
 
-test("drafts are told apart by the whole of their names", () => {
+test("drafts are distinguished by their whole names", () => {
   const { first } = twoTabs();
   first.open("answer.s/1/remarks").write("a");
   first.open("answer.s/1/remarks-too").write("b");

@@ -75,7 +75,7 @@ test("each phase has a line of its own, which fits on a tablet’s screen", () =
   for (const line of surgeon) assert.ok(line.length > 0 && line.length <= 85, line);
 });
 
-test("the surgeon is told what to do about a pause, and nothing about who made it", () => {
+test("the surgeon reads what to do about a pause, and nothing about its cause", () => {
   const paused = { ...VIEW, paused: true };
   assert.match(surgeonWords({ ...SURGEON, view: paused }), /^Wait for the operator/);
   assert.match(surgeonWords({ ...SURGEON, view: { ...paused, may_resume: true } }), /“Continue”/);
@@ -88,7 +88,7 @@ test("a tablet that holds something is not given back", () => {
   assert.match(surgeonWords({ ...ended, unsaved: true, unsent: true }), /comment in the box/);
 });
 
-test("a server that is not heard is told with the time since when", () => {
+test("a server that does not answer is reported, with the time since when", () => {
   const lost = { ...SURGEON, missed: true };
   assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. You can continue to comment/);
   assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
@@ -96,7 +96,7 @@ test("a server that is not heard is told with the time since when", () => {
   assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);
 });
 
-test("a certificate that has ended is told as the reason, and only while the server is not heard", () => {
+test("an expired certificate is given as the reason, and only while the server does not answer", () => {
   const time = new FakeTime();
   const contact = new Contact(time, null);
   assert.equal(contact.isCertificateOver, false, "a server without a certificate");
@@ -118,7 +118,7 @@ test("a certificate that has ended is told as the reason, and only while the ser
   assert.equal(contact.isCertificateOver, false);
 });
 
-test("before the server has said what is under way, nothing is asked of anybody", () => {
+test("nothing is asked before it is known which session is under way", () => {
   assert.match(surgeonWords({ ...SURGEON, known: false, view: null }), /^Connecting/);
   assert.match(operatorWords({ ...OPERATOR, known: false, view: null }), /^Connecting/);
 });
@@ -155,7 +155,7 @@ test("a server counts as missed 2 s after its connection was lost, or after 7 s 
   assert.equal(contact.isMissed, false);
 });
 
-test("the last seconds of a setting are told calmly, and voice only where it is recorded", () => {
+test("the last seconds of a setting are announced calmly, and voice only if it is recorded", () => {
   assert.match(surgeonWords({ ...SURGEON, view: VIEW, soon: true }), /ends in a moment/);
   assert.match(surgeonWords({ ...SURGEON, view: VIEW }), /and write what you notice/);
   assert.match(surgeonWords({ ...SURGEON, view: { ...VIEW, voice: true } }), /say or write/);

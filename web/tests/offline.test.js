@@ -11,7 +11,7 @@ import { FakeTime, fakeStore, settle, VIEW } from "./around.js";
 
 const HOUR_MS = 3_600_000;
 
-test("the last view comes back as it was told, without what time has overtaken", () => {
+test("the last view comes back as it was sent, without what is out of date", () => {
   const time = new FakeTime();
   const store = fakeStore();
   new LastView(store, "link", time.wall).keep(VIEW);
@@ -145,7 +145,7 @@ test("the screen stays on from a session’s first view to its end, also after t
   assert.equal(awake.advice, "");
 });
 
-test("a browser that does not keep the screen on is told of, and asked again", async () => {
+test("a browser that does not keep the screen on is reported, and asked again", async () => {
   const { around, awake } = screen();
   around.willing = false;
   awake.follow(VIEW);

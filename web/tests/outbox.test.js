@@ -69,7 +69,7 @@ test("without a network the waits double up to eight seconds, and a nudge tries 
   assert.equal(new Set(page.server.got.map(({ body }) => body.key)).size, 1, "always under the same key");
 });
 
-test("a reload sends what was left, in the order in which it was said", async () => {
+test("a reload sends what was left, in the order of entry", async () => {
   const page = openPage();
   const first = page.open();
   page.server.answers = [noNetwork(), noNetwork(), noNetwork()];
@@ -232,7 +232,7 @@ test("a draft that another tab has sent under the same key goes again under a ne
   assert.deepEqual(outbox.waiting, []);
 });
 
-test("whoever waits for answers is told at once when one fails or nobody answers", async () => {
+test("waiting for answers ends at once if one fails or the server does not answer", async () => {
   const page = openPage();
   const outbox = page.open();
   page.server.answers = [noNetwork()];
@@ -253,7 +253,7 @@ test("a failing comment alone does not keep answers from being settled", async (
   assert.equal(await outbox.settled("/answers"), true);
 });
 
-test("a device that stores nothing is said not to be durable, and still sends", async () => {
+test("a device that stores nothing is reported as not durable, and still sends", async () => {
   const page = openPage();
   page.store.full = true;
   const outbox = page.open();
@@ -283,7 +283,7 @@ test("an entry that another tab has sent is no longer waiting here", async () =>
   assert.deepEqual(outbox.waiting, []);
 });
 
-test("each entry tells its place among all that the device said, and how long ago that was", async () => {
+test("each entry has its number among all of the device, and its age", async () => {
   const page = openPage();
   const outbox = page.open();
   page.server.answers = [noNetwork(), noNetwork()];

@@ -34,7 +34,7 @@ test("lengths of time and amounts are as exact as it helps", () => {
   assert.equal(amount(145e9), "145.0 GB");
 });
 
-test("before it starts, the disk's time is told", () => {
+test("before it starts, the time that fits on the disk is shown", () => {
   assert.equal(nowWords(IDLE), "Nothing is being recorded.");
   assert.equal(
     diskWords(IDLE),
@@ -44,7 +44,7 @@ test("before it starts, the disk's time is told", () => {
   assert.equal(diskWords(unmeasured), "The disk has 145.0 GB free; the trial’s reserve is 1.0 GB.");
 });
 
-test("while it runs, lost frames and the protocol's wish are told", () => {
+test("while it runs, lost frames and the protocol's request are shown", () => {
   /** @type {Api.RecordingStatus} */
   const running = { ...IDLE, recording: "mosaic", seconds: 61.9, frames: 1500, bytes: 2.4e9 };
   assert.equal(nowWords(running), "Recording mosaics: 1 min, 1500 frames, 2.4 GB.");

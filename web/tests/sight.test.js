@@ -10,7 +10,7 @@ import { VIEW } from "./around.js";
 const SMALL = { width: 512, reduced: true };
 const LARGE = { width: 2048, reduced: false };
 
-test("a comment is told the size of the picture and the rate of the last two seconds", () => {
+test("a comment has the size of the picture and the rate of the last two seconds", () => {
   const sight = new Sight();
   assert.deepEqual(sight.at(0), { picture_width: null, pictures_per_second: null });
   for (let now = 0; now < 5000; now += 100) sight.see(LARGE, now);
@@ -94,7 +94,7 @@ test("while the tablet is away, the line does not say that the surgeon is lookin
   assert.match(nowWords({ ...facts, view, away: true }), /tablet is away/);
 });
 
-test("the surgeon is told what paused the session", () => {
+test("the surgeon reads what paused the session", () => {
   const words = (/** @type {Api.SurgeonView["paused_by"]} */ by) =>
     pausedWords({ ...VIEW, paused: true, paused_by: by }, "All saved.");
   assert.match(words("operator"), /operator has paused/);

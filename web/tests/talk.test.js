@@ -73,7 +73,7 @@ async function begin({ talk, microphone }) {
 
 const SOUND = new Blob(["sound"]);
 
-test("what is said is about the moment of the press, and ends with its reason", async () => {
+test("a recording belongs to the moment of the press, and ends with its reason", async () => {
   const page = openPage();
   page.talk.press();
   assert.deepEqual([page.talk.state, page.talk.label], ["opening", "Wait…"]);
@@ -96,7 +96,7 @@ test("what is said is about the moment of the press, and ends with its reason", 
   assert.deepEqual([page.talk.state, page.talk.trouble], ["idle", ""]);
 });
 
-test("a pedal held for an hour ends after two minutes, told before, and talks again only when pressed anew", async () => {
+test("a pedal held for an hour ends after two minutes, with a warning, and records again only when pressed", async () => {
   const page = openPage();
   await begin(page);
   await page.time.pass(LIMIT_MS - 10_000);
@@ -165,7 +165,7 @@ test("something that comes in front of the page ends the recording, and the surg
   assert.equal(page.talk.trouble, "");
 });
 
-test("a microphone that is taken away ends the recording, and what was said is kept", async () => {
+test("a microphone that is taken away ends the recording, and its sound is kept", async () => {
   const page = openPage();
   await begin(page);
   page.microphone.heard?.piece(SOUND);
@@ -176,7 +176,7 @@ test("a microphone that is taken away ends the recording, and what was said is k
   assert.match(page.talk.trouble, /taken away\. What you said until then is kept/);
 });
 
-test("a refused microphone is said in a sentence, and leaves no comment", async () => {
+test("a refused microphone is reported in a sentence, and leaves no comment", async () => {
   const page = openPage();
   page.talk.press();
   page.microphone.opened(new MicrophoneTrouble(refusalWords("NotAllowedError")));

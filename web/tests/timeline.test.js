@@ -114,7 +114,7 @@ test("an answer that does not count says why, and what counts instead", () => {
   assert.equal(setAsideWords(other), "3 (another device gave a different answer later; 5 counts)");
 });
 
-test("what a tablet may still hold is said where something may be outstanding", () => {
+test("a tablet's outstanding comments are mentioned if there may be any", () => {
   const timeOf = (/** @type {string} */ moment) => moment.slice(11, 16);
   assert.equal(outstandingWords(null, timeOf), null);
   const until = { counts_until: "2026-01-01T10:30:00Z", devices: 2 };

@@ -205,7 +205,7 @@ async fn a_comment_is_held_spoken_let_go_played_and_typed_out() {
     .await;
 
     researcher.click_labelled("#comment-list .beside", "Type out").await;
-    researcher.sees("#correct-heading", "Type out what was said").await;
+    researcher.sees("#correct-heading", "Transcribe the comment").await;
     assert_eq!(researcher.count("#correct-dialog audio").await, 1, "it can be heard while it is typed");
     researcher.type_into("#correct-new", "It follows my hand").await;
     shoot(researcher, "researcher-voice-1-typing").await;

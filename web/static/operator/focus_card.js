@@ -57,7 +57,7 @@ export function drawFocus(next, session) {
 }
 
 /**
- * In a session the slider shows only where the operator put it. Where the policy left the lens is not told.
+ * In a session the slider shows only where the operator put it, not where the policy left the lens.
  *
  * @param {number | null} byHand
  */

@@ -11,7 +11,7 @@ import { isOver, isUnderWay, lacksConsent } from "./session_words.js";
  *
  * @typedef {object} Facts
  * @property {View | null} view
- * @property {boolean} known whether the server has said which session, if any, is under way
+ * @property {boolean} known whether it is known which session, if any, is under way
  * @property {boolean} missed whether the server has been silent for too long
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it

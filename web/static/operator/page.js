@@ -35,7 +35,7 @@ let checkAgain = () => {};
 
 /** Whether the checks found something to put right before a trial. */
 let wrong = false;
-/** Whether the server has said which session, if any, is under way. */
+/** Whether it is known which session, if any, is under way. */
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator", byId("colour"));

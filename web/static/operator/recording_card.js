@@ -11,11 +11,11 @@ const EVERY_MS = 2000;
 const button = byId("record", HTMLButtonElement);
 let recording = false;
 let busy = false;
-/** What was told about a recording before the session under way. */
+/** The notice about a recording before the session under way. */
 let told = "";
 let notice = "";
 
-/** Another session begins: what became of an earlier one's recording is no longer told. */
+/** Another session begins: the notice about an earlier one's recording is no longer shown. */
 export function forgetNotice() {
   told = notice;
   byId("recording-notice").hidden = true;
@@ -40,7 +40,7 @@ function draw(status) {
  */
 function drawNotice({ notice: now, notice_warns: warns }) {
   notice = now ?? "";
-  // The same words a second time would be told again after another recording.
+  // After another recording the same notice is news again.
   if (recording) told = "";
   const line = byId("recording-notice");
   line.className = warns ? "notice-line warn" : "notice-line";

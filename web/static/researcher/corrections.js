@@ -141,7 +141,7 @@ export function askTranscript(session, comment) {
   const { key } = comment;
   const old = comment.note ?? "";
   ask({
-    heading: old ? "Change what was typed out" : "Type out what was said",
+    heading: old ? "Change the transcript" : "Transcribe the comment",
     consequence:
       "The recording stays as it is. " +
       "What you type is shown beside it, here and in exports, with who typed it and when.",

@@ -33,7 +33,7 @@ async function outstandingNow() {
     const { outstanding } = await get("/api/researcher/sessions/{session}", { session });
     return outstandingWords(outstanding, timeOfDay);
   } catch {
-    // The server checks this again when it is told to unblind.
+    // The server checks this again before it unblinds.
     return null;
   }
 }

@@ -10,7 +10,7 @@ import { Track } from "./track.js";
 /** How many pictures are requested ahead of playback: one second at 25 pictures a second. */
 const AHEAD = 25;
 
-/** Playback begins this many seconds before a comment, because what it is about was seen before it was said. */
+/** Playback begins this many seconds before a comment, because the surgeon saw its subject before commenting. */
 const BEFORE_COMMENT = 3;
 
 /** Elements that need the keys for themselves. */

@@ -1,4 +1,4 @@
-// Sends JSON to the server, and tells three outcomes apart: success, a refusal by the server, no answer.
+// Sends JSON to the server, and distinguishes three outcomes: success, a refusal by the server, no answer.
 
 /** A request that the server refused. Its message is written for people. */
 export class Refused extends Error {

@@ -57,7 +57,7 @@ export class Contact {
     return this.#heardAt;
   }
 
-  /** When the server's certificate ends, in milliseconds since 1970; null if it has none or has not said. */
+  /** When the server's certificate ends, in milliseconds since 1970; null if it has none or is not known yet. */
   get certificateEnd() {
     return this.#certificateEnd;
   }

@@ -8,7 +8,7 @@ const LOOK_MS = 1000;
 /** The server closes the connection with this code when the page's link is no longer valid. */
 const LINK_OVER = 4403;
 
-/** Delay before the server is told the picture's size on the screen. During a pinch the size keeps changing. */
+/** Delay before the picture's size on the screen is sent to the server. During a pinch the size keeps changing. */
 const SCREEN_MS = 150;
 
 /**
@@ -34,7 +34,7 @@ export class Live {
   #screen = null;
   /** Whether the page's link is no longer valid. */
   #over = false;
-  /** Whether a timer runs that will tell the server `#screen`. */
+  /** Whether a timer runs that will send `#screen` to the server. */
   #screenWaits = false;
 
   /** @param {"surgeon" | "operator" | "researcher"} role */

@@ -220,7 +220,7 @@ export class Comments {
     this.#outbox.add(PATH, comment({ kind: "withdrawal", text: key }, { session, segment, frame, run }));
   }
 
-  /** How many comments wait. One that was taken back is no longer told. */
+  /** How many comments wait, without those that were taken back. */
   get #waiting() {
     const bodies = this.#outbox.waiting.filter(({ path }) => path === PATH).map(({ body }) => body);
     const withdrawn = new Set(bodies.filter(({ kind }) => kind === "withdrawal").map(({ text }) => text));
@@ -264,7 +264,7 @@ export class Comments {
   }
 
   /**
-   * Whether all comments are saved, with the text to show. Recordings that wait with them are told on the same line.
+   * Whether all comments are saved, with the text to show. The same line counts recordings that wait.
    *
    * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
    */

@@ -10,7 +10,7 @@ const UNDER_WAY = "under way";
 /** @typedef {Api.SurgeonView | null} View */
 
 /**
- * Throws `error` unless it is a final refusal. The server need not be told about a session that it does not know.
+ * Throws `error` unless it is a final refusal. The server needs no message about a session that it does not know.
  *
  * @param {unknown} error
  */
@@ -25,7 +25,7 @@ export class Holding {
   #unsent;
   #post;
   #later;
-  /** What the server was last told, by session. @type {Map<string, string>} */
+  /** The message last sent to the server, by session. @type {Map<string, string>} */
   #known = new Map();
   #sessions;
   /** @type {View} */

@@ -16,7 +16,7 @@ const KEPT_MS = 2 * 60 * 60 * 1000;
  *
  * @typedef {object} Heard
  * @property {number} heardAt when it was last heard, in milliseconds since 1970
- * @property {number | null} certificateEnd when its certificate ends, likewise; null if it has none or has not said
+ * @property {number | null} certificateEnd when its certificate ends, likewise; null if it has none or is not known
  */
 
 /** @typedef {Heard & { link: string, view: View }} Kept */

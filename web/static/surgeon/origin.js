@@ -1,4 +1,4 @@
-// Where and when something is said: on which device, with which sequence number there, and how long ago. An entry may
+// Where and when something is entered: on which device, with which sequence number there, and how long ago. An entry may
 // wait for the network. Its wait is measured by the page's monotonic clock, which nobody can set.
 
 const DEVICE = "parfocal.device";
@@ -23,7 +23,7 @@ const DRIFT_MS = 1000;
  */
 
 /**
- * Kept with everything that is said.
+ * Kept with every entry.
  *
  * @typedef {object} Stamp
  * @property {string} device
@@ -96,7 +96,7 @@ export class Origins {
   }
 
   /**
-   * A stamp to keep with something that is said now.
+   * A stamp to keep with an entry made now.
    *
    * @returns {Stamp}
    */

@@ -19,7 +19,7 @@ const LONGEST_WAIT_MS = 8000;
  * the same draft under the same key. `stored` says whether this device keeps the entry over a reload.
  *
  * @typedef {object} Entry
- * @property {string} id sorts in the order in which things were said
+ * @property {string} id sorts in the order of entry
  * @property {string} path
  * @property {string | null} slot
  * @property {Stamp} given

@@ -23,7 +23,7 @@
  * @property {(question: Api.Question) => Draft} draft
  * @property {(run: () => void, ms: number) => () => void} later
  * @property {number} settings how many settings there are
- * @property {string[][]} said what the surgeon has said of each setting, to recall it
+ * @property {string[][]} said the surgeon's comments on each setting, as a reminder
  * @property {string} lot the same on every device of the session; a starting order is drawn from it
  */
 
@@ -40,7 +40,7 @@ const SUS_ITEMS = [
   "I needed to learn a lot of things before I could get going with this system.",
 ];
 
-/** Up to this many answers one sees without being told how many are given. */
+/** Up to this many questions, the number of answers given is not shown. */
 const AT_A_GLANCE = 3;
 
 const TYPING_PAUSE_MS = 900;
@@ -491,7 +491,7 @@ export class RankingAnswer extends Answer {
   }
 
   /**
-   * What the surgeon has said of a setting, on one line.
+   * The surgeon's comments on a setting, on one line.
    *
    * @param {number} setting
    */

@@ -18,7 +18,7 @@ const LONGEST_WAIT_MS = 8000;
  *
  * @typedef {object} Begin
  * @property {"begin"} kind
- * @property {string} id sorts in the order in which things were said
+ * @property {string} id sorts in the order of entry
  * @property {string} comment
  * @property {string} session
  * @property {Record<string, unknown>} body
@@ -174,7 +174,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * Whether all recordings are saved, with the text to show. What is held up is told together with the comments.
+   * Whether all recordings are saved, with the text to show. Recordings that are held up are counted with the comments.
    *
    * @returns {{ kind: "" | "saving" | "saved" | "unsaved", text: string }}
    */

@@ -31,7 +31,7 @@ export function steps(state) {
   });
 }
 
-/** The end of a setting is told this many seconds before. */
+/** The end of a setting is announced this many seconds before. */
 const SOON_SECONDS = 10;
 
 /**

@@ -34,7 +34,7 @@ go.onclick = async () => {
   draw(tried);
   try {
     await post("/api/surgeon/tablet-trials", { device: device(store), tried });
-    setText(byId("told"), "The operator’s page tells it, too, in the card “Ready for a trial?”.");
+    setText(byId("told"), "The operator’s page shows it, too, in the card “Ready for a trial?”.");
   } catch (error) {
     tellTrouble(
       byId("told"),

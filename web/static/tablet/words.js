@@ -11,7 +11,7 @@ export const PARTS = {
   },
   storage: {
     name: "Storage for comments",
-    advice: "leave private browsing, or make room on the tablet: what is said would be lost at a reload",
+    advice: "leave private browsing, or make room on the tablet: a reload would lose comments",
   },
   disk: {
     name: "Storage for voice",
