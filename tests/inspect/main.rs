@@ -139,6 +139,9 @@ fn overlays_are_pictures_of_the_same_size_and_none_overwrites_another() {
     }
 }
 
+/// Colours in which an overlay's circle and patch are drawn.
+const DRAWN: [[u8; 3]; 2] = [[0, 220, 255], [255, 220, 0]];
+
 /// A mosaic of 512x256 samples with a bright disc, saved as PNG: fine stripes in every band on it.
 fn striped_mosaic(folder: &TempDir) -> PathBuf {
     let path = folder.path().join("mosaic.png");
@@ -167,12 +170,12 @@ fn a_mosaic_is_developed_at_the_size_that_is_asked_for() {
 
         let picture = image::open(out.join(format!("mosaic.png.{size}.png"))).unwrap().to_rgb8();
         assert_eq!(picture.dimensions(), (width, height));
-        // The overlay lies beside it. In the picture itself no pixel has a colour that is only drawn.
+        // The overlay lies beside it. In the picture itself no pixel has the colours of circle and patch.
         let overlay = image::open(out.join("mosaic.png.overlay.png")).unwrap().to_rgb8();
         assert_eq!(overlay.dimensions(), (width, height));
-        let coloured = |picture: &image::RgbImage| picture.pixels().filter(|p| p[0].abs_diff(p[2]) > 200).count();
-        assert_eq!(coloured(&picture), 0, "{size}");
-        assert!(coloured(&overlay) > 50, "{size}");
+        let drawn = |picture: &image::RgbImage| picture.pixels().filter(|pixel| DRAWN.contains(&pixel.0)).count();
+        assert_eq!(drawn(&picture), 0, "{size}");
+        assert!(drawn(&overlay) > 50, "{size}");
         assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
 
         // Within the patch, where nothing is drawn.
@@ -207,8 +210,11 @@ fn only_mosaics_have_sizes() {
     assert_eq!(output.status.code(), Some(1));
     assert!(complaint(&output).contains("disc.png: --size is for mosaics"), "{}", complaint(&output));
 
-    let output = inspect(&["--json", "--mosaic", "--size", "full", "--out", out], &[&picture, &mosaic]);
+    let coloured = folder.path().join("coloured.png");
+    image::RgbImage::new(64, 64).save(&coloured).unwrap();
+    let output = inspect(&["--json", "--mosaic", "--size", "full", "--out", out], &[&coloured, &mosaic]);
     assert_eq!(output.status.code(), Some(1));
+    assert!(complaint(&output).contains("coloured.png: a mosaic is a gray picture, not"), "{}", complaint(&output));
     assert_eq!(objects(&output).len(), 1, "the mosaic is still developed");
 
     let unknown = inspect(&["--size", "double", "--out", out], &[&mosaic]);

@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::colour::linear_srgb_from_bands;
 use super::frame::MosaicFrame;
 
 /// Bands in one mosaic cell.
@@ -94,16 +93,6 @@ impl Calibration {
         [&self.dark, &self.white].into_iter().all(|reference| match reference {
             Reference::PerBand(_) => true,
             Reference::PerPixel(frame) => frame.width() == width && frame.height() == height,
-        })
-    }
-
-    /// Weights of the white-balanced bands in linear sRGB red, green and blue, with the spectral correction in them.
-    #[must_use]
-    pub fn linear_srgb(&self) -> [[f32; BANDS]; 3] {
-        linear_srgb_from_bands(&self.bands).map(|colour| {
-            std::array::from_fn(|band| {
-                self.correction.iter().zip(colour).map(|(from, weight)| weight * from[band]).sum()
-            })
         })
     }
 

@@ -8,7 +8,7 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, ImageDecoder};
 use turbojpeg::{Colorspace, DecompressHeader, Decompressor, Image, PixelFormat};
 
-use super::decode::{DecodeError, check_size};
+use super::picture::{DecodeError, check_size};
 
 /// Most scans of a progressive picture. More are a trick to keep the decoder busy.
 const MOST_SCANS: u32 = 500;

@@ -8,8 +8,8 @@ use std::sync::Once;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::decode::{DecodeError, LARGEST_MEMORY, LARGEST_SIDE, Picture, Samples, check_size};
 use super::jpeg_read;
+use super::picture::{DecodeError, LARGEST_MEMORY, LARGEST_SIDE, Picture, Samples, check_size};
 use super::tiff::Tiff;
 
 /// A PNG, JPEG or TIFF file.

@@ -10,7 +10,7 @@ mod srgb;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::calibration::{BANDS, Band};
+use super::calibration::{BANDS, Band, Calibration};
 use cie::Spectrum;
 pub(super) use srgb::Encoder;
 
@@ -21,10 +21,22 @@ const BAND_NOISE: f64 = 0.02;
 
 type BandMatrix = SMatrix<f64, BANDS, BANDS>;
 
+impl Calibration {
+    /// Weights of the white-balanced bands in linear sRGB red, green and blue, with the spectral correction in them.
+    #[must_use]
+    pub fn linear_srgb(&self) -> [[f32; BANDS]; 3] {
+        linear_srgb_from_bands(&self.bands).map(|colour| {
+            std::array::from_fn(|band| {
+                self.correction.iter().zip(colour).map(|(from, weight)| weight * from[band]).sum()
+            })
+        })
+    }
+}
+
 /// Three rows that make linear sRGB red, green and blue from white-balanced bands: least squares over
 /// [`reflectances::reflectances`] of band responses (Gaussians) against XYZ under D65,
 /// ridge-regularised by [`BAND_NOISE`], then scaled so that white bands give white.
-pub(super) fn linear_srgb_from_bands(bands: &[Band; BANDS]) -> [[f32; BANDS]; 3] {
+fn linear_srgb_from_bands(bands: &[Band; BANDS]) -> [[f32; BANDS]; 3] {
     let xyz = xyz_from_bands(bands);
     let to_rgb = Matrix3::from_fn(|row, column| srgb::FROM_XYZ[row][column]);
     let rgb = to_rgb * xyz;

@@ -6,7 +6,7 @@ use flate2::read::ZlibDecoder;
 use weezl::BitOrder;
 use weezl::decode::Decoder;
 
-use super::super::decode::DecodeError;
+use super::super::picture::DecodeError;
 
 /// How the samples of a page's chunks are stored.
 pub(super) struct Coding {

@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 
-use super::super::decode::DecodeError;
+use super::super::picture::DecodeError;
 
 /// Most directories that are followed. A chain that is longer is taken for damaged.
 const MOST: usize = 65_536;

@@ -9,8 +9,8 @@ mod directory;
 
 use image::{DynamicImage, ImageBuffer, metadata::Orientation};
 
-use super::decode::{DecodeError, LARGEST_MEMORY, Samples, check_size};
 use super::jpeg_read;
+use super::picture::{DecodeError, LARGEST_MEMORY, Samples, check_size};
 use chunk::Coding;
 use directory::{Container, Directory};
 

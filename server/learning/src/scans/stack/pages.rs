@@ -5,7 +5,8 @@ use std::path::Path;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{PictureFile, Reconstructor, in_blocks};
 
-use super::{Plane, StackError, file_name, listed};
+use super::plane::{Plane, StackError};
+use super::positions::{file_name, listed};
 
 /// The order of pages in focus, and the position of each.
 #[derive(Debug, Clone, PartialEq)]
