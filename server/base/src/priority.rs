@@ -91,7 +91,7 @@ static WITHDRAWN: AtomicBool = AtomicBool::new(false);
 /// Raises the calling thread as far as the process may: to real-time priority (root, `CAP_SYS_NICE` or an
 /// `rtprio` limit), otherwise to a lower niceness (root, or a raised limit). Threads that it starts do not
 /// inherit the real-time priority.
-#[allow(clippy::must_use_candidate, reason = "only the loop tells how it stands")]
+#[allow(clippy::must_use_candidate, reason = "only the loop reads the result")]
 pub fn raise(place: Place) -> Standing {
     if withdrawn() {
         return Standing::Withdrawn;

@@ -1,4 +1,4 @@
-//! The way of a frame, from the camera to the lens and to whoever looks on.
+//! The way of a frame, from the camera to the lens and to the viewers.
 //!
 //! [`control`] is the loop: a frame comes, the policy decides, the lens gets its command; it waits for nobody. [`live`]
 //! makes each frame once into the pictures that viewers get. [`lens_measurement`] measures with a camera how a lens

@@ -56,7 +56,7 @@ pub struct SurgeonView {
     pub answers: BTreeMap<String, AnswerValue>,
     /// Number of comments saved so far in this session, without those that were taken back.
     pub comments: usize,
-    /// The surgeon's own words about each setting, in the order they were said; empty outside the closing questions.
+    /// The surgeon's own words about each setting, in the order of entry; empty outside the closing questions.
     pub said: Vec<Vec<String>>,
 }
 
@@ -86,7 +86,7 @@ pub struct OperatorView {
     pub by_hand: Option<f64>,
     /// The latest pause that has no reason yet; none if every pause has one.
     pub reason_wanted: Option<ReasonWanted>,
-    /// Why the disk has not taken the `unrecorded` event; none if that is not known.
+    /// Why the `unrecorded` event is not on disk yet; none if that is not known.
     pub unrecorded_because: Option<String>,
     /// The latest comments, newest first.
     pub latest_comments: Vec<CommentLine>,

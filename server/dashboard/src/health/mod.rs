@@ -57,7 +57,7 @@ pub enum Code {
 pub struct Problem {
     /// What it is, for programs.
     pub code: Code,
-    /// How bad it is: `degraded` or `failing`.
+    /// Severity: `degraded` or `failing`.
     pub condition: Condition,
     /// What it is, in one sentence for people.
     pub message: &'static str,

@@ -98,7 +98,7 @@ struct NewAccount {
 #[utoipa::path(post, path = "/api/researcher/accounts", tag = "accounts", request_body = NewAccount, responses(
     (status = 200, body = Account),
     (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
-    (status = 409, description = "There is an account of this name or this display name", body = ErrorBody),
+    (status = 409, description = "An account of this name or display name exists", body = ErrorBody),
     (status = 422, description = "A name or passphrase is missing or malformed", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
 async fn make(
@@ -152,7 +152,7 @@ struct ChangeAccount {
     (status = 200, body = Vec<AccountLine>),
     (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
     (status = 404, description = "No such account", body = ErrorBody),
-    (status = 409, description = "It is the last lead who can sign in", body = ErrorBody),
+    (status = 409, description = "The account is of the last lead who can sign in", body = ErrorBody),
     (status = 422, description = "A passphrase is missing or malformed", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
 async fn change(

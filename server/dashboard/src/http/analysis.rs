@@ -116,7 +116,7 @@ fn remarked(protocol: &ProtocolAnalysis) -> Vec<&parfocal_results::analysis::Ana
     params(("study" = String, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
 async fn analysis_page(
     by: Researcher,
     State(app): State<AppState>,
@@ -135,7 +135,7 @@ async fn analysis_page(
     params(("study" = String, Path)), responses(
     (status = 200, body = Analysis),
     (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
 async fn analysis(
     by: Researcher,
     State(app): State<AppState>,
@@ -149,7 +149,7 @@ async fn analysis(
     params(("study" = String, Path)), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
     (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
 async fn analysis_zip(
     by: Researcher,
     State(app): State<AppState>,

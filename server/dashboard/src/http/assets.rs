@@ -191,7 +191,7 @@ pub fn body(name: &str) -> Option<&'static [u8]> {
     ),
     responses(
         (status = 200, description = "The file"),
-        (status = 304, description = "It is as the browser has it"),
+        (status = 304, description = "The browser's copy is current"),
         (status = 404, description = "No such file", body = super::error::ErrorBody),
     )
 )]

@@ -25,7 +25,7 @@ use parfocal_session::conductor::ConductError;
 /// Bytes of a backup that are read and sent at a time.
 const BLOCK: usize = 256 * 1024;
 
-/// A wish for a backup.
+/// A request for a backup.
 #[derive(Deserialize, ToSchema)]
 struct MakeBackup {
     /// The lead's own passphrase, entered again.

@@ -34,10 +34,11 @@ struct Change {
 ///
 /// `/api/operator/camera` and the live status show the value that the camera then uses.
 #[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
-    (status = 204, description = "The camera was asked"),
+    (status = 204, description = "The camera received the request"),
     (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
-    (status = 422, description = "Outside the camera's bounds", body = ErrorBody),
-    (status = 507, description = "The camera was asked, but the log could not be written", body = ErrorBody)))]
+    (status = 422, description = "The value is outside the camera's bounds", body = ErrorBody),
+    (status = 507, description = "The camera received the request, but the log could not be written",
+        body = ErrorBody)))]
 async fn change(
     _: Operator,
     State(app): State<AppState>,

@@ -43,7 +43,7 @@ struct ExportQuery {
     params(("session" = SessionId, Path), ExportQuery), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody)))]
+    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody)))]
 async fn zip(
     by: Researcher,
     State(app): State<AppState>,

@@ -29,7 +29,7 @@ struct Health {
     lens: bool,
     /// Whether the camera or the lens is simulated.
     simulated: bool,
-    /// What is wrong, the worst first.
+    /// Problems, the most severe first.
     problems: Vec<Problem>,
 }
 
@@ -37,8 +37,8 @@ struct Health {
 ///
 /// Answers at once, even while the disk hangs.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses(
-    (status = 200, description = "It does its work: `ok`, or `degraded` where something needs a person", body = Health),
-    (status = 503, description = "It cannot do its work: `failing`", body = Health)))]
+    (status = 200, description = "The server works: `ok`, or `degraded` if a person has to act", body = Health),
+    (status = 503, description = "The server cannot do its work: `failing`", body = Health)))]
 async fn healthz(State(app): State<AppState>) -> (StatusCode, Extension<OwnBody>, Json<Health>) {
     let status = Arc::clone(&app.control.status.borrow());
     let (condition, problems) = app.health.now();

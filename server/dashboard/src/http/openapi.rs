@@ -51,16 +51,16 @@ const OPEN: [&str; 10] = [
 /// Failures that any request may get: status and description.
 const ALWAYS: [(&str, &str); 5] = [
     ("400", "The request cannot be read"),
-    ("408", "It took too long"),
-    ("421", "The server listens on a loopback address and was asked for by another name"),
-    ("500", "The server failed; its log says more"),
+    ("408", "The request took too long"),
+    ("421", "The server listens on a loopback address, and the request names another host"),
+    ("500", "The server failed; see its log"),
     ("503", "Too many pages are open at once"),
 ];
 
 /// Failures that a request with a body may get: status and description.
 const WITH_BODY: [(&str, &str); 3] = [
     ("413", "The body is too long"),
-    ("415", "The body is not said to be application/json"),
+    ("415", "The Content-Type is not application/json"),
     ("422", "The body is JSON, but not as described"),
 ];
 

@@ -242,20 +242,20 @@ async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBo
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
-/// Moves the session on; repeating an action changes nothing. Answers with the session as it is then.
+/// Advances the session; repeating an action changes nothing. Returns the session after the action.
 #[utoipa::path(post, path = "/api/operator/actions", tag = "operator", request_body = Act, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 403, description = "Another role does this", body = ErrorBody),
+    (status = 403, description = "The action belongs to another role", body = ErrorBody),
     (status = 404, description = "No such session or segment", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody),
-    (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
+    (status = 409, description = "The action does not fit the state of the session", body = ErrorBody)))]
 async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     let by = by.for_session(&app, act.session).await?;
     app.conductor.act(by, act.session, act.action).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
-/// Records a participant's consent. Answers with the session as it is then.
+/// Records a participant's consent. Returns the session after that.
 #[utoipa::path(post, path = "/api/operator/consents", tag = "operator", request_body = NewConsent, responses(
     (status = 200, body = Option<OperatorView>),
     (status = 404, description = "No such session", body = ErrorBody),
@@ -280,7 +280,8 @@ struct Dismissal {
 
 /// Takes an ended session off the screens, so that the next can be prepared.
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
-    (status = 200, body = Option<OperatorView>), (status = 409, description = "It is under way", body = ErrorBody)))]
+    (status = 200, body = Option<OperatorView>),
+    (status = 409, description = "The session is under way", body = ErrorBody)))]
 async fn dismiss(
     by: Operator,
     State(app): State<AppState>,

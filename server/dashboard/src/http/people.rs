@@ -78,7 +78,7 @@ pub(super) trait Acting {
     /// The account, if somebody is signed in whose account may act in this role.
     fn account(&self) -> Option<&Account>;
 
-    /// Who acts, for actions for which a role's link is enough.
+    /// The person who acts, for actions that need no more than a role's link.
     fn actor(&self) -> Actor {
         Actor { role: Self::ROLE, account: self.account().map(|account| account.account.clone()) }
     }
@@ -88,7 +88,7 @@ pub(super) trait Acting {
         self.account().ok_or(Error::NeedsAccount(Self::ROLE))
     }
 
-    /// Who acts on `session`. If it belongs to a study, this must be somebody who is signed in.
+    /// The person who acts on `session`. If it belongs to a study, the person must be signed in.
     async fn for_session(&self, app: &App, session: SessionId) -> Result<Actor, Error> {
         if app.conductor.study_of(session).await?.is_some() {
             self.personally()?;

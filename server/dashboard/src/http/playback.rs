@@ -35,7 +35,7 @@ impl From<PlaybackError> for Error {
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionRecordings),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody)))]
+    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody)))]
 async fn recordings(
     by: Researcher,
     State(app): State<AppState>,
@@ -92,7 +92,7 @@ struct PictureQuery {
     responses(
     (status = 200, description = "The picture", content_type = "image/jpeg"),
     (status = 404, description = "No such session, recording or frame", body = ErrorBody),
-    (status = 409, description = "It has not been unblinded, or its participant withdrew", body = ErrorBody),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody),
     (status = 500, description = "The frame is damaged", body = ErrorBody)))]
 async fn frame(
     by: Researcher,

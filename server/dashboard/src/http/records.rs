@@ -24,7 +24,7 @@ use parfocal_trial::erasure::NewErasure;
     (status = 404, description = "No such session or record", body = ErrorBody),
     (status = 409, description = "The session is under way, its participant withdrew, what a surgeon wrote cannot be \
                                   corrected, or somebody has corrected the same meanwhile", body = ErrorBody),
-    (status = 422, description = "It makes no sense, or no reason was given", body = ErrorBody)))]
+    (status = 422, description = "The correction does not fit the record, or no reason was given", body = ErrorBody)))]
 async fn correct(
     by: Researcher,
     State(app): State<AppState>,

@@ -250,7 +250,7 @@ async fn session(
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/course", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "Its participant withdrew", body = ErrorBody)))]
+    (status = 409, description = "The participant withdrew", body = ErrorBody)))]
 async fn course(
     by: Researcher,
     State(app): State<AppState>,
@@ -265,7 +265,7 @@ async fn course(
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "Its participant withdrew", body = ErrorBody)))]
+    (status = 409, description = "The participant withdrew", body = ErrorBody)))]
 async fn timeline(
     by: Researcher,
     State(app): State<AppState>,
@@ -325,8 +325,8 @@ struct Unblind {
     request_body = Unblind, responses(
     (status = 204, description = "Unblinded"),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "Its order would tell that of another session of its balanced set, \
-                                  or something may be outstanding", body = ErrorBody),
+    (status = 409, description = "The order would reveal that of another session of its balanced set, or \
+                                  comments and answers may be outstanding", body = ErrorBody),
     (status = 422, description = "No reason was given, or no passphrase for a session of a study", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
 async fn unblind(

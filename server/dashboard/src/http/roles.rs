@@ -204,8 +204,8 @@ struct EnterQuery {
 
 /// Lets a browser in: takes the key of a role's link, sets the role's cookie and goes to the role's page.
 #[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
-    (status = 303, description = "Let in: the role's cookie, and on to its page"),
-    (status = 403, description = "Not a key of this server, or of a session that has ended",
+    (status = 303, description = "The role's cookie, and a redirect to its page"),
+    (status = 403, description = "The key is not of this server, or its session has ended",
      body = super::error::ErrorBody)))]
 async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
     let key = query.key.trim();
@@ -229,7 +229,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 
 /// The start page: redirects to the page of the role that the browser holds.
 #[utoipa::path(get, path = "/", tag = "roles", responses(
-    (status = 303, description = "On to the role's page"),
+    (status = 303, description = "Redirect to the role's page"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
 async fn start(Roles { held, .. }: Roles) -> Redirect {
     // Somebody who holds more than one role works here, and is not a participant of the trial.

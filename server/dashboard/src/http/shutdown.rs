@@ -2,7 +2,7 @@
 
 use tokio::sync::watch;
 
-/// Waits until the server is told to shut down.
+/// Waits until the server is asked to shut down.
 pub(crate) async fn ended(shutdown: &mut watch::Receiver<bool>) {
     let _ = shutdown.wait_for(|end| *end).await;
 }

@@ -86,11 +86,11 @@ struct SignedInAs {
 
 /// Signs in. The answer takes longer after failed attempts.
 #[utoipa::path(post, path = "/api/sign-in", tag = "accounts", request_body = SignIn, responses(
-    (status = 200, description = "Signed in: a cookie, or a token where it was asked for", body = SignedInAs),
-    (status = 403, description = "Name and passphrase do not belong together, the account is disabled, or another \
-                                  site made the request", body = ErrorBody),
+    (status = 200, description = "Signed in: a cookie, or a token if the request asked for it", body = SignedInAs),
+    (status = 403, description = "The name or passphrase is wrong, the account is disabled, or another site made \
+                                  the request", body = ErrorBody),
     (status = 409, description = "A lead set this passphrase; the person has to choose another", body = ErrorBody),
-    (status = 422, description = "The new passphrase is too short, or the one before", body = ErrorBody),
+    (status = 422, description = "The new passphrase is too short, or the same as before", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody),
     (status = 507, description = "The disk failed", body = ErrorBody)))]
 async fn sign_in(

@@ -101,7 +101,7 @@ impl StudyPage {
             Stage::Open => "Open. The operator can make sessions in it.",
             Stage::Closed => "Closed. No sessions can be made. It can be opened again, or locked permanently.",
             Stage::Locked => "Locked. Nothing can be changed. It can be unblinded.",
-            Stage::Unblinded => "Unblinded. Each session tells which policy ran in which setting.",
+            Stage::Unblinded => "Unblinded. Each session shows which policy ran in which setting.",
         }
     }
 
@@ -143,7 +143,7 @@ pub(super) const fn repetition(rule: Repetition) -> &'static str {
     }
 }
 
-/// Where a change of a study was made. Whoever made it is named beside, and may be a lead, an operator or a researcher.
+/// Where a change of a study was made. The person, who may be a lead, an operator or a researcher, is named beside it.
 pub(super) fn channel(by: &str) -> &'static str {
     if by == Channel::CommandLine.name() { "by a command" } else { "on a page" }
 }
@@ -212,7 +212,7 @@ struct PlanStudy {
 /// Plans a study.
 #[utoipa::path(post, path = "/api/researcher/studies", tag = "researcher", request_body = PlanStudy, responses(
     (status = 200, body = StudyDetail),
-    (status = 409, description = "There is a study of this name", body = ErrorBody),
+    (status = 409, description = "A study of this name exists", body = ErrorBody),
     (status = 422, description = "The definition is malformed, or a reason is missing", body = ErrorBody)))]
 async fn plan_study(
     by: Researcher,
@@ -244,11 +244,11 @@ struct ChangeStudy {
 #[utoipa::path(post, path = "/api/researcher/studies/{study}/changes", tag = "researcher",
     params(("study" = String, Path)), request_body = ChangeStudy, responses(
     (status = 200, body = StudyDetail),
-    (status = 403, description = "Nobody is signed in who may, the passphrase is wrong, or the study names others \
-                                  who may unblind", body = ErrorBody),
+    (status = 403, description = "Nobody with the right is signed in, the passphrase is wrong, or the study lets \
+                                  other people unblind", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody),
     (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "It does not fit where the study stands", body = ErrorBody),
+    (status = 409, description = "The change does not fit the stage of the study", body = ErrorBody),
     (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy",
      body = ErrorBody)))]
 async fn change_study(

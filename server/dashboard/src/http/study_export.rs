@@ -49,7 +49,7 @@ struct ExportStudy {
     params(("study" = String, Path)), request_body = ExportStudy, responses(
     (status = 200, body = StudyExportState),
     (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "It has no session to export, or is not unblinded", body = ErrorBody)))]
+    (status = 409, description = "The study has no session to export, or is not unblinded", body = ErrorBody)))]
 async fn start_study_export(
     by: ResearchReader,
     State(app): State<AppState>,
@@ -79,7 +79,7 @@ async fn study_export(
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/export.zip", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
-    (status = 404, description = "No export of it is finished", body = ErrorBody)))]
+    (status = 404, description = "No export of the study is finished", body = ErrorBody)))]
 async fn study_export_zip(
     by: Researcher,
     State(app): State<AppState>,

@@ -89,12 +89,12 @@ pub(super) struct Act {
     pub(super) action: Action,
 }
 
-/// Moves the session on; repeating an action changes nothing. Answers with the session as it is then.
+/// Advances the session; repeating an action changes nothing. Returns the session after the action.
 #[utoipa::path(post, path = "/api/surgeon/actions", tag = "surgeon", request_body = Act, responses(
     (status = 200, body = Option<SurgeonView>),
-    (status = 403, description = "Another role does this", body = ErrorBody),
+    (status = 403, description = "The action belongs to another role", body = ErrorBody),
     (status = 404, description = "No such session or segment", body = ErrorBody),
-    (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
+    (status = 409, description = "The action does not fit the state of the session", body = ErrorBody)))]
 async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Surgeon, act.session, act.action).await?;
     Ok(Json(app.surgeon_view.borrow().clone()))
@@ -104,7 +104,7 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
 #[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The key stands for another comment", body = ErrorBody),
+    (status = 409, description = "The key belongs to another comment", body = ErrorBody),
     (status = 422, description = "Empty or too long", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn comment(
@@ -121,7 +121,7 @@ async fn comment(
 #[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "No such session or question", body = ErrorBody),
-    (status = 409, description = "It has not been asked yet, or the key stands for another answer", body = ErrorBody),
+    (status = 409, description = "The question is not asked yet, or the key belongs to another answer", body = ErrorBody),
     (status = 422, description = "The value does not fit the question", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn answer(

@@ -55,7 +55,7 @@ struct TriedPart {
 /// Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends.
 #[utoipa::path(post, path = "/api/surgeon/tablet-trials", tag = "surgeon", request_body = TabletTrial, responses(
     (status = 200, description = "Noted", body = bool),
-    (status = 422, description = "Not what the page sends", body = ErrorBody)))]
+    (status = 422, description = "The body is malformed", body = ErrorBody)))]
 async fn tried(
     _: SurgeonsTablet,
     State(app): State<AppState>,

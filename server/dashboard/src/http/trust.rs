@@ -97,7 +97,7 @@ async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error
 
 /// Requested over TLS by the trust page, which was loaded unencrypted: a device that gets the answer trusts the server.
 #[utoipa::path(get, path = "/trust/check", tag = "trust", responses(
-    (status = 204, description = "The answer has arrived; it says nothing else")))]
+    (status = 204, description = "The connection works; the answer is empty")))]
 async fn check() -> impl IntoResponse {
     // While the page is not encrypted, it has another origin.
     (StatusCode::NO_CONTENT, [(ACCESS_CONTROL_ALLOW_ORIGIN, "*")])

@@ -45,8 +45,8 @@ struct PieceQuery {
     responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "The session has no such voice comment", body = ErrorBody),
-    (status = 409, description = "Another piece stands in its place", body = ErrorBody),
-    (status = 422, description = "No sound that browsers record, or too large", body = ErrorBody),
+    (status = 409, description = "The recording has another piece in this place", body = ErrorBody),
+    (status = 422, description = "The sound is of an unknown kind, or too large", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn keep_piece(
     _: SurgeonsTablet,
@@ -68,10 +68,10 @@ async fn keep_piece(
     responses(
     (status = 200, description = "The recording", content(
         (Vec<u8> = "audio/webm;codecs=opus"), (Vec<u8> = "audio/mp4"), (Vec<u8> = "audio/ogg;codecs=opus"))),
-    (status = 206, description = "A part of it"),
-    (status = 404, description = "No such session or recording, or it was erased", body = ErrorBody),
+    (status = 206, description = "A part of the recording"),
+    (status = 404, description = "No such session or recording, or the recording was erased", body = ErrorBody),
     (status = 409, description = "The participant withdrew", body = ErrorBody),
-    (status = 416, description = "It has no such part")))]
+    (status = 416, description = "The recording has no such part")))]
 async fn recording(
     by: Researcher,
     State(app): State<AppState>,

@@ -89,7 +89,7 @@ impl Files {
         };
         let wrong = |problem: String| TlsError::WrongOrder { path: self.certificate.clone(), problem };
 
-        // If the key belongs to none, that is said later, or why it cannot be used.
+        // If the key belongs to none, or cannot be used, a later check reports it.
         if let Some(own) = chain.iter().position(belongs).filter(|&own| own > 0) {
             return Err(wrong(format!("the server's own, to which the key belongs, is number {}", own + 1)));
         }

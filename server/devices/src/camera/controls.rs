@@ -163,6 +163,6 @@ mod tests {
         controls.refuse(Setting::Gain, "busy");
         assert_eq!(controls.offered().trouble.unwrap(), "Gain was not changed: the camera says: busy");
         controls.ask(Setting::Gain, 2.0).unwrap();
-        assert_eq!(controls.offered().trouble, None, "told of the last change alone");
+        assert_eq!(controls.offered().trouble, None, "trouble is reported for the last change alone");
     }
 }

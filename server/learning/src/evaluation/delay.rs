@@ -49,8 +49,8 @@ mod tests {
 
     #[test]
     fn the_error_of_a_late_observer_on_a_hand_worked_course() {
-        // The optimum walks up by 0.02 a frame from the middle. Who is n frames late is 0.02 n behind, once it has
-        // walked so long; before, it stands at the first optimum.
+        // The optimum walks up by 0.02 a frame from the middle. A policy that is n frames late is 0.02 n behind once the
+        // optimum has walked so long; before, the policy stands at the first optimum.
         let optimum: Vec<f64> = (0..20).map(|frame| 0.5 + 0.02 * f64::from(frame)).collect();
         for (late, behind) in [(0, 0.0), (1, 0.02 * 19.0 / 20.0), (2, (0.02 + 0.04 * 18.0) / 20.0)] {
             assert!((late_error(&optimum, late) - behind).abs() < 1e-12, "{late}");

@@ -1,4 +1,4 @@
-//! Who looked at the evidence. Each access is a record of its own, with a row in the chain.
+//! Accesses to the evidence. Each access is a record of its own, with a row in the chain.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -34,7 +34,7 @@ pub struct Backups {
 }
 
 struct Latest {
-    /// Who asked for it. Nobody else gets it.
+    /// Account that requested the backup. No other account gets it.
     by: AccountName,
     stage: Stage,
     /// Distinguishes it from other backups of this server.

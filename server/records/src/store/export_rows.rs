@@ -122,7 +122,7 @@ impl Reader {
         self.hand_out(session, sql, take).await
     }
 
-    /// Who looked at `session`.
+    /// The accesses to `session`.
     pub(super) async fn export_accesses(&self, session: SessionId) -> Result<Vec<AccessRow>, StoreError> {
         let rows = sqlx::query("SELECT * FROM accesses WHERE session = ? ORDER BY number")
             .bind(session.to_string())

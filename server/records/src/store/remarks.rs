@@ -184,8 +184,8 @@ impl Reader {
         rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
     }
 
-    /// The surgeons' devices on which something of `session` was said or that reported what they hold of it, each with
-    /// its last report.
+    /// The surgeons' devices that sent comments or answers of `session`, or reported how many they hold, each with its
+    /// last report.
     ///
     /// # Errors
     /// If the database fails.

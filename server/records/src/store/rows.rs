@@ -36,13 +36,13 @@ pub struct Comment {
     pub frame: Option<u64>,
     /// The run that counted the frame.
     pub frame_run: Option<i64>,
-    /// Where and when it was said, as the page reported.
+    /// Device and time of the comment, as the page reported them.
     pub origin: Origin,
     /// Whether it arrived too late to count.
     pub late: bool,
     /// When it was kept.
     pub stamp: Stamp,
-    /// What was said.
+    /// Content of the comment.
     pub said: CommentContent,
 }
 
@@ -126,30 +126,30 @@ pub struct Participant {
 pub struct SessionLine {
     /// Session.
     pub session: SessionId,
-    /// When it was made, by the server's wall clock.
+    /// When the session was made, by the server's wall clock.
     #[schema(value_type = String)]
     pub created: Timestamp,
-    /// Participant's code, as it was recorded.
+    /// Code of the participant, as it was recorded.
     pub participant: String,
-    /// The right code, where that was corrected.
+    /// Corrected code of the participant; none if it was not corrected.
     pub corrected_participant: Option<String>,
-    /// Protocol's name.
+    /// Name of the protocol.
     pub protocol: String,
-    /// Whether it is practice.
+    /// Whether it is a practice session.
     pub practice: bool,
-    /// The study that it belongs to; none where it is outside any study.
+    /// The study that it belongs to; none if it belongs to none.
     pub study: Option<String>,
-    /// How far it came.
+    /// State of the session.
     pub status: SessionStatus,
-    /// Settings inspected to the end.
+    /// Number of settings inspected to the end.
     pub finished_settings: i64,
-    /// Settings in all.
+    /// Number of settings in the session.
     pub settings: i64,
-    /// Comments kept.
+    /// Number of comments recorded.
     pub comments: i64,
-    /// Whether it was told which policies ran.
+    /// Whether it was unblinded.
     pub unblinded: bool,
-    /// Whether that was while it was under way.
+    /// Whether it was unblinded while it was under way.
     pub emergency: bool,
     /// Whether the participant withdrew: its data stay out of exports.
     pub withdrawn: bool,
@@ -204,8 +204,8 @@ impl RunClocks {
         start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
     }
 
-    /// When something was said that arrived at `at` in run `run`: its time of arrival, less its wait on the surgeon's
-    /// device.
+    /// When a comment or answer was entered that arrived at `at` in run `run`: the arrival minus its wait on the
+    /// surgeon's device.
     #[must_use]
     pub fn said(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
         let arrived = self.wall(run, at);

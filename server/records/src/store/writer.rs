@@ -1,4 +1,4 @@
-//! Who writes records: the server, or a command beside it.
+//! The writer of records: the server, or a command beside it.
 
 use std::path::Path;
 use std::time::Duration;

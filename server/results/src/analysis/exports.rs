@@ -136,7 +136,7 @@ struct ExportedSession {
     /// The policies of its settings, in order.
     schedule: Vec<String>,
     motions: Vec<Motion>,
-    /// What tells its database from others: the hash of the first row of its chain, which is random.
+    /// Identity of its database: the hash of the first row of its chain, which is random.
     database: String,
     /// The row of the chain with the session, which tells the order in which sessions were made.
     made: i64,

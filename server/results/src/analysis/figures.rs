@@ -1,4 +1,4 @@
-//! Figures of an analysis as SVG, for the page and for print: black and gray, told apart by shape.
+//! Figures of an analysis as SVG, for the page and for print: black and gray, distinguished by shape.
 
 use super::comparison::Comparison;
 use super::outcomes::{FOCAL_ERROR, Outcome};

@@ -29,9 +29,9 @@ pub struct Outcome {
     pub unit: String,
     /// Which end is better, if known: `higher` or `lower`.
     pub better: Option<&'static str>,
-    /// Lowest possible value, if there is one.
+    /// Lowest possible value; none if there is no limit.
     pub lowest: Option<f64>,
-    /// Highest possible value, if there is one.
+    /// Highest possible value; none if there is no limit.
     pub highest: Option<f64>,
 }
 

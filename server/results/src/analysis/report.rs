@@ -25,7 +25,7 @@ pub struct Analysis {
     pub unblinded: Timestamp,
     /// Names of the study's sites that this database, or the databases of this package, run.
     pub sites: Vec<String>,
-    /// Names of the definition's sites of which no session is here.
+    /// Names of the definition's sites that have no session in this analysis.
     pub missing_sites: Vec<String>,
     /// Seed of resamples and permutations: the first 16 hexadecimal digits of `definition_sha256`.
     pub seed: String,
@@ -136,7 +136,7 @@ pub struct Words {
     pub question: Option<String>,
     /// The words; empty if they were erased.
     pub text: String,
-    /// Whether it arrived after the time in which what a surgeon's device held still counted.
+    /// Whether it arrived too late to count.
     pub late: bool,
     /// Whether its words were erased.
     pub erased: bool,

@@ -12,31 +12,34 @@ table! {
     /// A session.
     #[derive(Debug, Clone)]
     SessionRow {
-        session: SessionId = means("Session's random id"),
-        protocol: String = means("Protocol's name"),
-        site: String = means("Site"),
-        surgeon: Option<String> = means("Participant's code, as it was corrected; empty of a withdrawn session"),
+        session: SessionId = means("Random id of the session"),
+        protocol: String = means("Name of the protocol"),
+        site: String = means("Name of the site"),
+        surgeon: Option<String> =
+            means("Code of the participant, with corrections applied; empty if the session was withdrawn"),
         counts: bool = means("Whether the session counts in the analysis"),
-        remark: Option<String> = means("Why it does not count, or what is to be known of it"),
+        remark: Option<String> =
+            means("Reason why the session does not count, or a remark on it; empty if there is none"),
     }
 }
 
 table! {
     name: "analysis_values",
-    description: "Every value that was compared: one for each outcome and setting of the sessions that count",
+    description: "Every compared value: one for each outcome and setting of the sessions that count",
     key: [session, setting, outcome],
     row:
     /// A value of an outcome in a setting.
     #[derive(Debug, Clone)]
     ValueRow {
-        session: SessionId = means("Session's random id"),
-        protocol: String = means("Protocol's name"),
-        surgeon: String = means("Participant's code, as it was corrected"),
+        session: SessionId = means("Random id of the session"),
+        protocol: String = means("Name of the protocol"),
+        surgeon: String = means("Code of the participant, with corrections applied"),
         setting: usize = means("Number of the setting in the session, from 1"),
-        policy: String = means("Policy that ran"),
-        repeat: usize = means("Which of the policy's settings in the session, from 1"),
-        outcome: String = means("Outcome; see analysis_policies"),
-        value: Option<f64> = means("The value; empty where it is missing"),
+        policy: String = means("Name of the policy that ran"),
+        repeat: usize = means("Number of the setting among those of the policy in the session, from 1"),
+        outcome: String = means("Name of the outcome, as in analysis_policies"),
+        value: Option<f64> =
+            means("Value of the outcome, in the unit that analysis_policies names; empty if it is missing"),
     }
 }
 
@@ -48,70 +51,83 @@ table! {
     /// Summary of a policy's values.
     #[derive(Debug, Clone)]
     PolicyRow {
-        protocol: String = means("Protocol's name"),
-        outcome: String = means("Outcome: question and measure, or a quantity of the focal power"),
-        label: String = means("The outcome in words"),
-        unit: String = means("Its unit or scale"),
-        better: Option<&'static str> = means("Which end is better, higher or lower, where that is known"),
-        policy: String = means("Policy"),
-        n: usize = means("Settings with a value"),
-        missing: usize = means("Settings without a value"),
-        mean: Option<f64> = means("Mean over the settings"),
-        median: Option<f64> = means("Median"),
-        sd: Option<f64> = means("Standard deviation of the sample (divided by n - 1)"),
+        protocol: String = means("Name of the protocol"),
+        outcome: String = means("Name of the outcome: question and measure, or a quantity of the focal power"),
+        label: String = means("Name of the outcome in words"),
+        unit: String = means("Unit or scale of the outcome"),
+        better: Option<&'static str> =
+            means("Better end of the scale: higher or lower; empty if neither is known to be better"),
+        policy: String = means("Name of the policy"),
+        n: usize = means("Number of settings with a value"),
+        missing: usize = means("Number of settings without a value"),
+        mean: Option<f64> = means("Mean over the settings, in the outcome's unit; empty without a value"),
+        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
+        sd: Option<f64> = means(
+            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
+             values",
+        ),
     }
 }
 
 table! {
     name: "analysis_sites",
-    description: "Each outcome by policy at each site, where sessions of several sites count",
+    description: "Each outcome by policy at each site; no rows if only one site has sessions that count",
     key: [protocol, outcome, site, policy],
     row:
     /// Summary of a policy's values at a site.
     #[derive(Debug, Clone)]
     SiteRow {
-        protocol: String = means("Protocol's name"),
-        outcome: String = means("Outcome; see analysis_policies"),
-        site: String = means("Site"),
-        surgeons: usize = means("Surgeons of the site whose sessions count"),
-        sessions: usize = means("Sessions of the site that count"),
-        policy: String = means("Policy"),
-        n: usize = means("Settings with a value"),
-        missing: usize = means("Settings without a value"),
-        mean: Option<f64> = means("Mean over the settings"),
-        median: Option<f64> = means("Median"),
-        sd: Option<f64> = means("Standard deviation of the sample (divided by n - 1)"),
+        protocol: String = means("Name of the protocol"),
+        outcome: String = means("Name of the outcome, as in analysis_policies"),
+        site: String = means("Name of the site"),
+        surgeons: usize = means("Number of surgeons of the site whose sessions count"),
+        sessions: usize = means("Number of sessions of the site that count"),
+        policy: String = means("Name of the policy"),
+        n: usize = means("Number of settings with a value"),
+        missing: usize = means("Number of settings without a value"),
+        mean: Option<f64> = means("Mean over the settings, in the outcome's unit; empty without a value"),
+        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
+        sd: Option<f64> = means(
+            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
+             values",
+        ),
     }
 }
 
 table! {
     name: "analysis_tests",
-    description: "What is tested of each outcome over all policies; surgeons with a missing value are left out",
+    description: "The tests of each outcome over all policies; surgeons with a missing value are left out",
     key: [protocol, outcome],
     row:
     /// The tests of an outcome.
     #[derive(Debug, Clone)]
     TestRow {
-        protocol: String = means("Protocol's name"),
-        outcome: String = means("Outcome; see analysis_policies"),
-        surgeons: usize = means("Surgeons without a missing value: those that are tested"),
-        left_out: usize = means("Surgeons who are left out because a value is missing"),
-        friedman_chi_square: Option<f64> = means("Friedman's statistic, corrected for ties; empty where not tested"),
-        friedman_df: Option<usize> = means("Its degrees of freedom"),
-        friedman_p_chi_square: Option<f64> = means("Its p from the chi-square distribution"),
-        friedman_p_permutation: Option<f64> = means("Its p over permutations of each surgeon's ranks"),
-        permutations: Option<String> = means("exact: over all of them; monte-carlo: over 9999 that were drawn"),
-        kendalls_w: Option<f64> = means("Kendall's W, 0 to 1: how far the surgeons agree on an order of policies"),
-        kendalls_w_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        kendalls_w_high: Option<f64> = means("Upper end of that interval"),
+        protocol: String = means("Name of the protocol"),
+        outcome: String = means("Name of the outcome, as in analysis_policies"),
+        surgeons: usize = means("Number of surgeons tested: those without a missing value"),
+        left_out: usize = means("Number of surgeons left out because a value is missing"),
+        friedman_chi_square: Option<f64> = means("Friedman's chi-square, corrected for ties; empty if not tested"),
+        friedman_df: Option<usize> = means("Degrees of freedom of Friedman's test; empty if not tested"),
+        friedman_p_chi_square: Option<f64> =
+            means("p of Friedman's test from the chi-square distribution; empty if not tested"),
+        friedman_p_permutation: Option<f64> =
+            means("p of Friedman's test over permutations of each surgeon's ranks; empty if not tested"),
+        permutations: Option<String> =
+            means("Permutations used: exact (all of them) or monte-carlo (9999 random ones); empty if not tested"),
+        kendalls_w: Option<f64> =
+            means("Kendall's W, 0 to 1: how far the surgeons agree on an order of policies; empty if not tested"),
+        kendalls_w_low: Option<f64> =
+            means("Lower end of the 95 % bootstrap interval of Kendall's W over surgeons; empty if not computed"),
+        kendalls_w_high: Option<f64> =
+            means("Upper end of the 95 % bootstrap interval of Kendall's W over surgeons; empty if not computed"),
         icc: Option<f64> = means("ICC(A,1) of the repeats of a policy in a session; empty without repeats"),
-        icc_low: Option<f64> = means("Lower end of its 95 % interval"),
-        icc_high: Option<f64> = means("Upper end of that interval"),
-        icc_subjects: usize = means("Policies of sessions that it compares"),
-        page_l: Option<f64> = means("Page's L over the positions in the session; empty where not tested"),
-        page_l_expected: Option<f64> = means("What L is on average without a trend"),
-        page_p: Option<f64> = means("Its two-sided p"),
-        page_sessions: usize = means("Sessions without a missing value"),
+        icc_low: Option<f64> = means("Lower end of the 95 % interval of the ICC; empty if not computed"),
+        icc_high: Option<f64> = means("Upper end of the 95 % interval of the ICC; empty if not computed"),
+        icc_subjects: usize = means("Number of pairs of session and policy that the ICC compares"),
+        page_l: Option<f64> = means("Page's L over the positions in the session; empty if not tested"),
+        page_l_expected: Option<f64> = means("Expected value of L without a trend; empty if not tested"),
+        page_p: Option<f64> = means("Two-sided p of Page's test; empty if not tested"),
+        page_sessions: usize = means("Number of sessions that Page's test uses: those without a missing value"),
         difference: String = means("Whether policies differ, in a sentence"),
         agreement: String = means("How far repeats agree, in a sentence"),
         position: String = means("Whether values rise or fall with the position, in a sentence"),
@@ -120,71 +136,86 @@ table! {
 
 table! {
     name: "analysis_pairs",
-    description: "Each outcome between each two policies, by the surgeons' means",
+    description: "Comparison of each two policies in each outcome, by the surgeons' means",
     key: [protocol, outcome, a, b],
     row:
     /// Two policies compared.
     #[derive(Debug, Clone)]
     PairRow {
-        protocol: String = means("Protocol's name"),
-        outcome: String = means("Outcome; see analysis_policies"),
-        a: String = means("One policy"),
-        b: String = means("The other"),
-        surgeons: usize = means("Surgeons compared"),
-        differing: usize = means("Surgeons whose means differ; the signed-rank test leaves out the others"),
+        protocol: String = means("Name of the protocol"),
+        outcome: String = means("Name of the outcome, as in analysis_policies"),
+        a: String = means("Name of the first policy"),
+        b: String = means("Name of the second policy"),
+        surgeons: usize = means("Number of surgeons compared"),
+        differing: usize =
+            means("Number of surgeons whose means differ; the signed-rank test leaves out the others"),
         w_positive: f64 = means("Sum of the ranks where a is higher"),
         w_negative: f64 = means("Sum of the ranks where b is higher"),
         p: f64 = means("Two-sided p of Wilcoxon's signed-rank test"),
-        method: String = means("How p was computed: exact or normal-approximation"),
+        method: String = means("Method that computed p: exact or normal-approximation"),
         p_holm: f64 = means("p corrected by Holm's method for the pairs of the outcome"),
-        rank_biserial: Option<f64> = means("Rank-biserial correlation, -1 to 1: above 0 where a is higher"),
-        rank_biserial_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        rank_biserial_high: Option<f64> = means("Upper end of that interval"),
-        mean_difference: f64 = means("Mean of a less mean of b, in the outcome's unit"),
-        mean_difference_low: Option<f64> = means("Lower end of its 95 % bootstrap interval over surgeons"),
-        mean_difference_high: Option<f64> = means("Upper end of that interval"),
+        rank_biserial: Option<f64> =
+            means("Rank-biserial correlation, -1 to 1, above 0 if a is higher; empty if no surgeon's means differ"),
+        rank_biserial_low: Option<f64> = means(
+            "Lower end of the 95 % bootstrap interval of the rank-biserial correlation over surgeons; empty if not \
+             computed",
+        ),
+        rank_biserial_high: Option<f64> = means(
+            "Upper end of the 95 % bootstrap interval of the rank-biserial correlation over surgeons; empty if not \
+             computed",
+        ),
+        mean_difference: f64 = means("Mean of a minus mean of b, in the outcome's unit"),
+        mean_difference_low: Option<f64> = means(
+            "Lower end of the 95 % bootstrap interval of mean_difference over surgeons; empty if not computed",
+        ),
+        mean_difference_high: Option<f64> = means(
+            "Upper end of the 95 % bootstrap interval of mean_difference over surgeons; empty if not computed",
+        ),
         median_difference: f64 = means("Median of the surgeons' differences, in the outcome's unit"),
     }
 }
 
 table! {
     name: "analysis_whole_sessions",
-    description: "Closing questions about whole sessions, which no policy can be given",
+    description: "Closing questions, which are about whole sessions and not about a policy",
     key: [protocol, outcome],
     row:
     /// Summary of the answers to a closing question.
     #[derive(Debug, Clone)]
     WholeRow {
-        protocol: String = means("Protocol's name"),
-        outcome: String = means("Question and measure"),
-        label: String = means("The outcome in words"),
-        unit: String = means("Its unit or scale"),
-        n: usize = means("Sessions with an answer"),
-        missing: usize = means("Sessions without one"),
-        mean: Option<f64> = means("Mean over the sessions"),
-        median: Option<f64> = means("Median"),
-        sd: Option<f64> = means("Standard deviation of the sample (divided by n - 1)"),
+        protocol: String = means("Name of the protocol"),
+        outcome: String = means("Name of the outcome: question and measure"),
+        label: String = means("Name of the outcome in words"),
+        unit: String = means("Unit or scale of the outcome"),
+        n: usize = means("Number of sessions with an answer"),
+        missing: usize = means("Number of sessions without an answer"),
+        mean: Option<f64> = means("Mean over the sessions, in the outcome's unit; empty without a value"),
+        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
+        sd: Option<f64> = means(
+            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
+             values",
+        ),
     }
 }
 
 table! {
     name: "analysis_words",
-    description: "What surgeons said, with the policy that ran",
+    description: "Comments and answers in words, with the policy that ran",
     key: [session, number],
     row:
     /// A comment or an answer in words.
     #[derive(Debug, Clone)]
     WordsRow {
-        session: SessionId = means("Session's random id"),
-        number: usize = means("Order in the session: by setting, then as it was kept"),
-        protocol: String = means("Protocol's name"),
-        surgeon: String = means("Participant's code, as it was corrected"),
+        session: SessionId = means("Random id of the session"),
+        number: usize = means("Number in the session, from 1: by setting, then in the order of recording"),
+        protocol: String = means("Name of the protocol"),
+        surgeon: String = means("Code of the participant, with corrections applied"),
         setting: Option<usize> = means("Number of the setting, from 1; empty outside the settings"),
-        policy: Option<String> = means("Policy that ran; empty outside the settings"),
-        question: Option<String> = means("The question that it answers; empty of a comment"),
-        text: String = means("The words; empty where they were erased"),
-        late: bool = means("Whether it arrived after the time in which what a surgeon's device held counted"),
-        erased: bool = means("Whether its words were erased"),
+        policy: Option<String> = means("Name of the policy that ran; empty outside the settings"),
+        question: Option<String> = means("Text of the question; empty for a comment"),
+        text: String = means("Words of the comment or answer; empty if they were erased"),
+        late: bool = means("Whether the comment or answer arrived too late to count"),
+        erased: bool = means("Whether the words were erased"),
     }
 }
 
@@ -381,4 +412,18 @@ impl ProtocolAnalysis {
 /// A name as it is written in JSON.
 fn kebab(name: &impl serde::Serialize) -> String {
     serde_json::to_value(name).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_column_that_may_be_empty_says_when() {
+        for table in TABLES {
+            for column in table.columns.iter().filter(|column| column.may_be_empty) {
+                assert!(column.description.contains("empty"), "{}.{}", table.name, column.name);
+            }
+        }
+    }
 }

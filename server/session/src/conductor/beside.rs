@@ -25,7 +25,7 @@ pub struct CorrectionLine {
     /// When it was recorded, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Who recorded it.
+    /// Role that recorded it.
     pub by: Role,
     /// The corrected record, in words.
     pub about: String,
@@ -59,7 +59,7 @@ pub struct WithdrawalLine {
     /// When it was recorded, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Who recorded it.
+    /// Role that recorded it.
     pub by: Role,
     /// The personal account of the person who recorded it, if signed in.
     pub account: Option<String>,

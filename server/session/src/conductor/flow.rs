@@ -298,7 +298,7 @@ impl Shared {
         let shown = live.shown();
         let because = live.unrecorded_because.as_deref();
         let (surgeon, operator) = shown.map(|course| views::both(course, because, now)).unzip();
-        // The operator first: that view tells which tablets may see the surgeon's.
+        // The operator first: that view decides which tablets may see the surgeon's.
         replace_if_changed(&self.operator, operator);
         replace_if_changed(&self.surgeon, surgeon);
     }

@@ -113,7 +113,7 @@ impl Shared {
     async fn of_earlier(&self, session: SessionId) -> Result<SessionFacts, ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.run_clock.clocks);
-        // If the protocol cannot be read, accept voice, so that nothing that was said is lost.
+        // If the protocol cannot be read, accept voice, so that no comment is lost.
         let voice = stored.protocol().map_or(true, |protocol| protocol.voice);
         let segments = stored.made.segments.into_iter().map(|(segment, _)| segment).collect();
         Ok(SessionFacts { segments, grace, voice })

@@ -35,11 +35,11 @@ pub struct SessionDetail {
     pub researcher_title: String,
     /// Algorithm that drew the order.
     pub algorithm: &'static str,
-    /// SHA-256 with which the order was committed to when the session was made.
+    /// SHA-256 published when the session was made, which commits to the order.
     pub commitment: String,
     /// The session's settings, in order.
     pub settings_detail: Vec<SettingDetail>,
-    /// Answers that count, in the order they were given; none once the participant has withdrawn.
+    /// Answers that count, in the order of entry; none once the participant has withdrawn.
     pub answers: Vec<AnswerLine>,
     /// Corrections, oldest first. Once the participant has withdrawn, only those of the participant.
     pub corrections: Vec<CorrectionLine>,
@@ -47,7 +47,8 @@ pub struct SessionDetail {
     pub consents: Vec<ConsentLine>,
     /// The participant's withdrawal, if there is one.
     pub withdrawal: Option<WithdrawalLine>,
-    /// Time, by the server's clock, until which what arrives counts; none while the session is under way.
+    /// Time, by the server's clock, until which arriving comments and answers count; none while the session is under
+    /// way.
     #[schema(value_type = Option<String>)]
     pub counts_until: Option<Timestamp>,
     /// What may still arrive and would not count after unblinding.

@@ -58,7 +58,7 @@ pub struct StudyDetail {
     pub analysis: String,
     /// The line to print, publish or mail before the first session; none until the orders are drawn.
     pub commitment_line: Option<String>,
-    /// What in the plan cannot work as it is meant, in sentences; empty once the study is open.
+    /// Concerns about the plan, in sentences; empty once the study is open.
     pub concerns: Vec<String>,
     /// Number of sessions for which a surgeon's device may still hold something that would not count after locking. 0
     /// unless the study is closed.
@@ -119,9 +119,9 @@ pub struct StudyLogLine {
     /// When it happened, by the wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Where it came from: a role, or the command line.
+    /// How the event was recorded: by a role, or on the command line.
     pub by: &'static str,
-    /// The person who did it, as given in the signature.
+    /// Name of the person, as given in the signature.
     pub person: String,
     /// What happened.
     pub text: String,

@@ -107,13 +107,13 @@ pub struct TimelineComment {
     /// When it was stored, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.
+    /// When the comment was made, in seconds: the time that it waited on the surgeon's device is subtracted.
     pub seconds: f64,
     /// Setting, from 1; none outside settings.
     pub setting: Option<usize>,
     /// Number of the frame that was on screen.
     pub frame: Option<u64>,
-    /// Whether it arrived after the time in which what a surgeon's device held still counted.
+    /// Whether it arrived too late to count.
     pub late: bool,
     /// The content of the comment; empty if it was erased.
     #[serde(flatten)]
@@ -148,7 +148,7 @@ pub struct SetAside {
     /// When it was stored, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// When it was given, in seconds: the time that it waited on the surgeon's device is subtracted.
+    /// When the answer was given, in seconds: the time that it waited on the surgeon's device is subtracted.
     pub seconds: f64,
     /// Setting, from 1; none for a closing question.
     pub setting: Option<usize>,
@@ -210,7 +210,7 @@ impl Conductor {
             said: comment.said,
         });
 
-        // What was said without a network arrived late. It stands where it was said.
+        // A comment made without a network arrives late, but is shown at the time it was made.
         let mut comments: Vec<TimelineComment> = comments.collect();
         comments.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
 
@@ -384,7 +384,7 @@ fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
     spans
 }
 
-/// What the surgeon saw. Each of these events tells of the time before it.
+/// What the surgeon saw. Each of these events describes the time before it.
 fn sights(events: &[(f64, &EventKind)]) -> Vec<SightSpan> {
     let span = |&(to, kind): &(f64, &EventKind)| match kind {
         EventKind::PicturesSeen { size, pictures, over_ms, .. } => Some(SightSpan {

@@ -28,7 +28,7 @@ pub struct RecordingStatus {
     pub bytes_per_second: Option<f64>,
     /// Bytes free on the disk.
     pub free_bytes: Option<u64>,
-    /// Of these, the bytes that recordings leave free.
+    /// Bytes of these that recordings leave free.
     pub reserve_bytes: Option<u64>,
     /// Seconds after which a recording would stop by itself.
     pub seconds_left: Option<f64>,

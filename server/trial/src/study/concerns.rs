@@ -1,5 +1,5 @@
-//! What in a study's plan cannot work as it is meant. Each concern is told when the study is planned, and has to be
-//! confirmed when it is opened: after that, the plan cannot be changed.
+//! Concerns about a study's plan: what in it cannot work as intended. Each is shown when the study is planned, and has
+//! to be confirmed when it is opened, because the plan cannot be changed afterwards.
 
 use super::definition::{Definition, Site};
 use crate::account::Account;

@@ -22,7 +22,7 @@ use parfocal_base::ids::SessionId;
 pub enum Change {
     /// Allow sessions to be made. The first time, the orders are drawn.
     Open {
-        /// Whether to open it the first time even though its plan cannot work as it is meant.
+        /// Whether to open it the first time although its plan has concerns.
         #[serde(default)]
         despite_concerns: bool,
     },

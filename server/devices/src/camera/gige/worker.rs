@@ -9,7 +9,7 @@ use super::shared::Shared;
 /// Time between two attempts to find a camera that is lost or not there yet.
 const RETRY: Duration = Duration::from_millis(300);
 
-/// Streams from `device` until told to stop. If the camera is lost, or not there yet, opens it again. Every picture must
+/// Streams from `device` until asked to stop. If the camera is lost, or not there yet, opens it again. Every picture must
 /// be of `size`, for which everything else was set up.
 pub fn run(shared: &Shared, setup: &Setup, device: Option<Device>, size: (usize, usize)) {
     let mut number = 0;

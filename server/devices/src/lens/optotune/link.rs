@@ -60,7 +60,7 @@ pub enum LinkError {
     /// The bytes that came back are not a reply.
     #[error(transparent)]
     Wire(#[from] WireError),
-    /// The thread was told to end.
+    /// The thread was asked to end.
     #[error("closing")]
     Stopped,
 }
@@ -295,7 +295,7 @@ impl<'a> Link<'a> {
         error
     }
 
-    /// Sends the bytes that wait. Then waits until bytes come, the slot is filled, the thread is told to end, or
+    /// Sends the bytes that wait. Then waits until bytes come, the slot is filled, the thread is asked to end, or
     /// `until`.
     pub fn pump(&mut self, until: Moment) -> Result<(), LinkError> {
         self.take_command();

@@ -56,7 +56,7 @@ pub fn let_go_of_all() {
         open.drain(..).filter_map(|shared| shared.upgrade()).collect()
     };
 
-    // All are told before any is waited for, so that they do it at the same time.
+    // All are asked to end before any is waited for, so that they end at the same time.
     for shared in &open {
         shared.end();
     }

@@ -34,7 +34,7 @@ pub struct Shared {
 }
 
 /// Everything known about the device.
-#[allow(clippy::struct_excessive_bools, reason = "each is told of the device by itself; no two make a state")]
+#[allow(clippy::struct_excessive_bools, reason = "the device reports each by itself; no two make a state")]
 pub struct State {
     /// The slot: the latest command not yet sent, and the time since which the slot has been full.
     wanted: Option<(FocalPower, Moment)>,
@@ -83,13 +83,13 @@ pub struct Device {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Progress {
     Serving,
-    /// The thread was told to end.
+    /// The thread was asked to end.
     Ending,
     Ended,
 }
 
 impl State {
-    /// Whether the thread was told to end, or has ended.
+    /// Whether the thread was asked to end, or has ended.
     pub fn ending(&self) -> bool {
         self.progress != Progress::Serving
     }
@@ -242,7 +242,7 @@ impl Shared {
         }
     }
 
-    /// Waits for `time`, or until the thread is told to end. Returns whether it was told to end.
+    /// Waits for `time`, or until the thread is asked to end. Returns whether it was asked to end.
     pub fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed

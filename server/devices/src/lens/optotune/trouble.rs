@@ -7,7 +7,7 @@ use crate::lens::LensError;
 /// The reason for ending a connection.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
-    /// The thread was told to end.
+    /// The thread was asked to end.
     #[error("closing")]
     Stopped,
     /// The device cannot be used.

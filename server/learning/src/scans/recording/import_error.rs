@@ -95,7 +95,7 @@ pub enum ImportError {
         path: PathBuf,
         /// The sample.
         largest: u16,
-        /// Bits that a sample was said to have.
+        /// Bits of a sample, as given by the user.
         bits: u8,
         /// Bits that it needs.
         needed: u8,

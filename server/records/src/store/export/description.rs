@@ -9,92 +9,109 @@ use parfocal_base::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::role::Role;
 
-const SESSION: Meaning = means("Session's random id");
-const SETTING: Meaning = means("Number of the setting in the session, from 1, as the surgeon read it");
-const SEGMENT: Meaning = means("Segment's random id, never shared by two segments");
-const WALL: Meaning = means("When it was recorded, by the server's wall clock").in_unit("UTC");
-const RUN: Meaning = means("Start of the server that recorded it; see runs");
-const MONOTONIC: Meaning = means("When it was recorded, by the monotonic clock; comparable within a run").in_unit("ns");
-const DEVICE: Meaning = means("Random id of the surgeon's device, kept by its browser; empty where the page told none");
-const SEQUENCE: Meaning =
-    means("Counts up with everything that was said on the device, in whatever tab; gaps mean nothing");
+const SESSION: Meaning = means("Random id of the session");
+const SETTING: Meaning = means("Number of the setting in the session, from 1, as the surgeon's page showed it");
+const SETTING_IF_ANY: Meaning = means(
+    "Number of the setting in the session, from 1, as the surgeon's page showed it; empty if the row belongs to no \
+     setting",
+);
+const SEGMENT: Meaning = means("Random id of the segment");
+const SEGMENT_IF_ANY: Meaning = means("Random id of the segment; empty if the row belongs to no segment");
+const WALL: Meaning = means("Time of recording, by the server's wall clock").in_unit("UTC");
+const RUN: Meaning = means("Number of the server start that recorded the row; see runs");
+const MONOTONIC: Meaning =
+    means("Time of recording, by the server's monotonic clock; comparable only within one run").in_unit("ns");
+const MONOTONIC_IF_ANY: Meaning = means(
+    "Time of recording, by the server's monotonic clock; comparable only within one run; empty if the command line \
+     recorded the row",
+)
+.in_unit("ns");
+const DEVICE: Meaning =
+    means("Random id of the surgeon's device, stored in its browser; empty if the page did not send one");
+const SEQUENCE: Meaning = means(
+    "Number that rises with every entry made on the device, across all its tabs; a missing number is not a missing \
+     entry; empty if the page did not send one",
+);
 const WAITED_BY: Meaning = means(
-    "Clock that measured waited_ms: page-clock, which nobody can set; or wall-clock, the device's, \
-     which may have been set meanwhile, where the page was loaded anew or the device slept before \
-     sending",
+    "Clock that measured waited_ms: page-clock, which nobody can set, or wall-clock, the device's own clock, which is \
+     used if the page was reloaded or the device slept before sending; empty if waited_ms is",
 );
 const CLIENT_MILLIS: Meaning =
-    means("The browser's clock when it was said, milliseconds since 1970-01-01 UTC").in_unit("ms");
-const WAITED: Meaning =
-    means("Time between saying and sending, on the surgeon's device: said at wall less this").in_unit("ms");
-const LATE: Meaning = means("Whether it arrived after counts_until of sessions.csv");
-const FRAME: Meaning = means("Frame's number within the run");
-const EXPOSED: Meaning = means("End of the exposure, by the monotonic clock").in_unit("ns");
+    means("Time of the entry by the device's clock, counted from 1970-01-01 UTC; empty if the page did not send it")
+        .in_unit("ms");
+const WAITED: Meaning = means(
+    "Time from the entry on the device to its sending; wall minus waited_ms is the time of the entry; empty if the \
+     page did not send it",
+)
+.in_unit("ms");
+const LATE: Meaning = means("Whether the row arrived after counts_until of sessions.csv, and so does not count");
+const FRAME: Meaning = means("Number of the frame within the run");
+const EXPOSED: Meaning = means("End of the frame's exposure, by the server's monotonic clock").in_unit("ns");
 const ERASED: Meaning =
-    means("When its words were erased, by the server's wall clock; by whom and why is in erasures").in_unit("UTC");
-const KEY: Meaning = means("Key by which the browser could send it again without it counting twice");
+    means("Time when the row's words were erased, by the server's wall clock; see erasures; empty if they were not")
+        .in_unit("UTC");
+const KEY: Meaning = means("Random key that the browser gave the entry, so that an entry sent twice counts once");
 
 table! {
     name: "runs",
     description:
-        "The starts of the server that the session's records belong to; by their clocks a monotonic \
-         time has a time of day",
+        "The server starts that recorded the session; each gives the wall time that belongs to its monotonic clock",
     key: [run],
     row:
     /// A start of the server.
     #[derive(Debug, Clone)]
     RunRow {
-        run: i64 = means("Start of the server, counting from 1").open(),
-        wall: Timestamp = means("The wall clock at the start").in_unit("UTC").open(),
-        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns").open(),
+        run: i64 = means("Number of the server start, from 1").open(),
+        wall: Timestamp = means("Wall clock at the start").in_unit("UTC").open(),
+        monotonic_ns: i64 = means("Monotonic clock at the start").in_unit("ns").open(),
         version: String = means("Version of parfocal").open(),
-        camera: String = means("The camera").open(),
-        lens: String = means("The lens").open(),
-        calibration: String = means("The sensor's calibration: name, unit, version and date").open(),
-        blur: Option<f64> =
-            means("How fast the optic blurs a unit of focal power, as the policies were told; else empty")
-                .in_unit("px").open(),
+        camera: String = means("Camera, as the server names it").open(),
+        lens: String = means("Lens, as the server names it").open(),
+        calibration: String = means("Calibration of the sensor: name, unit, version and date").open(),
+        blur: Option<f64> = means(
+            "Blur radius that one unit of focal power adds, as given to the policies; empty if it was not \
+             configured",
+        ).in_unit("px").open(),
     }
 }
 
 table! {
     name: "sessions",
-    description: "The session",
+    description: "The session: one participant with one protocol",
     key: [session],
     row:
     /// A session.
     #[derive(Debug, Clone)]
     SessionRow {
         session: SessionId = SESSION.open(),
-        participant: String = means("Participant's code").open(),
-        protocol: String = means("Protocol's name; its text is protocol.toml").open(),
+        participant: String = means("Code of the participant").open(),
+        protocol: String = means("Name of the protocol; protocol.toml holds its text").open(),
         protocol_sha256: String = means("SHA-256 of protocol.toml").open(),
-        practice: bool = means("Whether it is practice, never to be mixed with real data").open(),
-        algorithm: &'static str = means("Algorithm that drew the order from the seed").open(),
+        practice: bool = means("Whether the session is practice, which must not be mixed with trial data").open(),
+        algorithm: &'static str = means("Algorithm that draws the order of policies from the seed").open(),
         commitment: String =
-            means("SHA-256 published when the session was made; commits to seed and order").open(),
-        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC").open(),
-        run: i64 = means("Start of the server that made it; see runs").open(),
-        status: SessionStatus = means("under-way, completed or aborted"),
-        settings: i64 = means("Settings in all"),
-        finished_settings: i64 = means("Settings inspected to the end"),
-        comments: i64 = means("Comments kept"),
+            means("SHA-256 published when the session was created; it commits to seed and order").open(),
+        wall: Timestamp = means("Time of creation, by the server's wall clock").in_unit("UTC").open(),
+        run: i64 = means("Number of the server start that created the session; see runs").open(),
+        status: SessionStatus = means("State of the session: under-way, completed or aborted"),
+        settings: i64 = means("Number of settings that the protocol asks for"),
+        finished_settings: i64 = means("Number of settings inspected to the end"),
+        comments: i64 = means("Number of comments recorded"),
         monotonic_ns: i64 = MONOTONIC.open(),
-        unblinded: &'static str =
-            means("no; after-end; emergency-after-end; or while-under-way, which is emergency unblinding, too"),
+        unblinded: &'static str = means(
+            "Unblinding: no, after-end, emergency-after-end or while-under-way; the last is an emergency, too",
+        ),
         counts_until: Option<Timestamp> = means(
-            "Deadline for what counts: the session's end plus the protocol's grace_minutes, or unblinding \
-             if that came first; empty while the session is under way",
-        )
-        .in_unit("UTC"),
+            "Time until which arriving comments and answers count: the session's end plus the protocol's \
+             grace_minutes, or the unblinding if that came first; empty while the session is under way",
+        ).in_unit("UTC"),
     }
 }
 
 table! {
     name: "segments",
     description:
-        "The session's settings in order, each a segment of one policy; after unblinding, allocation.csv \
-         says which policy",
+        "The session's settings in order; in each of them one policy ran, which allocation.csv names after unblinding",
     key: [segment],
     row:
     /// A segment of a session.
@@ -104,39 +121,43 @@ table! {
         setting: usize = SETTING,
         segment: SegmentId = SEGMENT,
         started: Option<Timestamp> = means(
-            "When inspection began, by the server's wall clock; empty if it never did",
-        )
-        .in_unit("UTC"),
+            "Time when inspection began, by the server's wall clock; empty if it did not begin",
+        ).in_unit("UTC"),
         finished: Option<Timestamp> =
-            means("When inspection ended, by the server's wall clock").in_unit("UTC"),
-        finished_by: Option<Role> =
-            means("Who ended it: surgeon, operator, or system at the time limit"),
-        inspected_seconds: Option<f64> = means("Time inspected, without pauses").in_unit("s"),
+            means("Time when inspection ended, by the server's wall clock; empty if it did not end").in_unit("UTC"),
+        finished_by: Option<Role> = means(
+            "Who ended the inspection: surgeon, operator, or system at the time limit; empty if it did not end",
+        ),
+        inspected_seconds: Option<f64> =
+            means("Duration of the inspection without pauses; empty if it did not end").in_unit("s"),
     }
 }
 
 table! {
     name: "comments",
-    description: "What the surgeon said, in the order it was kept",
+    description: "The surgeon's comments, in the order in which the server recorded them",
     key: [key],
     row:
     /// A comment.
     #[derive(Debug, Clone)]
     CommentRow {
-        number: usize = means("Order of the comment in the session, from 1"),
+        number: usize = means("Number of the comment in the session, from 1"),
         key: IdempotencyKey = KEY.open(),
         session: SessionId = SESSION.open(),
-        setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT.open(),
+        setting: Option<usize> = SETTING_IF_ANY,
+        segment: Option<SegmentId> = SEGMENT_IF_ANY.open(),
         kind: &'static str = means(
-            "text (typed), quick (one tap), mark (\"mark this moment\"), voice (said aloud; see voice) or withdrawal \
-                (takes another comment back)",
+            "Kind of comment: text (typed), quick (one tap), mark (\"mark this moment\"), voice (spoken; see voice) \
+             or withdrawal (takes back another comment)",
         ).open(),
         text: Option<String> = means(
-            "What was said, as it was said; empty for a mark and for voice; of a withdrawal the key of the other comment",
+            "Text of the comment, word for word; for a withdrawal the key of the comment taken back; empty for a \
+             mark and for voice, and if the text was erased",
         ).sealed(),
-        frame: Option<u64> = means("Number of the frame on the surgeon's screen").open(),
-        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs").open(),
+        frame: Option<u64> =
+            means("Number of the frame on the surgeon's screen; empty if the page did not send it").open(),
+        frame_run: Option<i64> =
+            means("Number of the server start that counted that frame; see runs; empty if frame is").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -147,53 +168,60 @@ table! {
         sequence: Option<i64> = SEQUENCE.open(),
         late: bool = LATE.open(),
         erased: Option<Timestamp> = ERASED,
-        withdrawn: Option<Timestamp> =
-            means("When the surgeon took it back, by the server's wall clock; empty if not").in_unit("UTC"),
+        withdrawn: Option<Timestamp> = means(
+            "Time when the surgeon took the comment back, by the server's wall clock; empty if it was not taken \
+             back",
+        ).in_unit("UTC"),
     }
 }
 
 table! {
     name: "answers",
-    description: "Answers in the order they were kept, those that do not count included",
+    description: "All answers, also those that do not count, in the order in which the server recorded them",
     key: [key],
     row:
     /// An answer.
     #[derive(Debug, Clone)]
     AnswerRow {
-        number: usize = means("Order of the answer in the session, from 1"),
+        number: usize = means("Number of the answer in the session, from 1"),
         key: IdempotencyKey = KEY.open(),
         session: SessionId = SESSION.open(),
-        setting: Option<usize> = means("Setting asked about, from 1; empty for a closing question"),
-        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question").open(),
-        question: String = means("Question's id in the protocol").open(),
-        question_text: Option<String> = means("The question as the surgeon read it"),
+        setting: Option<usize> =
+            means("Number of the setting that the question is about, from 1; empty for a closing question"),
+        segment: Option<SegmentId> =
+            means("Random id of the segment that the question is about; empty for a closing question").open(),
+        question: String = means("Id of the question in the protocol").open(),
+        question_text: Option<String> =
+            means("Text of the question as shown to the surgeon; empty if the protocol has no such question"),
         kind: Option<&'static str> = means(
-            "text, likert, visual-analogue, ranking, sus, nasa-tlx, surg-tlx or recognition",
+            "Kind of question: text, likert, visual-analogue, ranking, sus, nasa-tlx, surg-tlx or recognition; \
+             empty if the protocol has no such question",
         ),
         revision: usize =
-            means("Place among the answers to the question in the order they were given, from 1"),
-        counts: bool =
-            means("Whether it is the answer that counts: the one given last, late ones left aside"),
+            means("Number of the answer among those to the same question, in the order of entry, from 1"),
+        counts: bool = means("Whether the answer counts: of those that are not late, only the last entered does"),
         value: Option<String> = means(
-            "JSON: a text; a Likert point from 1; a place from 0 to 100 (visual-analogue); 1 no, 2 not sure, \
-             3 yes (recognition); settings from 1, best first, or with ties the place of each setting \
-             (ranking); ten points of 1..5 (sus); gradations of 1..21, of which 1 is a rating of 0 and 21 of \
-             100 (nasa-tlx, surg-tlx), then 1 or 2 for the chosen scale of each pair; 0 for an item still \
-             open; as it stood after this revision; of a late answer, as it was given; scores has all of it \
-             as numbers",
+            "Answer as it stands after this revision, as JSON; a late answer as entered; the text \"\" if erased. By kind: \
+             a text; a Likert point from 1; a position from 0 to 100 (visual-analogue); 1 no, 2 not sure, 3 yes \
+             (recognition); the settings from best to worst, or with ties the rank of each setting (ranking); ten \
+             points from 1 to 5, 0 for an open item (sus); gradations from 1 (a rating of 0) to 21 (a rating of \
+             100), then 1 or 2 for the scale chosen of each pair, 0 for an open item (nasa-tlx, surg-tlx). The \
+             table scores has the same as numbers",
         ),
         given_value: Option<String> = means(
-            "JSON: what was given this time, before items of a questionnaire given earlier were joined to it",
+            "The part of the answer that was entered this time, as JSON, before it was joined with the \
+             questionnaire's earlier items; the text \"\" if erased",
         ).sealed(),
-        sus_score: Option<f64> = means("System Usability Scale score, 0..100").in_unit("points"),
+        sus_score: Option<f64> = means(
+            "System Usability Scale score, 0..100; empty for other kinds and if an item is open",
+        ).in_unit("points"),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
         given: Timestamp = means(
-            "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one \
-             device are ordered by sequence all the same",
-        )
-        .in_unit("UTC"),
+            "Time of entry, by the server's clocks: the arrival minus waited_ms; the answers of one device are \
+             ordered by sequence all the same",
+        ).in_unit("UTC"),
         client_millis: Option<i64> = CLIENT_MILLIS.open(),
         waited_ms: Option<i64> = WAITED.open(),
         waited_by: Option<&'static str> = WAITED_BY.open(),
@@ -201,8 +229,8 @@ table! {
         sequence: Option<i64> = SEQUENCE.open(),
         late: bool = LATE.open(),
         disagrees: bool = means(
-            "Whether it is its device's last answer to the question, and another device's last answer \
-             differs",
+            "Whether another device's last answer to the question differs from this one, which is its own device's \
+             last",
         ),
         erased: Option<Timestamp> = ERASED,
     }
@@ -211,8 +239,7 @@ table! {
 table! {
     name: "scores",
     description:
-        "The items and scores of the answers that count, one a row, corrections applied; a score that \
-         lacks an item is empty",
+        "The items and scores of the answers that count, one per row, with corrections applied",
     key: [question, setting, measure],
     row:
     /// An item or a score of an answer.
@@ -220,19 +247,21 @@ table! {
     ScoreRow {
         session: SessionId = SESSION,
         setting: Option<usize> =
-            means("Setting asked about, from 1; empty for a closing question"),
-        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
-        question: String = means("Question's id in the protocol"),
-        kind: &'static str = means("Kind of the question, as in answers"),
+            means("Number of the setting that the question is about, from 1; empty for a closing question"),
+        segment: Option<SegmentId> =
+            means("Random id of the segment that the question is about; empty for a closing question"),
+        question: String = means("Id of the question in the protocol"),
+        kind: &'static str = means("Kind of question, as in answers"),
         measure: String = means(
-            "Name of the item or score: item-1..10 and sus-score; the names of the scales, 0..100, raw-tlx \
-             (nasa-tlx), raw-surg-tlx, weight-of-..., 0..5, and weighted-surg-tlx (surg-tlx); point (likert); \
-             position (visual-analogue); rank-of-setting-N, 1 for the best, ties sharing their ranks (ranking); \
-             recognised (recognition)",
+            "Name of the item or score: item-1..10 and sus-score (sus); the names of the scales, 0..100, and \
+             raw-tlx (nasa-tlx) or raw-surg-tlx, weight-of-..., 0..5, and weighted-surg-tlx (surg-tlx); point \
+             (likert); position (visual-analogue); rank-of-setting-N, 1 for the best, with shared ranks for ties \
+             (ranking); recognised (recognition)",
         ),
-        label: String = means("The same for reading"),
-        value: Option<f64> = means("The number; empty where it is missing"),
-        computed: bool = means("Whether it is computed from other items"),
+        label: String = means("Name of the item or score in words"),
+        value: Option<f64> =
+            means("Value of the item or score; empty if the item is open, or the score lacks an item"),
+        computed: bool = means("Whether the value is computed from other items"),
         corrected: bool = means("Whether the answer was corrected; see corrections"),
     }
 }
@@ -240,24 +269,24 @@ table! {
 table! {
     name: "corrections",
     description:
-        "What a researcher put right, in order; the originals stand in their tables as they were \
-         recorded. Of several about the same field of a record the latest counts",
+        "Corrections by researchers, in order; the other tables keep the original values; of several corrections of \
+         the same field the latest counts",
     key: [number],
     row:
     /// A correction.
     #[derive(Debug, Clone)]
     CorrectionRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
-        subject: &'static str = means("What was corrected: session, answer or comment").open(),
-        record: String = means("The key of the answer or comment, or the session's id").open(),
+        subject: &'static str = means("Kind of record corrected: session, answer or comment").open(),
+        record: String = means("Key of the answer or comment, or id of the session").open(),
         field: &'static str = means(
-            "What of it: participant, value (of an answer, JSON), or note (beside an answer or a comment)",
+            "Field corrected: participant, value (of an answer, as JSON) or note (beside an answer or a comment)",
         ).open(),
-        old_value: String = means("What stood there so far").sealed(),
-        new_value: String = means("What is right").sealed(),
-        reason: String = means("Why, as the researcher said").sealed(),
-        role: Role = means("Who did it: researcher").open(),
+        old_value: String = means("Value before the correction; empty if there was none, or it was erased").sealed(),
+        new_value: String = means("Correct value; empty if it was erased").sealed(),
+        reason: String = means("Reason, in the researcher's words; empty if it was erased").sealed(),
+        role: Role = means("Role that made the record: researcher").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -267,19 +296,19 @@ table! {
 
 table! {
     name: "consents",
-    description: "What the participant consented to; the latest counts",
+    description: "Consents of the participant; the latest counts",
     key: [number],
     row:
     /// A consent.
     #[derive(Debug, Clone)]
     ConsentRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
-        text_version: String = means("Version of the text").open(),
-        given_on: String = means("The day on which it was given, YYYY-MM-DD").open(),
-        obtained_by: String = means("Who obtained it: initials or a code").sealed(),
-        medium: &'static str = means("paper or screen").open(),
-        role: Role = means("Who recorded it: operator").open(),
+        text_version: String = means("Version of the consent text").open(),
+        given_on: String = means("Day of the consent, YYYY-MM-DD").open(),
+        obtained_by: String = means("Initials or code of the person who obtained the consent").sealed(),
+        medium: &'static str = means("Form of the consent: paper or screen").open(),
+        role: Role = means("Role that made the record: operator").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -288,18 +317,24 @@ table! {
 
 table! {
     name: "erasures",
-    description: "Words that were erased: the record stays, with the hash of what it said",
+    description: "Erasures of words: the erased record stays, with the hash of its words",
     key: [number],
     row:
     /// An erasure.
     #[derive(Debug, Clone)]
     ErasureRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
-        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event").open(),
-        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER").open(),
-        reason: String = means("Why, as the researcher said").sealed(),
-        role: Role = means("Who did it: researcher").open(),
+        subject: &'static str = means(
+            "Kind of record erased: answer, comment or correction, or event or study-event, of which the reason was \
+             erased",
+        ).open(),
+        record: String = means(
+            "Key of that record as in chain: number of a correction, SESSION/NUMBER of an event, STUDY/NUMBER of a \
+             study-event, else the key",
+        ).open(),
+        reason: String = means("Reason, in the researcher's words").sealed(),
+        role: Role = means("Role that made the record: researcher").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -309,78 +344,80 @@ table! {
 table! {
     name: "withdrawals",
     description:
-        "The sessions of the same protocol whose participants withdrew: their data are in no export",
+        "The sessions of the same protocol whose participants withdrew; no export has their data",
     key: [session],
     row:
     /// A withdrawn session.
     #[derive(Debug, Clone)]
     WithdrawalRow {
         session: SessionId = SESSION,
-        protocol: String = means("Protocol's name"),
-        place: i64 = means(
-            "Place among the sessions of the protocol, in the order in which they were made, from 1",
-        ),
-        wall: Timestamp = means("When it was withdrawn, by the server's wall clock").in_unit("UTC"),
-        role: String = means("Who recorded that: operator or researcher"),
+        protocol: String = means("Name of the protocol"),
+        place: i64 = means("Number of the session among those of the protocol, in the order of creation, from 1"),
+        wall: Timestamp = means("Time of the withdrawal, by the server's wall clock").in_unit("UTC"),
+        role: String = means("Role that made the record: operator or researcher"),
     }
 }
 
 table! {
     name: "events",
-    description: "Everything that happened to the session, in order and without gaps",
+    description: "All events of the session, in order; no number is missing",
     key: [session, number],
     row:
     /// An event.
     #[derive(Debug, Clone)]
     EventRow {
         session: SessionId = SESSION.open(),
-        number: u32 = means("Order of the event in the session, from 1").open(),
+        number: u32 = means("Number of the event in the session, from 1").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
-        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)").open(),
-        kind: &'static str = means(
-            "created, started, segment-started, segment-finished, questions-finished, paused, reason-given, \
-             focused-by-hand, tablet-away, tablet-back, pictures-seen, resumed, server-restarted, completed, aborted, \
-             withdrawn or unblinded",
+        role: Role = means(
+            "Role that caused the event: surgeon, operator, researcher, or system (a time limit, a restart)",
         ).open(),
-        setting: Option<usize> = SETTING,
-        segment: Option<SegmentId> = SEGMENT.open(),
-        inspected_ms: Option<u64> =
-            means("Time inspected in the segment by then, without pauses").in_unit("ms").open(),
+        kind: &'static str = means(
+            "Kind of event: created, started, segment-started, segment-finished, questions-finished, paused, \
+             reason-given, focused-by-hand, tablet-away, tablet-back, pictures-seen, resumed, server-restarted, \
+             completed, aborted, withdrawn or unblinded",
+        ).open(),
+        setting: Option<usize> = SETTING_IF_ANY,
+        segment: Option<SegmentId> = SEGMENT_IF_ANY.open(),
+        inspected_ms: Option<u64> = means(
+            "Duration of inspection in the segment so far, without pauses; empty outside a segment",
+        ).in_unit("ms").open(),
         reason: Option<String> = means(
-            "Reason given; that of an unblinding is only in allocation.json, as it may name a policy",
+            "Reason given for the event; empty if none was given or it was erased, and for an unblinding, whose \
+             reason may name a policy and is only in allocation.json",
         ).sealed(),
-        emergency: Option<bool> = means("For an unblinding: whether the session was still under way").open(),
+        emergency: Option<bool> =
+            means("Whether the session was still under way at its unblinding; empty for other events").open(),
     }
 }
 
 table! {
     name: "devices",
     description:
-        "When camera and lens ceased to work and, once they had for a second, worked again, in words, \
-         and what the operator changed of the camera; from the start of each run of the server that \
-         served the session, so that the state in which the session began is told, to the session's \
-         end",
+        "Failures and recoveries of camera and lens, and the operator's changes of the camera. A recovery is recorded \
+         after the device has worked for a second. The rows reach from the start of each server run that served the \
+         session to the end of the session, so they include the state at its beginning",
     key: [number],
     row:
     /// A change in the state of camera or lens.
     #[derive(Debug, Clone)]
     DeviceRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
-        device: String = means("camera or lens").open(),
-        working: bool = means("Whether it worked from then on").open(),
-        message: String = means("What it said of itself, or what was changed").open(),
+        device: String = means("Device: camera or lens").open(),
+        working: bool = means("Whether the device worked from then on").open(),
+        message: String = means("Message of the device, or the operator's change, in words").open(),
     }
 }
 
 table! {
     name: "recordings",
     description:
-        "What was recorded of the session, one row a folder; the recordings themselves stay in the data folder",
+        "The recordings of the session, one folder per row; the recordings themselves stay in the data folder",
     key: [name],
     row:
     /// A recording of the session.
@@ -388,124 +425,149 @@ table! {
     RecordingRow {
         session: SessionId = SESSION,
         name: String = means("Name of the recording"),
-        path: String = means("Its folder, relative to the data folder"),
-        kind: Option<&'static str> =
-            means("mosaic (raw mosaics in Zarr v3) or view (JPEG pictures); empty where it cannot be read"),
-        run: Option<i64> = means("Start of the server that recorded it; see runs"),
-        started: Option<Timestamp> =
-            means("When it began, by the server's wall clock; its frames count from then").in_unit("UTC"),
-        monotonic_ns: Option<i64> =
-            means("The same by the monotonic clock; comparable within a run").in_unit("ns"),
-        first_ns: Option<i64> = means("End of the first frame's exposure, since it began").in_unit("ns"),
-        last_ns: Option<i64> = means("End of the last frame's exposure, since it began").in_unit("ns"),
-        frames: Option<usize> = means("Frames that it holds"),
-        lost: Option<u64> = means(
-            "Frames that the recorder was too slow for; empty of a view, which has the frames that viewers could get",
+        path: String = means("Folder of the recording, relative to the data folder"),
+        kind: Option<&'static str> = means(
+            "Kind of recording: mosaic (raw mosaics in Zarr v3) or view (JPEG pictures); empty if it cannot be read",
         ),
-        ended: Option<String> =
-            means("How it ended: stopped, or why it stopped by itself; empty if it was cut short or goes on"),
-        description_sha256: Option<String> = means("SHA-256 of its zarr.json or view.json"),
-        problem: Option<String> = means("Why it cannot be read, where it cannot"),
+        run: Option<i64> =
+            means("Number of the server start that made the recording; see runs; empty if it cannot be read"),
+        started: Option<Timestamp> = means(
+            "Start of the recording, by the server's wall clock; first_ns and last_ns count from it; empty if it \
+             cannot be read",
+        ).in_unit("UTC"),
+        monotonic_ns: Option<i64> = means(
+            "Start of the recording, by the server's monotonic clock; comparable only within one run; empty if it \
+             cannot be read",
+        ).in_unit("ns"),
+        first_ns: Option<i64> = means(
+            "End of the first frame's exposure, from the recording's start; empty if it has no frame",
+        ).in_unit("ns"),
+        last_ns: Option<i64> = means(
+            "End of the last frame's exposure, from the recording's start; empty if it has no frame",
+        ).in_unit("ns"),
+        frames: Option<usize> = means("Number of frames in the recording; empty if it cannot be read"),
+        lost: Option<u64> = means(
+            "Number of frames that the recorder was too slow for; empty for a view, which holds the frames sent to \
+             viewers, and if the recording cannot be read",
+        ),
+        ended: Option<String> = means(
+            "How the recording ended: stopped, or the reason why it stopped by itself; empty if it was cut short or \
+             continues",
+        ),
+        description_sha256: Option<String> =
+            means("SHA-256 of the recording's zarr.json or view.json; empty if it cannot be read"),
+        problem: Option<String> = means("Reason why the recording cannot be read; empty if it can"),
     }
 }
 
 table! {
     name: "accesses",
-    description: "Who looked at the session's focal path or recordings, or exported the session, this export included",
+    description:
+        "Views of the session's focal path and recordings, and exports of the session, this one included",
     key: [number],
     row:
     /// A look at the evidence.
     #[derive(Debug, Clone)]
     AccessRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         wall: Timestamp = WALL.open(),
         run: Option<i64> =
-            means("Start of the server that recorded it; empty for the command line").open(),
-        monotonic_ns: Option<i64> = MONOTONIC.open(),
-        role: String = means("Who: researcher, or command-line").open(),
-        kind: String = means("path-viewed, recording-viewed or exported").open(),
+            means("Number of the server start that recorded the row; empty if the command line did").open(),
+        monotonic_ns: Option<i64> = MONOTONIC_IF_ANY.open(),
+        role: String = means("Role that had access: researcher, or command-line").open(),
+        kind: String = means("Kind of access: path-viewed, recording-viewed or exported").open(),
         session: SessionId = SESSION.open(),
-        detail: Option<String> = means("Of an export: blinded or unblinded").open(),
+        detail: Option<String> =
+            means("Kind of export: blinded or unblinded; empty for other kinds of access").open(),
     }
 }
 
 table! {
     name: "studies",
-    description: "The study that the session belongs to; without a row where it is outside any study",
+    description: "The study that the session belongs to; no row if it belongs to none",
     key: [study],
     row:
     /// A study.
     #[derive(Debug, Clone)]
     StudyRow {
-        study: String = means("The study's name: the same at every site").open(),
-        title: String = means("Its title"),
-        definition_sha256: String = means("SHA-256 of study.toml: the same at every site").open(),
-        sites: String = means("JSON: the names of its sites that this database runs").open(),
-        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC").open(),
-        stage: &'static str = means("planned, open, closed, locked or unblinded"),
-        commitment: Option<String> =
-            means("SHA-256 published when it was first opened; commits to the orders of all its places here"),
+        study: String = means("Name of the study, the same at every site").open(),
+        title: String = means("Title of the study"),
+        definition_sha256: String = means("SHA-256 of study.toml, the same at every site").open(),
+        sites: String = means("Names of the study's sites that this database holds, as JSON").open(),
+        wall: Timestamp =
+            means("Time when the study was planned, by the server's wall clock").in_unit("UTC").open(),
+        stage: &'static str = means("Stage of the study: planned, open, closed, locked or unblinded"),
+        commitment: Option<String> = means(
+            "SHA-256 published when the study was first opened; it commits to the orders of all its places in this \
+             database; empty before",
+        ),
     }
 }
 
 table! {
     name: "study_sessions",
-    description: "The session's place in its study; without a row where it is outside any study",
+    description: "The session's place in its study; no row if it belongs to none",
     key: [session],
     row:
     /// The place of a session in a study.
     #[derive(Debug, Clone)]
     StudySessionRow {
         session: SessionId = SESSION.open(),
-        study: String = means("The study's name").open(),
-        site: String = means("The site's name").open(),
-        protocol: String = means("The protocol's name").open(),
-        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order").open(),
+        study: String = means("Name of the study").open(),
+        site: String = means("Name of the site").open(),
+        protocol: String = means("Name of the protocol").open(),
+        place: usize = means(
+            "Place in the list of site and protocol, from 1; it does not reveal the order of policies",
+        ).open(),
     }
 }
 
 table! {
     name: "study_events",
     description:
-        "What happened to the study as a whole, and to this session in it. Numbers that are missing are of \
-         other sessions",
+        "Events of the study as a whole, and of this session in it; missing numbers belong to other sessions",
     key: [study, number],
     row:
     /// An event of a study.
     #[derive(Debug, Clone)]
     StudyEventRow {
-        study: String = means("The study's name").open(),
-        number: i64 = means("Order of the event in the study, from 1").open(),
+        study: String = means("Name of the study").open(),
+        number: i64 = means("Number of the event in the study, from 1").open(),
         wall: Timestamp = WALL.open(),
-        run: Option<i64> = means("Start of the server that recorded it; empty for the command line").open(),
-        monotonic_ns: Option<i64> = MONOTONIC.open(),
-        role: String = means("How it was recorded: researcher (on the page), or command-line").open(),
-        person: String = means("Who, as the person said").open(),
+        run: Option<i64> =
+            means("Number of the server start that recorded the row; empty if the command line did").open(),
+        monotonic_ns: Option<i64> = MONOTONIC_IF_ANY.open(),
+        role: String = means("How the event was recorded: researcher (on the page), or command-line").open(),
+        person: String = means("Name of the person, as entered").open(),
         kind: String = means(
-            "planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded, which is \
-             emergency unblinding of one session",
+            "Kind of event: planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded \
+             (emergency unblinding of one session)",
         ).open(),
-        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study").open(),
-        commitment: Option<String> = means("Of the first opening: commits to all orders").open(),
-        reason: String = means("Reason given").sealed(),
+        about_session: Option<SessionId> =
+            means("Random id of the session that the event is about; empty for the whole study").open(),
+        commitment: Option<String> = means(
+            "SHA-256 published at the first opening, which commits to all orders; empty for other events",
+        ).open(),
+        reason: String = means("Reason given for the event; empty if none was given, or it was erased").sealed(),
     }
 }
 
 table! {
     name: "actors",
-    description: "Under which personal account a record was made; a record without a row was made through a \
-                  role's link, by the command line, or by the server",
+    description:
+        "The personal account behind each record; a record without a row was made through a role's link, by the \
+         command line or by the server",
     key: [number],
     row:
     /// The account behind a record.
     #[derive(Debug, Clone, sqlx::FromRow)]
     ActorRow {
-        number: i64 = means("Order of the row in the database").open(),
-        kind: String = means("Kind of the record, as in chain.csv").open(),
+        number: i64 = means("Number of the row in the database, from 1").open(),
+        kind: String = means("Kind of record, as in chain.csv").open(),
         record: String = means("Key of the record, as in chain.csv").open(),
-        session: String = means("Session id").open(),
-        account: String = means("The account's name").open(),
-        display: String = means("The person's name then").open(),
+        session: String = means("Random id of the session").open(),
+        account: String = means("Name of the account").open(),
+        display: String = means("Name of the person when the record was made").open(),
     }
 }
 
@@ -519,45 +581,49 @@ table! {
     VoiceRow {
         comment: IdempotencyKey = means("Key of the comment, as in comments.csv"),
         session: SessionId = SESSION,
-        setting: Option<usize> = SETTING,
+        setting: Option<usize> = SETTING_IF_ANY,
         file: Option<String> =
-            means("The file; empty where nothing of the recording arrived, or its sound was erased"),
-        media_type: Option<&'static str> = means("What the file is, as the browser recorded it"),
-        seconds: f64 = means("How long the recording is, as the page told").in_unit("s"),
-        pieces: usize = means("Pieces that arrived; see voice_pieces"),
-        missing: usize = means("Pieces that did not arrive, though later ones did"),
-        bytes: i64 = means("Length of the pieces that arrived"),
-        sha256: Option<String> = means("SHA-256 of the file"),
+            means("Name of the file; empty if no piece of the recording arrived, or its sound was erased"),
+        media_type: Option<&'static str> =
+            means("Media type of the file, as the browser recorded it; empty if no piece arrived"),
+        seconds: f64 = means("Duration of the recording, as the page measured it").in_unit("s"),
+        pieces: usize = means("Number of pieces that arrived; see voice_pieces"),
+        missing: usize = means("Number of pieces that did not arrive although later ones did"),
+        bytes: i64 = means("Length of the pieces that arrived").in_unit("bytes"),
+        sha256: Option<String> = means("SHA-256 of the file; empty if there is no file"),
         ended: Option<&'static str> = means(
-            "Why it ended: released (the surgeon let go), limit (after two minutes), microphone-lost or left (the \
-             page went out of sight); empty where it was cut off",
+            "Why the recording ended: released (the surgeon let go), limit (after two minutes), microphone-lost or \
+             left (the page was hidden); empty if it was cut off",
         ),
-        complete: bool = means("Whether it has its end and all its pieces"),
-        transcript: Option<String> =
-            means("What was said, typed out by a researcher; by whom and when is in corrections"),
-        erased: Option<Timestamp> =
-            means("When its sound was erased, by the server's wall clock; by whom and why is in erasures")
-                .in_unit("UTC"),
+        complete: bool = means("Whether the end and all pieces of the recording arrived"),
+        transcript: Option<String> = means("Transcript by a researcher; see corrections; empty if there is none"),
+        erased: Option<Timestamp> = means(
+            "Time when the sound was erased, by the server's wall clock; see erasures; empty if it was not",
+        ).in_unit("UTC"),
     }
 }
 
 table! {
     name: "voice_pieces",
-    description: "The pieces in which the recordings of voice comments arrived, in the order they were kept",
+    description: "The pieces of the recordings of voice comments, in the order in which the server recorded them",
     key: [number],
     row:
     /// A piece of a recording.
     #[derive(Debug, Clone)]
     VoicePieceRow {
-        number: i64 = means("Order of the record in the database").open(),
+        number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
         comment: IdempotencyKey = means("Key of the comment, as in comments.csv").open(),
-        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another").open(),
-        media_type: &'static str = means("What it is, as the browser recorded it").open(),
-        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms").open(),
-        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice").open(),
-        bytes: i64 = means("Its length").open(),
-        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased").open(),
+        piece: u32 =
+            means("Number of the piece in the recording, from 1; the pieces in this order are the file").open(),
+        media_type: &'static str = means("Media type of the piece, as the browser recorded it").open(),
+        through_ms: i64 = means(
+            "Duration of the recording up to the end of the piece, as the page measured it",
+        ).in_unit("ms").open(),
+        ended: Option<&'static str> =
+            means("Why the recording ended, as in voice; empty if the piece is not the last").open(),
+        bytes: i64 = means("Length of the piece").in_unit("bytes").open(),
+        sha256: String = means("SHA-256 of the piece; it stays when the sound is erased").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -567,31 +633,40 @@ table! {
 table! {
     name: "chain",
     description:
-        "The chain of all records of the database up to this export, in order: of the rows that are not \
-         about this session only number, entry and hash; docs/evidence.md says what is hashed",
+        "The chain of all records of the database up to this export, in order; rows of other sessions have only \
+         number, entry and hash; docs/evidence.md describes what is hashed",
     key: [number],
     row:
     /// A row of the chain.
     #[derive(Debug, Clone, Default)]
     ChainRow {
-        number: i64 = means("Order of the row, from 1, without gaps"),
+        number: i64 = means("Number of the row, from 1; no number is missing"),
         entry: String = means("SHA-256 of the columns from wall to content"),
-        hash: String = means("SHA-256 of number, the hash of the row before, and entry"),
-        wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC"),
-        kind: Option<String> =
-            means(
-            "Kind of the record: run, participant, session, event, comment, answer, device, access, \
-             correction, consent, erasure, telemetry, study, study-event, study-session, account-event, \
-             actor or voice-piece",
+        hash: String = means("SHA-256 of number, the hash of the previous row, and entry"),
+        wall: Option<String> = means(
+            "Time of writing, by the server's wall clock; empty if the row is of another session",
+        ).in_unit("UTC"),
+        kind: Option<String> = means(
+            "Kind of record: run, participant, session, event, comment, answer, device, access, correction, \
+             consent, erasure, telemetry, study, study-event, study-session, account-event, actor or voice-piece; \
+             empty if the row is of another session",
         ),
-        key: Option<String> = means("The record's key"),
-        session: Option<String> = means("The record's session; empty for runs and devices"),
-        place: Option<i64> = means("Order of the row among those of the session, from 1"),
-        salt: Option<String> = means("Random; keeps entry from being guessed"),
-        sealed: Option<String> = means("SHA-256 of the record's sealed columns, with sealed_salt"),
-        sealed_salt: Option<String> =
-            means("Random; empty where the sealed columns are withheld; see chain_salts.csv"),
-        content: Option<String> = means("SHA-256 of the record"),
+        key: Option<String> = means("Key of the record; empty if the row is of another session"),
+        session: Option<String> = means(
+            "Random id of the record's session; empty for runs and devices, and if the row is of another session",
+        ),
+        place: Option<i64> = means(
+            "Number of the row among those of the session, from 1; empty if it is of no session or another one",
+        ),
+        salt: Option<String> =
+            means("Random bytes that keep entry from being guessed; empty if the row is of another session"),
+        sealed: Option<String> =
+            means("SHA-256 of sealed_salt and the record's sealed columns; empty if it has none"),
+        sealed_salt: Option<String> = means(
+            "Random bytes that keep sealed from being guessed; empty if the record has no sealed columns, or they \
+             are withheld until unblinding; see chain_salts.csv",
+        ),
+        content: Option<String> = means("SHA-256 of the record; empty if the row is of another session"),
     }
 }
 
@@ -603,17 +678,17 @@ table! {
     /// The salt of a row's sealed columns.
     #[derive(Debug, Clone, sqlx::FromRow)]
     ChainSaltRow {
-        number: i64 = means("The row of chain.csv"),
-        salt: String = means("Random"),
+        number: i64 = means("Number of the row of chain.csv"),
+        salt: String = means("Random bytes that keep the sealed columns from being guessed"),
     }
 }
 
 table! {
     name: "telemetry",
     description:
-        "Every step of the control loop during the settings. Metric and timing are left to \
-         policy_steps.csv, as they tell the policy; the focal path itself, and frames left out where \
-         the loop waited, may suggest one to an expert",
+        "Every step of the control loop during the settings. Metric and timing would reveal the policy and are in \
+         policy_steps.csv. An expert may still guess a policy from the focal path, and from frames that are missing \
+         because the loop waited",
     key: [run, frame],
     row:
     /// A step of the control loop, without the columns that reveal the policy.
@@ -623,25 +698,24 @@ table! {
         run: i64 = RUN,
         frame: i64 = FRAME,
         exposed_ns: i64 = EXPOSED,
-        asked: f64 =
-            means("Focal power asked of the lens after the frame").in_unit("focal power, 0..1"),
+        asked: f64 = means("Focal power commanded after the frame").in_unit("focal power, 0..1"),
         measured: Option<f64> = means(
-            "Focal power at the middle of the frame's exposure, by the lens's dynamics; empty while \
-             the lens was away",
-        )
-        .in_unit("focal power, 0..1"),
+            "Focal power at the middle of the frame's exposure, computed from the lens's dynamics; empty while the \
+             lens was unavailable",
+        ).in_unit("focal power, 0..1"),
         held: bool = means(
-            "Whether the lens was held by a pause or because lens or camera failed; holds for the \
-             policy's sake are in policy_steps.csv, as they tell the policy",
+            "Whether the lens was held because of a pause or a failure of lens or camera; holds caused by the \
+             policy would reveal it and are in policy_steps.csv",
         ),
-        optimal: Option<f64> =
-            means("The optimum, where camera and lens are simulated").in_unit("focal power, 0..1"),
+        optimal: Option<f64> = means(
+            "Best focal power for the frame; empty unless camera and lens are simulated",
+        ).in_unit("focal power, 0..1"),
     }
 }
 
 table! {
     name: "allocation",
-    description: "Which policy ran in which setting",
+    description: "The policy that ran in each setting",
     key: [segment],
     row:
     /// The policy of a segment.
@@ -650,29 +724,28 @@ table! {
         session: SessionId = SESSION,
         setting: usize = SETTING,
         segment: SegmentId = SEGMENT,
-        policy: PolicyName = means("Policy's name"),
+        policy: PolicyName = means("Name of the policy"),
     }
 }
 
 table! {
     name: "weights",
     description:
-        "The weights that the session's learned policies had in each start of the server that served \
-         it",
+        "The weights of the session's learned policies in each server start that served the session",
     key: [run, policy],
     row:
     /// The weights that a learned policy had in a start of the server.
     #[derive(Debug, Clone, sqlx::FromRow)]
     WeightsRow {
         run: i64 = RUN,
-        policy: String = means("Policy's name"),
-        sha256: String = means("SHA-256 of the file of its weights"),
+        policy: String = means("Name of the policy"),
+        sha256: String = means("SHA-256 of the policy's weights file"),
     }
 }
 
 table! {
     name: "policy_steps",
-    description: "The columns of each step that reveal the policy; join with telemetry.csv by run and frame",
+    description: "The columns of each step that reveal the policy; to be joined with telemetry.csv by run and frame",
     key: [run, frame],
     row:
     /// The columns of a step of the control loop that reveal the policy.
@@ -681,13 +754,14 @@ table! {
         setting: i64 = SETTING,
         run: i64 = RUN,
         frame: i64 = FRAME,
-        policy: Option<String> = means("Policy that was asked; empty where none was"),
-        metric: Option<f64> =
-            means("The policy's focus metric (mean gradient magnitude or mean local ratio)"),
+        policy: Option<String> = means("Name of the policy that ran; empty if none did"),
+        metric: Option<f64> = means(
+            "Focus metric of the policy: mean gradient magnitude or mean local ratio; empty if it computed none",
+        ),
         policy_micros: i64 = means("Duration of the policy's step").in_unit("us"),
-        latency_micros: i64 = means("From the end of the exposure to the lens command").in_unit("us"),
+        latency_micros: i64 = means("Time from the end of the exposure to the lens command").in_unit("us"),
         held: Option<String> = means(
-            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, \
+            "Why the lens was held; empty if it was not: paused, policy-panicked, policy-nonsense, policy-slow, \
              policy-unavailable, lens-failed or camera-failed",
         ),
     }
@@ -746,6 +820,15 @@ mod tests {
         for table in ALL {
             for column in table.columns {
                 assert!(!column.description.is_empty(), "{}.{}", table.name, column.name);
+            }
+        }
+    }
+
+    #[test]
+    fn every_column_that_may_be_empty_says_when() {
+        for table in ALL {
+            for column in table.columns.iter().filter(|column| column.may_be_empty) {
+                assert!(column.description.contains("empty"), "{}.{}", table.name, column.name);
             }
         }
     }

@@ -83,8 +83,7 @@ impl Export {
         // something else was recorded in between, the export is recorded again.
         for _ in 0..ATTEMPTS {
             let head = recorder.record(&Access::Exported { session, unblinded }).await?;
-            // The session may be under way. The snapshot makes sure that what is said meanwhile is in all files or in
-            // none.
+            // The session may be under way. The snapshot makes sure that a new comment is in all files or in none.
             let snapshot = recorder.reader().snapshot().await?;
             match Self::of(&snapshot, head, session, unblinded).await {
                 Ok(Some(export)) => return Ok(Self { recordings, ..export }),

@@ -10,7 +10,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, of_session};
 
 /// A row for each recording of `session` in the data folder `data`. A recording that cannot be read has a row that says
-/// so. A broken recording must not prevent the export of what was said.
+/// so. A broken recording must not prevent the export of comments.
 pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     let folder = data.join(FOLDER);
     let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(told).collect());

@@ -32,10 +32,12 @@ pub struct Column {
     pub name: &'static str,
     /// Type.
     pub kind: Type,
-    /// Unit; empty where there is none.
+    /// Unit; empty if it has none.
     pub unit: &'static str,
     /// What it means.
     pub description: &'static str,
+    /// Whether a row may have no value for it.
+    pub may_be_empty: bool,
     /// Whether and how the chain hashes it.
     pub proof: Proof,
 }
@@ -87,6 +89,9 @@ pub trait Row {
 pub trait Cell: Serialize {
     /// The type of its column.
     const KIND: Type;
+
+    /// Whether it may have no value.
+    const MAY_BE_EMPTY: bool = false;
 
     /// The cell; null if there is no value.
     fn value(&self) -> Value {
@@ -160,6 +165,7 @@ impl Cell for String {
 
 impl<T: Cell> Cell for Option<T> {
     const KIND: Type = T::KIND;
+    const MAY_BE_EMPTY: bool = true;
 
     fn write_csv(&self, csv: &mut Vec<u8>) {
         if let Some(cell) = self {
@@ -201,10 +207,11 @@ impl Meaning {
         Self { proof: Proof::Sealed, ..self }
     }
 
-    /// The column called `name`.
+    /// The column called `name`, which has a value in every row.
     #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
-        Column { name, kind, unit: self.unit, description: self.description, proof: self.proof }
+        let may_be_empty = false;
+        Column { name, kind, unit: self.unit, description: self.description, may_be_empty, proof: self.proof }
     }
 }
 
@@ -230,7 +237,12 @@ macro_rules! export_table {
             const TABLE: $crate::store::export::Table = $crate::store::export::Table {
                 name: $table,
                 description: $description,
-                columns: &[$($meaning.column(stringify!($field), <$cell as $crate::store::export::Cell>::KIND),)+],
+                columns: &[$(
+                    $crate::store::export::Column {
+                        may_be_empty: <$cell as $crate::store::export::Cell>::MAY_BE_EMPTY,
+                        ..$meaning.column(stringify!($field), <$cell as $crate::store::export::Cell>::KIND)
+                    },
+                )+],
                 key: &[$(stringify!($key),)+],
             };
 
@@ -385,7 +397,7 @@ mod tests {
     use super::*;
 
     fn column(kind: Type) -> Column {
-        Column { name: "text", kind, unit: "", description: "", proof: Proof::None }
+        Column { name: "text", kind, unit: "", description: "", may_be_empty: false, proof: Proof::None }
     }
 
     #[test]

@@ -52,7 +52,7 @@ fn ends_with_itself(export: &ExportFiles, last: Option<FoundEntry>, head: &Head)
     let told = &package["parfocal"]["chain"];
     let same = told["number"].as_i64() == Some(head.number) && told["hash"].as_str() == Some(head.hash.as_str());
     if !same {
-        return Err(format!("chain: it ends at {head}, which is not the head that datapackage.json tells"));
+        return Err(format!("chain: it ends at {head}, which is not the head in datapackage.json"));
     }
 
     let exports = rows(export, "accesses")?;

@@ -54,7 +54,7 @@ pub(super) fn study(export: &ExportFiles) -> Outcome {
 
     let Some(statement) = statement(export)? else {
         let said =
-            "definition and protocol are those of the study; its orders are not told before all of it is unblinded";
+            "definition and protocol are those of the study; its orders stay secret until all of it is unblinded";
         return Ok(Verdict::Passed(said.to_owned()));
     };
     if commitment(&statement) != committed {
