@@ -73,25 +73,6 @@ fn info_tells_of_a_recording_of_the_view() {
 }
 
 #[test]
-fn a_recording_of_an_earlier_version_has_no_sizes_and_is_read_all_the_same() {
-    let folder = TempDir::new().unwrap();
-    let (path, writer) = view(&folder);
-    writer.finish(Ended::Stopped).unwrap();
-    let index = fs::read_to_string(path.join("view.csv")).unwrap();
-    let earlier: Vec<String> =
-        index.lines().map(|line| line.split(',').take(4).collect::<Vec<_>>().join(",")).collect();
-    fs::write(path.join("view.csv"), earlier.join("\n") + "\n").unwrap();
-    let header = fs::read_to_string(path.join("view.json")).unwrap();
-    let mut header: Value = serde_json::from_str(&header).unwrap();
-    header.as_object_mut().unwrap().retain(|name, _| name != "run" && name != "monotonic_ns");
-    fs::write(path.join("view.json"), header.to_string()).unwrap();
-
-    let told = info(&path);
-    assert_eq!((&told["frames"], &told["sizes"], &told["run"]), (&10.into(), &serde_json::json!([]), &Value::Null));
-    assert!(ViewRecording::open(&path).unwrap().picture(9).unwrap() == picture(128, 64, 90));
-}
-
-#[test]
 fn what_a_power_cut_left_of_the_view_is_read_up_to_the_last_whole_picture() {
     let folder = TempDir::new().unwrap();
     let (path, writer) = view(&folder);

@@ -69,9 +69,9 @@ fn policies_are_evaluated_on_a_stack_and_get_its_blur_rate() {
     };
 
     let untold = results(&[]);
-    // Two stacks at two scales each, three policies: the oracle and the baseline are always there.
+    // Two stacks at two scales each, four policies: the oracle and both baselines are always there.
     let stacks = untold["stacks"].as_array().unwrap();
-    assert_eq!((stacks.len(), stacks[0]["rows"].as_array().unwrap().len()), (4, 3));
+    assert_eq!((stacks.len(), stacks[0]["rows"].as_array().unwrap().len()), (4, 4));
     assert_eq!((&stacks[0]["planes"], &stacks[2]["planes"], &stacks[0]["blur"]), (&7.into(), &6.into(), &Value::Null));
 
     // 7 of 13 planes are half of the range, so half of the blur.
@@ -140,7 +140,7 @@ fn a_stack_in_one_file_is_one_in_a_folder() {
         assert!(output.status.success(), "{}", complaint(&output));
         let images: Vec<_> =
             contents(&out).into_iter().filter(|(path, _)| path.extension().is_some_and(|end| end == "png")).collect();
-        (images, said(&output), complaint(&output))
+        (images, said(&output), notes(&output))
     };
     let (expected, _, _) = make(&pictures, "of a folder");
 
@@ -194,7 +194,7 @@ fn uneven_positions_are_interpolated_and_said() {
     let more = ["--size", "96", "--poses", "5"];
     let output = parfocal(&[&["scan", "from-stack", text(&pictures), "--out", text(&out)], &more[..]].concat());
     assert!(output.status.success(), "{}", complaint(&output));
-    let told = complaint(&output);
+    let told = notes(&output);
     let expected = "the planes stand 1 apart: 12 are pictures as they were taken, 1 are mixed";
     assert!(told.contains(expected), "{told}");
 }

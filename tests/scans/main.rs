@@ -46,6 +46,13 @@ fn complaint(output: &Output) -> String {
     error.lines().find(|line| line.starts_with("parfocal: ")).unwrap_or_else(|| panic!("{error}")).to_owned()
 }
 
+/// What a command that succeeds tells on standard error.
+fn notes(output: &Output) -> String {
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{told}");
+    told
+}
+
 /// Arguments that record a small scan of the phantom.
 fn recording(out: &Path, poses: usize) -> Vec<String> {
     let arguments = ["scan", "record", "--camera", "phantom", "--focal-powers", "5", "--seed", "7", "--poses"];

@@ -59,7 +59,7 @@ const UNREACHABLE: &str = "const open = document.querySelector('dialog[open]') ?
     const controls = elements.filter((one) => one.matches('button, a, select, textarea, summary, input:not([type=radio])'));
     const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 1 || b.bottom <= a.top + 1;
     // What stands over the picture scrolls there, so it lies on nothing.
-    const scrolled = (one) => one.closest('.panel');
+    const scrolled = (one) => one.closest('.panel, .overlay-menu > div');
     controls.forEach((one, index) => {
         for (const other of controls.slice(index + 1)) {
             if (scrolled(one) !== scrolled(other)) continue;

@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 57] = [
+const KEYS: [&str; 58] = [
     "age",
     "answers",
     "area",
@@ -67,6 +67,7 @@ const KEYS: [&str; 57] = [
     "radius",
     "reduced",
     "run",
+    "said",
     "remaining_seconds",
     "scales",
     "second",

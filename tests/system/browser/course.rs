@@ -75,7 +75,7 @@ async fn practice(theatre: &Theatre) {
     theatre.tap_notice(2).await;
     theatre.finish_setting(5).await;
 
-    surgeon.sees("#panel h2", "Final questions").await;
+    surgeon.sees_panel("Final questions").await;
     surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees("#panel h2", "Practice is over").await;
 

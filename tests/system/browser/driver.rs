@@ -20,7 +20,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::wait::until;
+use super::wait::{comes_true, until};
 
 const NEEDED: &str =
     "the browser tests need Chromium and its driver; on Debian: apt-get install chromium chromium-driver";
@@ -344,7 +344,9 @@ impl Browser {
 impl Browser {
     /// Waits until the element is shown and its text contains `text`.
     pub async fn sees(&self, css: &str, text: &str) {
-        until(&format!("{css} to say '{text}'"), || async { self.text(css).await.contains(text) }).await;
+        if !comes_true(|| async { self.text(css).await.contains(text) }).await {
+            panic!("{css} never says '{text}', but '{}'", self.text(css).await);
+        }
     }
 
     /// Waits until nothing that `css` selects is shown.

@@ -20,7 +20,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     theatre.begin("S-06", "limited").await;
     theatre.tap_notice(1).await;
     theatre.say("There is room", 1).await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     disk.fill();
     // There may be space left within the files: send long comments until it is used up.
     let mut said = vec!["There is room".to_owned()];

@@ -67,7 +67,7 @@ async fn first_setting(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(1).await;
     theatre.finish().await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     assert_eq!(surgeon.count(".track.marked").await, 0, "no line has a mark of its own");
 
     mark(surgeon, "[data-question=effort]", 0.0).await;
@@ -83,7 +83,7 @@ async fn first_setting(theatre: &Theatre) {
     surgeon.reload().await;
     surgeon.sees(&state("workload"), "3 of 6 answered · Saved").await;
     assert_eq!(surgeon.count("[data-question=workload] .track.marked").await, 3);
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees("#missing", "One question is still open.").await;
     surgeon.sees("[data-question=workload] fieldset:nth-child(4) .gap", "Not answered yet").await;
     shoot(surgeon, "surgeon-17-workload").await;
@@ -101,7 +101,7 @@ async fn first_setting(theatre: &Theatre) {
     .await;
     surgeon.show("[data-question=effort]").await;
     shoot(surgeon, "surgeon-18-instruments").await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees_no("[data-question=effort]").await;
 }
 
@@ -111,7 +111,7 @@ async fn second_setting(theatre: &Theatre) {
     theatre.say("Frau Mustermann bleeds", 1).await;
     theatre.say("The edge is sharp now", 2).await;
     theatre.finish().await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     mark(surgeon, "[data-question=effort]", 0.75).await;
     choose_in_view(theatre, "how-often", 5).await;
     for scale in 1..=6 {
@@ -120,8 +120,8 @@ async fn second_setting(theatre: &Theatre) {
     surgeon.sees(&state("workload"), "Saved").await;
     choose_in_view(theatre, "seen-before", 3).await;
     surgeon.sees(&state("seen-before"), "Saved").await;
-    surgeon.click(".questions .done button").await;
-    surgeon.sees("#panel h2", "Final questions").await;
+    surgeon.tap_in_panel(".questions .done button").await;
+    surgeon.sees_panel("Final questions").await;
 }
 
 async fn closing(theatre: &Theatre) {
@@ -139,7 +139,7 @@ async fn closing(theatre: &Theatre) {
     }
     surgeon.sees(&state("preference"), "Saved").await;
     shoot(surgeon, "surgeon-20-places").await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     surgeon.sees("#panel h2", "Thank you").await;
 }
 

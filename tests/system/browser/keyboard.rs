@@ -77,7 +77,7 @@ async fn a_surgeon_goes_through_a_session_without_touching_the_screen() {
         })
         .await;
 
-        surgeon.sees("#panel h2", "a few questions").await;
+        surgeon.sees_panel("a few questions").await;
         // A key right after the questions have appeared was meant for what was there before.
         surgeon.run(A_WHILE, &[]).await;
         surgeon.tab_to("sharpness").await;
@@ -89,7 +89,7 @@ async fn a_surgeon_goes_through_a_session_without_touching_the_screen() {
         surgeon.press(Key::Enter.into()).await;
     }
 
-    surgeon.sees("#panel h2", "Final questions").await;
+    surgeon.sees_panel("Final questions").await;
     surgeon.run(A_WHILE, &[]).await;
     surgeon.tab_to("Finish").await;
     surgeon.press(Key::Enter.into()).await;

@@ -48,7 +48,7 @@ async fn text_of_twice_the_size_leaves_every_page_usable() {
     look(&theatre.operator, "large-text-operator-2-inspecting").await;
 
     theatre.finish().await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     look(surgeon, "large-text-surgeon-5-questions").await;
     theatre.answer_questions(4).await;
 }

@@ -125,7 +125,7 @@ async fn out_of_reach_in_a_setting_and_in_its_questions_nothing_is_lost_or_doubl
     theatre.keeps(COMMENTS, &["In reach", "Out of reach", "mark", "Loaded again"]).await;
 
     theatre.finish().await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     surgeon.keeps_page().await;
     theatre.proxy.go_dark();
     theatre.choose("sharpness", 3).await;
@@ -145,7 +145,7 @@ async fn out_of_reach_in_a_setting_and_in_its_questions_nothing_is_lost_or_doubl
     theatre.proxy.come_back();
     surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
     theatre.keeps("SELECT value FROM answers WHERE question = 'sharpness' ORDER BY number", &["3", "5", "6"]).await;
-    surgeon.click(".questions .done button").await;
+    surgeon.tap_in_panel(".questions .done button").await;
     theatre.tap_notice(2).await;
     theatre.keeps("SELECT value FROM answers WHERE question = 'remarks'", &["\"Half a remark\""]).await;
     assert_eq!(surgeon.kept_on_device().await, Vec::<String>::new());

@@ -57,7 +57,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     theatre.tap_notice(1).await;
     theatre.finish().await;
 
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     surgeon.cut("/answers").await;
     theatre.choose("sharpness", 3).await;
     surgeon.sees("[data-question=sharpness] > .state", "Saved here").await;

@@ -60,7 +60,14 @@ pub fn start_again(server: &mut Server) {
 }
 
 impl Browser {
-    /// Taps `css` in the panel over the picture, once the panel takes taps: right after it has appeared it takes none.
+    /// Waits for the panel over the picture whose heading contains `heading`, and until it takes taps: right after it
+    /// has appeared it takes none.
+    pub async fn sees_panel(&self, heading: &str) {
+        self.sees("#panel h2", heading).await;
+        until("the panel to take taps", || async { self.count("#panel[data-fresh]").await == 0 }).await;
+    }
+
+    /// Taps `css` in the panel over the picture, once the panel takes taps.
     pub async fn tap_in_panel(&self, css: &str) {
         until("the panel to take taps", || async {
             self.count(css).await > 0 && self.count("#panel[data-fresh]").await == 0
@@ -196,10 +203,10 @@ impl Theatre {
 
     /// The surgeon answers the questions after a setting and continues.
     pub async fn answer_questions(&self, point: u8) {
-        self.surgeon.sees("#panel h2", "a few questions").await;
+        self.surgeon.sees_panel("a few questions").await;
         self.choose("sharpness", point).await;
         self.surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
-        self.surgeon.click(".questions .done button").await;
+        self.surgeon.tap_in_panel(".questions .done button").await;
         self.surgeon.sees_no("[data-question=sharpness]").await;
     }
 

@@ -27,7 +27,7 @@ impl Theatre {
         other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
         other.tap_in_panel("input[name=sharpness][value='3']").await;
         other.sees("[data-question=sharpness] > .state", "Saved").await;
-        other.click(".questions .done button").await;
+        other.tap_in_panel(".questions .done button").await;
     }
 
     /// Waits until the result of `sql` in the database is `expected`.
@@ -61,7 +61,7 @@ async fn an_answer_left_half_written_is_sent_when_its_question_is_gone() {
     theatre.begin("S-07", "short").await;
     theatre.tap_notice(1).await;
     theatre.finish().await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
     // Written and left at once, before the page has sent it.
     surgeon.write_and_leave(REMARKS, "Half an answer").await;
     theatre.put_away().await;
@@ -122,7 +122,7 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
     }
     assert!(surgeon.text("#finish").await.contains("Tap again"), "a key held down is one press");
     press(surgeon, "Enter", "\r", false).await;
-    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.sees_panel("a few questions").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -80,7 +80,13 @@ impl Shared {
         action: &Action,
         signature: Option<&Signature>,
     ) -> Result<(), ConductError> {
-        let mut pen = self.pen.lock().await;
+        // While the disk refuses to record a stop, somebody is trying most of the time. Who asks then is told why at once,
+        // not after waiting for that attempt and one more.
+        let refused = self.live().unrecorded_because.clone();
+        let mut pen = match refused {
+            Some(because) => self.pen.try_lock().map_err(|_| ConductError::Storage(because))?,
+            None => self.pen.lock().await,
+        };
         let events = loop {
             self.keep_time();
             if let Some(course) = self.live().course_of(session) {
