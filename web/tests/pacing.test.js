@@ -55,6 +55,12 @@ test("a message holds a header of the length that it states, then the picture", 
   assert.deepEqual([...jpeg], [9, 8, 7]);
 });
 
+test("a picture that came before the page's scripts is as old as it is", async () => {
+  const { notes, page, clock } = notingPage();
+  await new Pictures(page).take(FRAME, clock.ms - 400);
+  assert.equal(notes.at(-1), "acknowledge 7 after 400 ms");
+});
+
 test("a picture is acknowledged after it was drawn, once", async () => {
   const { notes, page } = notingPage();
   await new Pictures(page).take(FRAME);

@@ -2,8 +2,10 @@
 //! pixels are left out, because the surgeon is to judge the picture.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::io::Read;
 
+use flate2::read::GzDecoder;
+use parfocal_dashboard::http::assets;
 use serde_json::Value;
 
 use super::proxy::Connection;
@@ -30,7 +32,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 58] = [
+const KEYS: [&str; 59] = [
     "age",
     "answers",
     "area",
@@ -52,6 +54,7 @@ const KEYS: [&str; 58] = [
     "may_resume",
     "name",
     "notice",
+    "only_if_yes",
     "optional",
     "pairs",
     "patch",
@@ -91,8 +94,16 @@ const KEYS: [&str; 58] = [
     "sharpness",
 ];
 /// Question ids, which are keys too where answers are listed.
-const QUESTION_IDS: [&str; 7] =
-    ["usability", "closing-remarks", "effort", "how-often", "workload", "seen-before", "surgical-workload"];
+const QUESTION_IDS: [&str; 8] = [
+    "usability",
+    "closing-remarks",
+    "effort",
+    "how-often",
+    "workload",
+    "seen-before",
+    "seen-before-why",
+    "surgical-workload",
+];
 
 /// A question of the NASA Task Load Index about every setting, in its published words.
 const PUBLISHED: &str = "what you were asked to do";
@@ -169,13 +180,15 @@ fn answer(seen: &mut Seen, path: &str, head: &str, body: &[u8]) {
     }
 }
 
-/// A static file that equals the repository's file is the same whichever policy runs.
+/// A static file that was built into the program is the same whichever policy runs.
 fn file(seen: &mut Seen, name: &str, body: &[u8]) {
     if body.is_empty() {
         return; // kept by the browser from before: 304
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("web/static").join(name);
-    assert!(std::fs::read(file).unwrap() == body, "{name} is not the file of the repository");
+    let mut unpacked = Vec::new();
+    let is_packed = GzDecoder::new(body).read_to_end(&mut unpacked).is_ok();
+    let got = if is_packed { &unpacked } else { body };
+    assert!(assets::content(name) == Some(got), "{name} is not the file of the program");
     seen.files.insert(name.to_owned());
 }
 

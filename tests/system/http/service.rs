@@ -1,10 +1,12 @@
 //! The service: how it starts and ends, the contents of every response, files, errors, and the description of the
 //! interface.
 
+use std::io::Read;
 use std::net::TcpListener;
 
+use flate2::read::GzDecoder;
 use reqwest::StatusCode;
-use reqwest::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
+use reqwest::header::{ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, ETAG, IF_NONE_MATCH, VARY};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -197,6 +199,35 @@ async fn static_files_are_kept_for_ever_by_their_hash() {
     ] {
         assert_eq!(server.get(missing).send().await.unwrap().status(), StatusCode::NOT_FOUND, "{missing}");
     }
+}
+
+/// The goal of issue 45 for a tablet at the end of a slow link: at most 15 requests to open the surgeon's page. Besides
+/// these there are its link, the page, the session, the worker and the page for it, and the live connection.
+#[tokio::test]
+async fn the_surgeons_page_needs_few_files_and_they_are_small() {
+    const BESIDES: usize = 6;
+    let server = Server::start();
+    let page = server.get_as("surgeon", "/surgeon").send().await.unwrap().text().await.unwrap();
+    let files: Vec<&str> = page.split('"').filter(|part| part.starts_with("/static/")).collect();
+    assert!(files.len() + BESIDES <= 15, "{files:?}");
+
+    let mut bytes = 0;
+    for file in &files {
+        let plain = server.get(file).send().await.unwrap().bytes().await.unwrap();
+        let answer = server.get(file).header(ACCEPT_ENCODING, "gzip, deflate, br").send().await.unwrap();
+        assert_eq!(answer.headers()[CONTENT_ENCODING], "gzip");
+        assert_eq!(answer.headers()[VARY], "accept-encoding");
+        let packed = answer.bytes().await.unwrap();
+        bytes += packed.len();
+        let mut unpacked = Vec::new();
+        GzDecoder::new(&*packed).read_to_end(&mut unpacked).unwrap();
+        assert!(unpacked == plain, "{file}");
+
+        let text = String::from_utf8_lossy(&plain);
+        assert!(!text.lines().any(|line| line.starts_with("import ")), "{file} asks for further files");
+    }
+    // Half a second at 1 Mbit/s.
+    assert!(bytes < 62_500, "{bytes} bytes");
 }
 
 #[tokio::test]

@@ -5,6 +5,22 @@ import { Reconnection } from "./reconnection.js";
 
 const LOOK_MS = 1000;
 
+/**
+ * A connection that the page opened before its scripts came, with what was heard on it, until it is taken over.
+ *
+ * @typedef {object} Early
+ * @property {WebSocket} socket
+ * @property {{ data: any, at: number }[]} heard `at` is in milliseconds of the page's clock
+ */
+
+/** Takes over the connection that the page opened early; null if there is none that is alive. */
+function takeEarly() {
+  const page = /** @type {{ early?: Early }} */ (globalThis);
+  const early = page.early;
+  delete page.early;
+  return early && isAlive(early.socket) ? early : null;
+}
+
 /** The server closes the connection with this code when the page's link is no longer valid. */
 const LINK_OVER = 4403;
 
@@ -93,28 +109,38 @@ export class Live {
 
   #connect() {
     if (this.#over || isAlive(this.#socket)) return;
-    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    const socket = new WebSocket(`${scheme}//${location.host}/live?role=${this.#role}`);
+    const early = takeEarly();
+    const socket = early?.socket ?? new WebSocket(this.#address());
     socket.binaryType = "arraybuffer";
+    this.#socket = socket;
     this.#reconnection.heard(performance.now());
     const pictures = this.#pictures(socket);
 
-    socket.onopen = () => {
+    const opened = () => {
       if (socket !== this.#socket) return;
       this.#reconnection.opened();
       this.#tellVisibility();
       this.#sendScreen();
       this.#tellConnection(true);
     };
-    socket.onmessage = ({ data }) => {
+    const take = (/** @type {any} */ data, /** @type {number} */ at) => {
       if (socket !== this.#socket) return;
-      this.#reconnection.heard(performance.now());
+      this.#reconnection.heard(at);
       for (const listener of this.#listeners) listener.heard?.();
       if (typeof data === "string") this.#hear(JSON.parse(data));
-      else pictures.take(data);
+      else pictures.take(data, at);
     };
+    socket.onopen = opened;
+    socket.onmessage = ({ data }) => take(data, performance.now());
     socket.onclose = ({ code }) => this.#lost(socket, code);
-    this.#socket = socket;
+
+    if (socket.readyState === WebSocket.OPEN) opened();
+    for (const { data, at } of early?.heard ?? []) take(data, at);
+  }
+
+  #address() {
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    return `${scheme}//${location.host}/live?role=${this.#role}`;
   }
 
   /**

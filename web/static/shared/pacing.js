@@ -46,9 +46,12 @@ export class Pictures {
     this.#page = page;
   }
 
-  /** @param {ArrayBuffer} message */
-  async take(message) {
-    this.#waiting.push({ message, receivedAt: this.#page.now() });
+  /**
+   * @param {ArrayBuffer} message
+   * @param {number} [receivedAt] when it came, if not just now
+   */
+  async take(message, receivedAt = this.#page.now()) {
+    this.#waiting.push({ message, receivedAt });
     if (this.#isDrawing) return;
 
     this.#isDrawing = true;

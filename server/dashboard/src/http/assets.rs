@@ -1,158 +1,216 @@
 //! Static files, built into the program. Their addresses contain a hash of all of them, so browsers can keep them
 //! forever, and a new version of the program is never mixed with old files.
+//!
+//! Of the surgeon's page all scripts are one file, and every file is compressed where the browser takes that: a tablet
+//! at the end of a slow link opens the page several times sooner.
 
-use std::sync::LazyLock;
+use std::io::Write;
+use std::sync::{LazyLock, OnceLock};
 
 use axum::extract::Path;
 use axum::http::StatusCode;
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, HeaderMap, IF_NONE_MATCH};
+use axum::http::header::{
+    ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, ETAG, HeaderMap, IF_NONE_MATCH, VARY,
+};
 use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use sha2::{Digest, Sha256};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::bundle::bundle;
 use super::error::Error;
 
 struct Asset {
     name: &'static str,
+    /// The file as it is in the repository.
     body: &'static [u8],
+    /// What a browser gets, compressed; made when it is first asked for.
+    packed: OnceLock<Vec<u8>>,
+}
+
+/// The script of the surgeon's page, which browsers get with all that it imports.
+const BUNDLED: &str = "surgeon/page.js";
+
+/// What else the surgeon's page loads.
+const WITH_BUNDLE: [&str; 4] = ["shared/style.css", "shared/viewer.css", "shared/icon.svg", "surgeon/page.css"];
+
+/// The script of the surgeon's page in one file; as it is in the repository if the scripts cannot be put together, which
+/// a test rules out.
+static BUNDLE: LazyLock<Vec<u8>> = LazyLock::new(|| match bundle(BUNDLED, &source) {
+    Ok(text) => text.into_bytes(),
+    Err(error) => {
+        tracing::error!(%error, "the scripts of the surgeon's page are sent one by one");
+        source(BUNDLED).unwrap_or_default().as_bytes().to_vec()
+    }
+});
+
+/// The text of script `name`.
+fn source(name: &str) -> Option<&'static str> {
+    body(name).and_then(|body| std::str::from_utf8(body).ok())
+}
+
+impl Asset {
+    /// What a browser gets.
+    fn content(&self) -> &'static [u8] {
+        if self.name == BUNDLED { &BUNDLE } else { self.body }
+    }
+
+    /// The same, compressed.
+    fn packed(&'static self) -> &'static [u8] {
+        self.packed.get_or_init(|| {
+            let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+            // Writing to memory does not fail.
+            let written = encoder.write_all(self.content()).and_then(|()| encoder.finish());
+            written.unwrap_or_default()
+        })
+    }
 }
 
 macro_rules! assets {
     ($($name:literal),* $(,)?) => {
-        [$(Asset { name: $name, body: include_bytes!(concat!("../../../../web/static/", $name)) }),*]
+        [$(Asset {
+            name: $name,
+            body: include_bytes!(concat!("../../../../web/static/", $name)),
+            packed: OnceLock::new(),
+        }),*]
     };
 }
 
 /// All files of `web/static/`, by folder and name. A test compares this table with the folder.
-static ASSETS: &[Asset] = &assets![
-    "accounts/backup.js",
-    "accounts/people.js",
-    "accounts/sign_in.js",
-    "offline/worker.js",
-    "operator/camera_card.js",
-    "operator/camera_settings.js",
-    "operator/checks_card.js",
-    "operator/checks_words.js",
-    "operator/choices.js",
-    "operator/consent.js",
-    "operator/device_words.js",
-    "operator/devices.js",
-    "operator/focus_card.js",
-    "operator/now.js",
-    "operator/orders.js",
-    "operator/page.css",
-    "operator/page.js",
-    "operator/recording_card.js",
-    "operator/recording_words.js",
-    "operator/session_card.js",
-    "operator/session_words.js",
-    "operator/surgeon_link.js",
-    "operator/traces.js",
-    "researcher/analysis.css",
-    "researcher/correction_words.js",
-    "researcher/corrections.js",
-    "researcher/deeds.js",
-    "researcher/definition.js",
-    "researcher/metric_drawing.js",
-    "researcher/page.css",
-    "researcher/pictures.js",
-    "researcher/player.js",
-    "researcher/player_words.js",
-    "researcher/playhead.js",
-    "researcher/session.js",
-    "researcher/studies.js",
-    "researcher/study.js",
-    "researcher/study_export.js",
-    "researcher/study_export_words.js",
-    "researcher/svg.js",
-    "researcher/timeline.js",
-    "researcher/timeline_drawing.js",
-    "researcher/timeline_words.js",
-    "researcher/track.js",
-    "researcher/voice.js",
-    "shared/api.js",
-    "shared/canvas.js",
-    "shared/contact.js",
-    "shared/copy.js",
-    "shared/dialogs.js",
-    "shared/dom.js",
-    "shared/fit.js",
-    "shared/framing.js",
-    "shared/gestures.js",
-    "shared/icon.svg",
-    "shared/live.js",
-    "shared/overlay.js",
-    "shared/overlay_boxes.js",
-    "shared/pacing.js",
-    "shared/peaking.js",
-    "shared/reconnection.js",
-    "shared/sight.js",
-    "shared/sign_in.js",
-    "shared/storage.js",
-    "shared/style.css",
-    "shared/text.js",
-    "shared/trouble.js",
-    "shared/uuid.js",
-    "shared/viewer.css",
-    "shared/viewer.js",
-    "shared/zooming.js",
-    "surgeon/answers.js",
-    "surgeon/awake.js",
-    "surgeon/choices.js",
-    "surgeon/comment_box.js",
-    "surgeon/comments.js",
-    "surgeon/confirm.js",
-    "surgeon/confirm_button.js",
-    "surgeon/device.js",
-    "surgeon/dimmer.js",
-    "surgeon/disk_store.js",
-    "surgeon/drafts.js",
-    "surgeon/grip.js",
-    "surgeon/holding.js",
-    "surgeon/instrument_form.js",
-    "surgeon/last_view.js",
-    "surgeon/microphone.js",
-    "surgeon/notice.js",
-    "surgeon/notice_dialog.js",
-    "surgeon/now.js",
-    "surgeon/offline.js",
-    "surgeon/origin.js",
-    "surgeon/outbox.js",
-    "surgeon/over.js",
-    "surgeon/page.css",
-    "surgeon/page.js",
-    "surgeon/panel.js",
-    "surgeon/question_form.js",
-    "surgeon/question_panel.js",
-    "surgeon/questions.js",
-    "surgeon/ranking.js",
-    "surgeon/room.js",
-    "surgeon/storage_words.js",
-    "surgeon/talk.js",
-    "surgeon/talk_button.js",
-    "surgeon/talk_keys.js",
-    "surgeon/tap_guard.js",
-    "surgeon/track.js",
-    "surgeon/voice_outbox.js",
-    "surgeon/words.js",
-    "tablet/device.js",
-    "tablet/page.js",
-    "tablet/trials.js",
-    "tablet/words.js",
-    "trust/page.css",
-    "trust/page.js",
-    "trust/verdict.js",
-];
+static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    Vec::from(assets![
+        "accounts/backup.js",
+        "accounts/people.js",
+        "accounts/sign_in.js",
+        "offline/worker.js",
+        "operator/camera_card.js",
+        "operator/camera_settings.js",
+        "operator/checks_card.js",
+        "operator/checks_words.js",
+        "operator/choices.js",
+        "operator/consent.js",
+        "operator/device_words.js",
+        "operator/devices.js",
+        "operator/focus_card.js",
+        "operator/now.js",
+        "operator/orders.js",
+        "operator/page.css",
+        "operator/page.js",
+        "operator/recording_card.js",
+        "operator/recording_words.js",
+        "operator/session_card.js",
+        "operator/session_words.js",
+        "operator/surgeon_link.js",
+        "operator/traces.js",
+        "researcher/analysis.css",
+        "researcher/correction_words.js",
+        "researcher/corrections.js",
+        "researcher/deeds.js",
+        "researcher/definition.js",
+        "researcher/metric_drawing.js",
+        "researcher/page.css",
+        "researcher/pictures.js",
+        "researcher/player.js",
+        "researcher/player_words.js",
+        "researcher/playhead.js",
+        "researcher/session.js",
+        "researcher/studies.js",
+        "researcher/study.js",
+        "researcher/study_export.js",
+        "researcher/study_export_words.js",
+        "researcher/svg.js",
+        "researcher/timeline.js",
+        "researcher/timeline_drawing.js",
+        "researcher/timeline_words.js",
+        "researcher/track.js",
+        "researcher/voice.js",
+        "shared/api.js",
+        "shared/canvas.js",
+        "shared/contact.js",
+        "shared/copy.js",
+        "shared/dialogs.js",
+        "shared/dom.js",
+        "shared/fit.js",
+        "shared/framing.js",
+        "shared/gestures.js",
+        "shared/icon.svg",
+        "shared/live.js",
+        "shared/overlay.js",
+        "shared/overlay_boxes.js",
+        "shared/pacing.js",
+        "shared/peaking.js",
+        "shared/reconnection.js",
+        "shared/sight.js",
+        "shared/sign_in.js",
+        "shared/storage.js",
+        "shared/style.css",
+        "shared/text.js",
+        "shared/trouble.js",
+        "shared/uuid.js",
+        "shared/viewer.css",
+        "shared/viewer.js",
+        "shared/zooming.js",
+        "surgeon/answers.js",
+        "surgeon/awake.js",
+        "surgeon/choices.js",
+        "surgeon/comment_box.js",
+        "surgeon/comments.js",
+        "surgeon/confirm.js",
+        "surgeon/confirm_button.js",
+        "surgeon/device.js",
+        "surgeon/dimmer.js",
+        "surgeon/disk_store.js",
+        "surgeon/drafts.js",
+        "surgeon/grip.js",
+        "surgeon/holding.js",
+        "surgeon/instrument_form.js",
+        "surgeon/last_view.js",
+        "surgeon/microphone.js",
+        "surgeon/notice.js",
+        "surgeon/notice_dialog.js",
+        "surgeon/now.js",
+        "surgeon/offline.js",
+        "surgeon/origin.js",
+        "surgeon/outbox.js",
+        "surgeon/over.js",
+        "surgeon/page.css",
+        "surgeon/page.js",
+        "surgeon/panel.js",
+        "surgeon/question_form.js",
+        "surgeon/question_panel.js",
+        "surgeon/questions.js",
+        "surgeon/ranking.js",
+        "surgeon/room.js",
+        "surgeon/storage_words.js",
+        "surgeon/talk.js",
+        "surgeon/talk_button.js",
+        "surgeon/talk_keys.js",
+        "surgeon/tap_guard.js",
+        "surgeon/track.js",
+        "surgeon/voice_outbox.js",
+        "surgeon/words.js",
+        "tablet/device.js",
+        "tablet/page.js",
+        "tablet/trials.js",
+        "tablet/words.js",
+        "trust/page.css",
+        "trust/page.js",
+        "trust/verdict.js",
+    ])
+});
 
 /// Hash of all files: the first 8 bytes of a SHA-256, in hexadecimal.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let mut hash = Sha256::new();
-    for asset in ASSETS {
+    for asset in ASSETS.iter() {
         hash.update(asset.name);
         hash.update(asset.body.len().to_le_bytes());
         hash.update(asset.body);
     }
+    // How the scripts are put together may change, too.
+    hash.update(&*BUNDLE);
     hex::encode(&hash.finalize()[..8])
 });
 
@@ -168,15 +226,25 @@ pub fn version() -> &'static str {
     &VERSION
 }
 
-/// Addresses of all static files in `folder`.
-pub fn urls_in(folder: &str) -> impl Iterator<Item = String> {
-    ASSETS.iter().filter(move |asset| asset.name.split('/').next() == Some(folder)).map(|asset| url(asset.name))
+/// Addresses of all files that the surgeon's page loads.
+pub fn surgeon_urls() -> impl Iterator<Item = String> {
+    WITH_BUNDLE.into_iter().chain([BUNDLED]).map(url)
 }
 
-/// The content of static file `name`; `None` if there is no such file.
+/// What a browser gets as static file `name`; `None` if there is no such file.
+#[must_use]
+pub fn content(name: &str) -> Option<&'static [u8]> {
+    asset_of(name).map(Asset::content)
+}
+
+fn asset_of(name: &str) -> Option<&'static Asset> {
+    ASSETS.iter().find(|asset| asset.name == name)
+}
+
+/// Static file `name` as it is in the repository; `None` if there is no such file.
 #[must_use]
 pub fn body(name: &str) -> Option<&'static [u8]> {
-    ASSETS.iter().find(|asset| asset.name == name).map(|asset| asset.body)
+    asset_of(name).map(|asset| asset.body)
 }
 
 /// A static file: a script, a style sheet, an icon.
@@ -200,17 +268,33 @@ async fn asset(
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let name = format!("{folder}/{name}");
-    let body = body(&name).ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
+    let asset = asset_of(&name).ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
 
     // A page of an older version of the program asks with the older hash. It gets the current file, and must not keep
     // it.
     let cache = if version == *VERSION { "public, max-age=31536000, immutable" } else { "no-cache" };
-    let etag = format!("\"{}\"", *VERSION);
-    let common = [(CACHE_CONTROL, cache.to_owned()), (ETAG, etag.clone())];
+    let packs = takes_gzip(&headers);
+    let etag = if packs { format!("\"{}-gzip\"", *VERSION) } else { format!("\"{}\"", *VERSION) };
+    let common = [(CACHE_CONTROL, cache.to_owned()), (ETAG, etag.clone()), (VARY, "accept-encoding".to_owned())];
     if headers.get(IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
-    Ok((common, [(CONTENT_TYPE, content_type(&name))], body).into_response())
+
+    let kind = [(CONTENT_TYPE, content_type(&name))];
+    if packs {
+        return Ok((common, kind, [(CONTENT_ENCODING, "gzip")], asset.packed()).into_response());
+    }
+    Ok((common, kind, asset.content()).into_response())
+}
+
+/// Whether the browser takes compressed files (RFC 9110, section 12.5.3).
+fn takes_gzip(headers: &HeaderMap) -> bool {
+    let accepted = headers.get(ACCEPT_ENCODING).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    accepted.split(',').any(|coding| {
+        let mut parts = coding.split(';').map(str::trim);
+        let refused = |weight: &str| weight.strip_prefix("q=").is_some_and(|q| q.parse() == Ok(0.0));
+        parts.next() == Some("gzip") && !parts.any(refused)
+    })
 }
 
 fn content_type(name: &str) -> &'static str {
@@ -234,7 +318,12 @@ pub fn routes() -> OpenApiRouter<AppState> {
 mod tests {
     use std::path::Path;
 
-    use super::{ASSETS, content_type};
+    use std::io::Read;
+
+    use axum::http::header::{ACCEPT_ENCODING, HeaderMap};
+    use flate2::read::GzDecoder;
+
+    use super::{ASSETS, asset_of, bundle, content, content_type, source, takes_gzip};
 
     #[test]
     fn every_file_of_the_folder_is_part_of_the_program() {
@@ -253,5 +342,35 @@ mod tests {
         }
 
         assert_eq!(found, ASSETS.len(), "a file stands in the table twice");
+    }
+
+    #[test]
+    fn the_scripts_of_every_page_can_be_put_together() {
+        for asset in ASSETS.iter().filter(|asset| asset.name.ends_with(".js") && asset.name != "offline/worker.js") {
+            bundle(asset.name, &source).unwrap();
+        }
+        let page = std::str::from_utf8(content("surgeon/page.js").unwrap()).unwrap();
+        assert!(page.contains("// shared/live.js") && !page.contains("\nimport ") && !page.contains("\nexport "));
+    }
+
+    #[test]
+    fn a_packed_file_is_the_file_and_much_smaller() {
+        let page = asset_of("surgeon/page.js").unwrap();
+        let mut unpacked = Vec::new();
+        GzDecoder::new(page.packed()).read_to_end(&mut unpacked).unwrap();
+        assert!(unpacked == page.content());
+        assert!(page.packed().len() * 3 < unpacked.len(), "{} of {}", page.packed().len(), unpacked.len());
+    }
+
+    #[test]
+    fn a_browser_that_does_not_take_compressed_files_gets_none() {
+        let takes = |accepted: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(ACCEPT_ENCODING, accepted.parse().unwrap());
+            takes_gzip(&headers)
+        };
+        assert!(takes("gzip") && takes("br, gzip;q=0.5, *") && takes("deflate,gzip"));
+        assert!(!takes("br") && !takes("gzip;q=0, br") && !takes("gzip; q=0.000") && !takes("") && !takes("x-gzip"));
+        assert!(!takes_gzip(&HeaderMap::new()));
     }
 }

@@ -5,6 +5,7 @@ mod accounts;
 mod analysis;
 pub mod assets;
 mod backup;
+mod bundle;
 mod camera;
 mod checks;
 mod connections;

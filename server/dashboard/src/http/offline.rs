@@ -34,7 +34,7 @@ struct Offline {
 #[utoipa::path(get, path = "/surgeon/worker.js", tag = "surgeon",
     responses((status = 200, description = "The script", content_type = "text/javascript")))]
 async fn worker(_: SurgeonsTablet) -> Result<Response, Error> {
-    let files = ["surgeon", "shared"].into_iter().flat_map(assets::urls_in).collect();
+    let files = assets::surgeon_urls().collect();
     let offline = Offline { version: assets::version(), files };
     let offline = serde_json::to_string(&offline).map_err(|_| Error::Internal)?;
 
