@@ -1,6 +1,9 @@
 //! Voice over HTTP: pieces are accepted only from a surgeon's tablet and played only to the researcher, in the byte
 //! ranges that a browser requests. Only pages that need it may use the microphone or play sound.
 
+use std::path::Path;
+use std::process::Command;
+
 use serde_json::{Value, json};
 
 use crate::support::Server;
@@ -82,6 +85,53 @@ async fn a_recording_comes_in_pieces_from_a_tablet_and_is_played_in_parts_to_the
     }
     let nobody = path.replace(COMMENT, "00000000-0000-4000-8000-000000000002");
     assert_eq!(server.get_as("researcher", &nobody).send().await.unwrap().status(), 404);
+}
+
+/// Three and a half seconds of a tone as browsers record: the file does not say how long it is. `None` without ffmpeg.
+fn as_browsers_record(folder: &Path, name: &str, form: &[&str]) -> Option<Vec<u8>> {
+    let file = folder.join(name);
+    let tone = ["-v", "error", "-f", "lavfi", "-i", "sine=frequency=440:duration=3.5"];
+    let made = Command::new("ffmpeg").args(tone).args(form).arg(&file).status();
+    made.is_ok_and(|status| status.success()).then(|| std::fs::read(file).unwrap())
+}
+
+/// The length in seconds that the header of a file states; `None` if it states none.
+fn stated(file: &Path) -> Option<f64> {
+    let asked = ["-v", "error", "-show_entries", "format=duration", "-of", "default=nw=1:nk=1"];
+    let output = Command::new("ffprobe").args(asked).arg(file).output().unwrap();
+    String::from_utf8(output.stdout).unwrap().trim().parse().ok()
+}
+
+/// Chrome and Firefox record `WebM` with Opus, Safari MP4 with AAC.
+#[tokio::test]
+async fn a_recording_of_either_format_tells_its_player_how_long_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let webm = ["-c:a", "libopus", "-b:a", "24k", "-f", "webm", "-live", "1"];
+    let mp4 = ["-c:a", "aac", "-b:a", "32k", "-f", "mp4", "-movflags", "empty_moov+default_base_moof+frag_keyframe"];
+    let formats = [("live.webm", OPUS, webm.as_slice()), ("live.mp4", "audio/mp4", mp4.as_slice())];
+    for (name, media_type, form) in formats {
+        let Some(sound) = as_browsers_record(folder.path(), name, form) else {
+            println!("skipped: no ffmpeg to make a recording with");
+            return;
+        };
+
+        let server = server();
+        let session = a_session(&server, "S-05", "spoken").await;
+        let comment = json!({"key": COMMENT, "session": session, "kind": "voice"});
+        post(&server, "surgeon", "/api/surgeon/comments", &comment).await;
+        let half = sound.len() / 2;
+        let first = format!("1?session={session}&through_ms=1700");
+        assert_eq!(send(&server, "surgeon", &first, media_type, sound[..half].to_vec()).await.0, 204);
+        let last = format!("2?session={session}&through_ms=3500&ended=released");
+        assert_eq!(send(&server, "surgeon", &last, media_type, sound[half..].to_vec()).await.0, 204);
+
+        let path = format!("/api/researcher/sessions/{session}/voice/{COMMENT}");
+        let played = server.get_as("researcher", &path).send().await.unwrap().bytes().await.unwrap();
+        let file = folder.path().join(format!("played-{name}"));
+        std::fs::write(&file, played).unwrap();
+        let seconds = stated(&file);
+        assert!(seconds.is_some_and(|seconds| (seconds - 3.5).abs() < 0.1), "{name}: {seconds:?}");
+    }
 }
 
 #[tokio::test]

@@ -16,6 +16,7 @@ use super::people::Acting;
 use super::ranges;
 use super::roles::{Researcher, SurgeonsTablet};
 use parfocal_base::ids::{IdempotencyKey, SessionId};
+use parfocal_results::package::playable::with_duration;
 use parfocal_trial::voice::{Ending, NewPiece};
 
 #[derive(Deserialize, IntoParams)]
@@ -62,7 +63,8 @@ async fn keep_piece(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets that range.
+/// The sound of a voice comment, as far as it has arrived, for a player: with its duration, which browsers do not write
+/// into what they record. Exports have it as it arrived. A request for a range of bytes gets that range.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/voice/{comment}", tag = "researcher",
     params(("session" = SessionId, Path), ("comment" = IdempotencyKey, Path, description = "The comment's key")),
     responses(
@@ -80,7 +82,7 @@ async fn recording(
 ) -> Result<Response, Error> {
     by.for_session(&app, session).await?;
     let (media_type, audio) = app.conductor.voice_audio(session, comment).await?;
-    let mut response = ranges::answer(&headers, audio);
+    let mut response = ranges::answer(&headers, with_duration(media_type, audio));
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(media_type.name()));
     Ok(response)
 }

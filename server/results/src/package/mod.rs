@@ -10,7 +10,7 @@ mod error;
 mod join;
 mod labels;
 mod parquet;
-mod playable;
+pub mod playable;
 mod r;
 mod redcap;
 mod source;
