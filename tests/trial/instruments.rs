@@ -107,6 +107,9 @@ async fn every_instrument_is_answered_and_scored() {
 
     trial.answer("workload", points(&[21, 0, 0, 0, 0, 0])).await.unwrap();
     trial.answer("seen-before", AnswerValue::Point(3)).await.unwrap();
+    let why = trial.view().questions.into_iter().find(|question| question.id == "seen-before-why").unwrap();
+    assert_eq!((why.only_if_yes.as_deref(), why.optional), (Some("seen-before"), true));
+    trial.answer("seen-before-why", AnswerValue::Text("it never moves".to_owned())).await.unwrap();
     trial.surgeon(Action::FinishQuestions { segment }).await;
     let earlier = [7, 4, 13, 9, 7, 9, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1];
     trial.answer("surgical-workload", points(&earlier)).await.unwrap();
@@ -140,6 +143,7 @@ async fn every_instrument_is_answered_and_scored() {
     };
     assert_eq!(words("how-often", Some(1)), "3 (Sometimes)");
     assert_eq!(words("seen-before", Some(2)), "Yes");
+    assert_eq!(words("seen-before-why", Some(2)), "it never moves");
     assert!(words("workload", Some(1)).starts_with("Mental demand 30, Physical demand 15"), "{detail:?}");
 }
 
@@ -183,6 +187,7 @@ fn a_protocol_with_a_wrong_instrument_is_refused_with_line_and_key() {
         ("kind = \"likert\"", "kind = \"likert\"\npoints = 5", "not allowed together with 'labels'"),
         ("consent_version = \"2.1\"", "consent_version = \" \"", "key 'consent_version'"),
         ("kind = \"recognition\"", "kind = \"recognise\"", "key 'kind'"),
+        ("id = \"remarks\"", "id = \"seen-before-why\"", "'seen-before-why' is used twice"),
     ] {
         let fault = fault(from, to);
         assert!(fault.starts_with("trial.toml, line ") && fault.contains(said), "{to}: {fault}");

@@ -362,3 +362,27 @@ test("long questionnaires say how far one is", () => {
   assert.equal(new Questionnaire([usability, ask(SHARPNESS, 4)]).progressWords, "9 of 11 answered");
   assert.equal(new Questionnaire([ask(SHARPNESS)]).progressWords, "", "one question is seen at a glance");
 });
+
+test("what gave a setting away is asked only of who recognised one, and counts as no open question before", () => {
+  const { ask, given } = openPage();
+  /** @type {Api.Question} */
+  const recognised = { id: "seen", kind: "recognition", text: "Recognised?" };
+  /** @type {Api.Question} */
+  const why = { id: "seen-why", kind: "text", text: "By what?", optional: true, only_if_yes: "seen" };
+  /** @type {ScaleAnswer} */
+  const guess = ask(recognised);
+  const words = ask(why);
+  const asked = new Questionnaire([guess, words, ask(SHARPNESS), ask(REMARKS)]);
+
+  assert.equal(asked.isAsked(words), false);
+  assert.equal(asked.progressWords, "0 of 3 answered");
+  guess.choose(2);
+  assert.equal(asked.isAsked(words), false);
+  guess.choose(3);
+  assert.equal(asked.isAsked(words), true);
+  assert.equal(asked.progressWords, "1 of 4 answered");
+  assert.deepEqual(
+    given.map(({ value }) => value),
+    [2, 3],
+  );
+});

@@ -76,7 +76,7 @@ mod tests {
     use crate::question::QuestionKind;
 
     fn question(kind: QuestionKind) -> Question {
-        Question { id: "q".to_owned(), text: "?".to_owned(), kind, optional: false }
+        Question { id: "q".to_owned(), text: "?".to_owned(), kind, optional: false, only_if_yes: None }
     }
 
     #[test]

@@ -17,6 +17,9 @@ pub struct Question {
     /// Whether the question can be left unanswered.
     #[serde(default)]
     pub optional: bool,
+    /// Id of the recognition question to which this one belongs: it is asked only if that one is answered with yes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub only_if_yes: Option<String>,
 }
 
 /// The kinds of question, by the answers that they take.

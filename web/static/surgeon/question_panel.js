@@ -38,6 +38,12 @@ export class QuestionPanel {
     }
     this.#questionnaire = new Questionnaire(answers);
     this.#boxes = answers.map((answer) => questionBox(answer, () => this.#settled()));
+    this.#showAsked();
+  }
+
+  /** Shows the questions that are asked, and no others. */
+  #showAsked() {
+    for (const { answer, element } of this.#boxes) element.hidden = !this.#questionnaire.isAsked(answer);
   }
 
   /**
@@ -118,6 +124,7 @@ export class QuestionPanel {
   /** The surgeon has changed an answer. Clears the message about open questions once none is marked as open. */
   #settled() {
     if (!this.#questionnaire.marked) tell(this.#missing, "");
+    this.#showAsked();
     this.#drawProgress();
   }
 
@@ -158,6 +165,7 @@ export class QuestionPanel {
 
   #draw() {
     for (const box of this.#boxes) box.draw();
+    this.#showAsked();
     this.#drawProgress();
   }
 

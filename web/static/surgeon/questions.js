@@ -43,6 +43,9 @@ const SUS_ITEMS = [
 /** Up to this many questions, the number of answers given is not shown. */
 const AT_A_GLANCE = 3;
 
+/** Recognition questions are answered with 1 for no, 2 for not sure, 3 for yes. */
+const YES = 3;
+
 const TYPING_PAUSE_MS = 900;
 export const NOT_ANSWERED = "Not answered yet";
 
@@ -582,6 +585,17 @@ export class Questionnaire {
     return this.answers.find((answer) => answer.question.id === question);
   }
 
+  /**
+   * Whether the surgeon is to see a question. One that belongs to a yes is asked only after it.
+   *
+   * @param {AnyAnswer} answer
+   */
+  isAsked({ question }) {
+    if (!question.only_if_yes) return true;
+    const before = this.find(question.only_if_yes);
+    return before instanceof ScaleAnswer && before.point === YES;
+  }
+
   /** Marks the questions that are still to be answered, and returns them. */
   check() {
     for (const answer of this.answers) answer.giveNow();
@@ -593,7 +607,8 @@ export class Questionnaire {
 
   /** Says how far the surgeon is; empty where that is seen at a glance. */
   get progressWords() {
-    const all = this.answers.map(({ progress }) => progress);
+    const asked = this.answers.filter((answer) => this.isAsked(answer));
+    const all = asked.map(({ progress }) => progress);
     const answered = all.reduce((sum, one) => sum + one.answered, 0);
     const total = all.reduce((sum, one) => sum + one.total, 0);
     return total < AT_A_GLANCE ? "" : `${answered} of ${total} answered`;

@@ -5,7 +5,7 @@ mod likert;
 mod measure;
 pub mod nasa_tlx;
 mod ranking;
-mod recognition;
+pub mod recognition;
 pub mod surg_tlx;
 pub mod sus;
 mod visual_analogue;

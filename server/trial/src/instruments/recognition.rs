@@ -3,12 +3,30 @@
 //! not ask which policy ran, because surgeons know no policy by name.
 
 use super::measure::{Measure, given};
+use crate::question::{Question, QuestionKind};
 
 const WORDS: [&str; 3] = ["No", "Not sure", "Yes"];
 
 /// Whether `point` is one of the three answers.
 pub fn fits(point: u8) -> bool {
     (1..=WORDS.len()).contains(&usize::from(point))
+}
+
+/// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether the
+/// recognition question `id` is about all settings.
+pub fn follow_up(id: &str, closing: bool) -> Question {
+    let text = if closing {
+        "Which settings did you recognise, and by what? Give their numbers."
+    } else {
+        "By what did you recognise this setting?"
+    };
+    Question {
+        id: format!("{id}-why"),
+        text: text.to_owned(),
+        kind: QuestionKind::Text,
+        optional: true,
+        only_if_yes: Some(id.to_owned()),
+    }
 }
 
 /// 1 for no, 2 for not sure, 3 for yes.

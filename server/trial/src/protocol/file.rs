@@ -12,7 +12,7 @@ use super::{Prompt, Protocol, Record};
 use crate::allocation::Order;
 use crate::consent;
 use crate::grace::DEFAULT_GRACE;
-use crate::instruments::{nasa_tlx, surg_tlx};
+use crate::instruments::{nasa_tlx, recognition, surg_tlx};
 use crate::question::{Question, QuestionKind};
 use crate::tablet::WhenAway;
 use parfocal_base::FocalPower;
@@ -356,18 +356,26 @@ impl Reader<'_> {
         ids: &mut BTreeSet<String>,
         closing: bool,
     ) -> Result<Vec<Question>, Fault> {
-        questions
-            .iter()
-            .map(|question| {
-                identifier(&question.id, "id")?;
-                let id = question.id.get_ref().clone();
-                if !ids.insert(id.clone()) {
-                    return Err(Fault::new(question.id.span(), "id", format!("'{id}' is used twice")));
-                }
-                let kind = self.kind(question, closing)?;
-                Ok(Question { id, text: self.shown(&question.text, "text")?, kind, optional: question.optional })
-            })
-            .collect()
+        let mut read = Vec::new();
+        for question in questions {
+            identifier(&question.id, "id")?;
+            let id = question.id.get_ref().clone();
+            let mut take = |id: &str| {
+                let twice = || Fault::new(question.id.span(), "id", format!("'{id}' is used twice"));
+                ids.insert(id.to_owned()).then_some(()).ok_or_else(twice)
+            };
+            take(&id)?;
+
+            let kind = self.kind(question, closing)?;
+            let follow_up = (kind == QuestionKind::Recognition).then(|| recognition::follow_up(&id, closing));
+            if let Some(follow_up) = &follow_up {
+                take(&follow_up.id)?;
+            }
+            let text = self.shown(&question.text, "text")?;
+            read.push(Question { id, text, kind, optional: question.optional, only_if_yes: None });
+            read.extend(follow_up);
+        }
+        Ok(read)
     }
 
     fn kind(&self, question: &FileQuestion, closing: bool) -> Result<QuestionKind, Fault> {

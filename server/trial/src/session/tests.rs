@@ -18,7 +18,7 @@ fn segment(number: usize) -> SegmentId {
 }
 
 fn question(id: &str, optional: bool) -> Question {
-    Question { id: id.to_owned(), text: format!("{id}?"), kind: QuestionKind::Text, optional }
+    Question { id: id.to_owned(), text: format!("{id}?"), kind: QuestionKind::Text, optional, only_if_yes: None }
 }
 
 fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
