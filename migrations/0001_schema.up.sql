@@ -65,7 +65,8 @@ CREATE TABLE events (
 -- key is the browser's idempotency key: a comment sent twice is one row. device and sequence say where it was said;
 -- sequence counts up with everything that is said on a device. waited_ms is how long it waited on the device before it
 -- was sent, and waited_by the clock that measured this. Frames are counted anew in each run, and a comment may be kept
--- in a later one than it was made in: frame_run is the run that counted the frame. late is whether it arrived when
+-- in a later one than it was made in: frame_run is the run that counted the frame. picture_width and
+-- pictures_per_second are what the surgeon saw then, as the page counted it. late is whether it arrived when
 -- nothing counted any more.
 CREATE TABLE comments (
     number INTEGER PRIMARY KEY,
@@ -83,6 +84,8 @@ CREATE TABLE comments (
     late INTEGER NOT NULL CHECK (late IN (0, 1)),
     frame INTEGER,
     frame_run INTEGER,
+    picture_width INTEGER CHECK (picture_width > 0),
+    pictures_per_second REAL CHECK (pictures_per_second >= 0),
     kind TEXT NOT NULL,
     text TEXT
 ) STRICT;
@@ -130,7 +133,8 @@ CREATE TABLE policies (
     name TEXT NOT NULL UNIQUE
 ) STRICT;
 
--- Fifty rows a second all day long: numbers only, and one index over the rows of trials alone.
+-- Fifty rows a second all day long: numbers only, and one index over the rows of trials alone. picture_width is that of
+-- the surgeon's picture at that time.
 CREATE TABLE telemetry (
     number INTEGER PRIMARY KEY,
     run INTEGER NOT NULL,
@@ -144,7 +148,8 @@ CREATE TABLE telemetry (
     policy_micros INTEGER NOT NULL,
     latency_micros INTEGER NOT NULL,
     held TEXT,
-    optimal REAL
+    optimal REAL,
+    picture_width INTEGER
 ) STRICT;
 CREATE INDEX telemetry_by_segment ON telemetry (segment, number) WHERE segment IS NOT NULL;
 
@@ -456,9 +461,11 @@ BEGIN SELECT RAISE(ABORT, 'study_sessions are append-only'); END;
 CREATE TRIGGER comments_no_update BEFORE UPDATE ON comments
 WHEN NEW.text IS NOT '' OR NOT EXISTS (SELECT 1 FROM erasures WHERE subject = 'comment' AND record = OLD.key)
     OR (NEW.number, NEW.key, NEW.session, NEW.segment, NEW.run, NEW.wall, NEW.monotonic_ns, NEW.client_millis,
-        NEW.frame, NEW.kind, NEW.frame_run, NEW.waited_ms, NEW.device, NEW.sequence, NEW.waited_by, NEW.late)
+        NEW.frame, NEW.kind, NEW.frame_run, NEW.picture_width, NEW.pictures_per_second, NEW.waited_ms, NEW.device,
+        NEW.sequence, NEW.waited_by, NEW.late)
     IS NOT (OLD.number, OLD.key, OLD.session, OLD.segment, OLD.run, OLD.wall, OLD.monotonic_ns, OLD.client_millis,
-        OLD.frame, OLD.kind, OLD.frame_run, OLD.waited_ms, OLD.device, OLD.sequence, OLD.waited_by, OLD.late)
+        OLD.frame, OLD.kind, OLD.frame_run, OLD.picture_width, OLD.pictures_per_second, OLD.waited_ms, OLD.device,
+        OLD.sequence, OLD.waited_by, OLD.late)
 BEGIN SELECT RAISE(ABORT, 'comments are append-only'); END;
 CREATE TRIGGER answers_no_update BEFORE UPDATE ON answers
 WHEN NEW.value IS NOT '""' OR NOT EXISTS (SELECT 1 FROM erasures WHERE subject = 'answer' AND record = OLD.key)

@@ -19,7 +19,7 @@ use parfocal_trial::account::{Account, AccountName, AccountRole};
 use parfocal_trial::action::Action;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::question::{AnswerValue, QuestionKind};
-use parfocal_trial::remark::{CommentContent, NewAnswer, NewComment, Origin};
+use parfocal_trial::remark::{CommentContent, NewAnswer, NewComment, Origin, Sight};
 use parfocal_trial::role::Role;
 use parfocal_trial::view::{OperatorView, SurgeonView};
 use rand::{Rng, SeedableRng};
@@ -150,6 +150,7 @@ impl Trial {
             segment: view.segment,
             frame: Some(1234),
             run: Some(self.store.run()),
+            sight: Sight::default(),
             origin: Origin { client_millis: Some(1_772_355_600_000), ..Origin::default() },
             said: CommentContent::Text(text.to_owned()),
         }

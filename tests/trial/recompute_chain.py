@@ -33,11 +33,15 @@ OPEN = {
         "sessions",
         "session participant protocol protocol_sha256 practice algorithm commitment wall run monotonic_ns segments",
     ),
-    "event": ("events", "session number wall run monotonic_ns role kind segment inspected_ms emergency"),
+    "event": (
+        "events",
+        "session number wall run monotonic_ns role kind segment inspected_ms emergency about focal_power left_at "
+        "hidden picture_width picture_height pictures over_ms",
+    ),
     "comment": (
         "comments",
-        "key session segment kind frame frame_run wall run monotonic_ns client_millis waited_ms waited_by device "
-        "sequence late",
+        "key session segment kind frame frame_run picture_width pictures_per_second wall run monotonic_ns "
+        "client_millis waited_ms waited_by device sequence late",
     ),
     "answer": (
         "answers",
@@ -117,7 +121,7 @@ def main(folder):
                 segment, first, last = row["key"].split("/")
                 part = slice(int(first) - 1, int(last))
                 of_it = [step for step in telemetry if step["setting"] == setting[segment]][part]
-                names = "run frame exposed_ns asked measured held optimal".split()
+                names = "run frame exposed_ns asked measured held optimal picture_width".split()
                 open_hash = sha256("parfocal-steps-1", *(step[name] for step in of_it for name in names))
                 content = ["segment", segment, "first", first, "last", last, "steps_sha256", open_hash]
                 hidden = None

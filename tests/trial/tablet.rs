@@ -2,15 +2,22 @@
 
 use std::time::Duration;
 
+use parfocal_base::FocalPower;
 use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::{Command, Drive};
-use parfocal_trial::action::Action;
+use parfocal_records::store::export::export;
+use parfocal_records::store::export::verify::{Verdict, verify};
+use parfocal_records::store::telemetry;
+use parfocal_trial::action::{Action, Focus};
 use parfocal_trial::event::EventKind;
+use parfocal_trial::remark::Sight;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::PauseCause;
 use parfocal_trial::tablet::{PictureSize, Presence, Report};
 
+use crate::exports::{json, rows};
 use crate::fixture::Trial;
+use crate::storage::step;
 
 const SMALL: PictureSize = PictureSize { width: 512, height: 272 };
 const LARGE: PictureSize = PictureSize { width: 2048, height: 1088 };
@@ -138,4 +145,74 @@ async fn what_was_seen_until_the_end_of_a_setting_is_recorded_before_it() {
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::FinishSegment { segment }).await;
     assert_eq!(names(&trial, session).await, ["pictures-seen", "segment-finished"]);
+}
+
+/// "Blurred" may be said of the link: so the size and the rate stand beside each comment, setting and step.
+#[tokio::test]
+async fn an_export_tells_what_size_of_picture_the_surgeon_saw_and_how_many() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(&folder.path().join("data")).await;
+    let session = inspecting(&mut trial, "paper").await;
+    let segment = trial.view().segment.unwrap();
+    let (sender, receiver) = tokio::sync::mpsc::channel(16);
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
+
+    report(&trial, Presence::Present, Some(LARGE), 3).await;
+    let mut comment = trial.comment("blurred");
+    comment.sight = Sight { picture_width: Some(512), pictures_per_second: Some(2.5) };
+    trial.conductor.comment(comment).await.unwrap();
+    let mut comment = trial.comment("lied");
+    comment.sight = Sight { picture_width: Some(0), pictures_per_second: Some(-1.0) };
+    trial.conductor.comment(comment).await.unwrap();
+    report(&trial, Presence::Present, Some(SMALL), 1).await;
+    // On a slow link some reports have no picture.
+    report(&trial, Presence::Present, None, 1).await;
+    sender.send(step(7, Some(segment))).await.unwrap();
+    drop(sender);
+    writer.await.unwrap();
+
+    report(&trial, Presence::Silent, None, 4).await;
+    trial.surgeon(Action::Resume).await;
+    trial.conductor.act(Role::Operator, session, Action::Pause { reason: String::new() }).await.unwrap();
+    let pause = trial.store.reader().events(session).await.unwrap().len();
+    // No decimal of it must be lost on the way to the file.
+    let power = FocalPower::new(0.1 + 0.2).unwrap();
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(power.get())).await.unwrap();
+    trial.wait(Duration::from_secs(2)).await;
+    let about = u32::try_from(pause).unwrap();
+    let why = Action::GiveReason { event: about, reason: "smoke".to_owned() };
+    trial.conductor.act(Role::Operator, session, why).await.unwrap();
+
+    let out = folder.path().join("out");
+    export(&trial.recorder(), session, &out, false).await.unwrap();
+    let checks = verify(&out, None);
+    assert!(checks.iter().all(|check| !matches!(check.verdict, Verdict::Failed(_))), "{checks:#?}");
+
+    let comments = rows(&out, "comments");
+    let seen = |row: usize| (comments[row]["picture_width"].as_str(), comments[row]["pictures_per_second"].as_str());
+    assert_eq!([seen(0), seen(1)], [("512", "2.5"), ("", "")]);
+    assert_eq!(json(&out, "session.json")["comments"][0]["picture_width"], 512);
+
+    let events = rows(&out, "events");
+    let of = |kind: &str| events.iter().filter(|row| row["kind"] == kind).collect::<Vec<_>>();
+    let [large, small] = of("pictures-seen")[..] else { panic!("{events:#?}") };
+    assert_eq!((large["picture_width"].as_str(), large["picture_height"].as_str()), ("2048", "1088"));
+    assert_eq!((large["pictures"].as_str(), large["over_ms"].as_str()), ("60", "3000"));
+    assert_eq!(small["picture_width"], "512");
+    assert_eq!(of("tablet-away")[0]["hidden"], "false");
+    assert_eq!(of("focused-by-hand")[0]["focal_power"], "0.30000000000000004");
+    assert_eq!(of("reason-given")[0]["about"], about.to_string());
+
+    let setting = &rows(&out, "segments")[0];
+    assert_eq!(setting["least_picture_width"], "512");
+    // Three seconds of 2048, and of 512 the time until the tablet went away.
+    let small_ms: f64 = small["over_ms"].parse().unwrap();
+    let mean = (2048.0 * 3000.0 + 512.0 * small_ms) / (3000.0 + small_ms);
+    assert!((setting["mean_picture_width"].parse::<f64>().unwrap() - mean).abs() < 1e-6);
+    let rate = (60.0 + 20.0) * 1000.0 / (3000.0 + small_ms);
+    assert!((setting["pictures_per_second"].parse::<f64>().unwrap() - rate).abs() < 1e-6);
+
+    assert_eq!(rows(&out, "telemetry")[0]["picture_width"], "512");
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    assert_eq!(timeline.comments[0].picture_width, Some(512));
 }

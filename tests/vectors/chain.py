@@ -184,6 +184,10 @@ for number, run, monotonic, done_by, detail in [(1, None, None, None, "lead"), (
 columns = dict(number=1, kind="session", record=SESSION, session=SESSION, account="km", display="Kim Mäkelä")
 kept("actors", "actor", "1", SESSION, columns)
 
+def as_json(number):
+    return None if number is None else json.dumps(number).replace("1e-07", "1e-7")
+
+
 # Events, whose segment, place in the setting, emergency and reason are in a JSON payload.
 for number, kind, payload in [
     (1, "created", {}),
@@ -191,9 +195,18 @@ for number, kind, payload in [
     (3, "paused", {"segment": SEGMENTS[0], "inspected_ms": 1500, "reason": "smoke, “much” of it"}),
     (4, "unblinded", {"emergency": True, "reason": "adverse event"}),
     (5, "unblinded", {"emergency": False, "reason": ""}),
+    (6, "reason-given", {"about": 3, "reason": "the smoke"}),
+    (7, "focused-by-hand", {"focal_power": 0.30000000000000004, "left_at": 1e-07}),
+    (8, "tablet-away", {"hidden": True}),
+    (
+        9,
+        "pictures-seen",
+        {"segment": SEGMENTS[0], "width": 512, "height": 272, "pictures": 20, "over_ms": 1500},
+    ),
 ]:
     columns = dict(session=SESSION, number=number, run=1, wall=wall(7), monotonic_ns=7_000 + number, role="operator")
-    whole = json.dumps({"kind": kind} | payload, ensure_ascii=False)
+    # As the program writes it: 1e-7, where Python writes 1e-07.
+    whole = json.dumps({"kind": kind} | payload, ensure_ascii=False).replace("1e-07", "1e-7")
     insert("events", **columns, kind=kind, payload=whole)
     hashed = dict(
         session=SESSION,
@@ -206,6 +219,14 @@ for number, kind, payload in [
         segment=payload.get("segment"),
         inspected_ms=payload.get("inspected_ms"),
         emergency=payload.get("emergency"),
+        about=payload.get("about"),
+        focal_power=as_json(payload.get("focal_power")),
+        left_at=as_json(payload.get("left_at")),
+        hidden=payload.get("hidden"),
+        picture_width=payload.get("width"),
+        picture_height=payload.get("height"),
+        pictures=payload.get("pictures"),
+        over_ms=payload.get("over_ms"),
     )
     record("event", f"{SESSION}/{number}", SESSION, hashed, dict(reason=payload.get("reason")))
 
@@ -224,6 +245,8 @@ for number, key, kind, frame, said, erased, full in [
         kind=kind,
         frame=frame,
         frame_run=1 if full else None,
+        picture_width=1024 if full else None,
+        pictures_per_second=Real("12.5", "12.5") if full else None,
         wall=wall(8),
         run=2,
         monotonic_ns=8_000,
@@ -388,9 +411,10 @@ for frame, policy, asked, measured, metric, held, optimal in steps:
         latency_micros=640,
         held=held,
         optimal=optimal,
+        picture_width=512 if policy else None,
     )
     is_held = held in ("paused", "lens-failed", "camera-failed")
-    open_fields += [1, frame, frame * 20_000_000, asked, measured, is_held, optimal]
+    open_fields += [1, frame, frame * 20_000_000, asked, measured, is_held, optimal, 512 if policy else None]
     sealed_fields += ["cnn-learned" if policy else None, metric, 17, 640, held]
 steps_sha256 = sha256("parfocal-steps-1", *(text(value) for value in open_fields))
 parts = ["segment", SEGMENTS[0], "first", "1", "last", "3", "steps_sha256", steps_sha256]

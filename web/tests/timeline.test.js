@@ -2,7 +2,12 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { lengthOf, linePath, powerAt, powerOf, Scale } from "../static/researcher/timeline.js";
-import { description, outstandingWords, setAsideWords } from "../static/researcher/timeline_words.js";
+import {
+  description,
+  outstandingWords,
+  seenWords,
+  setAsideWords,
+} from "../static/researcher/timeline_words.js";
 
 /** @type {Api.Timeline} */
 const EMPTY = { absences: [], comments: [], pauses: [], points: [], set_aside: [], settings: [], sights: [] };
@@ -123,4 +128,10 @@ test("a tablet's outstanding comments are mentioned if there may be any", () => 
     "Comments and answers still on a tablet count until 10:30. " +
       "2 tablets have not confirmed since the end that everything was sent.",
   );
+});
+
+test("beside a comment stands what the surgeon saw, as far as it is known", () => {
+  assert.equal(seenWords({ picture_width: 512, pictures_per_second: 2.5 }), "512 px, 3/s");
+  assert.equal(seenWords({ picture_width: 2048 }), "2048 px");
+  assert.equal(seenWords({ picture_width: null, pictures_per_second: null }), "");
 });

@@ -26,12 +26,14 @@ test("a voice comment reads as it was typed out, also once its sound is gone", (
     erased: null,
     voice: WHOLE,
   });
-  assert.equal(commentWords(comment), "Voice comment, not typed out yet");
-  assert.equal(commentWords({ ...comment, note: "it wanders" }), "it wanders");
+  assert.equal(commentWords(comment, "UTC"), "Voice comment, not typed out yet");
+  assert.equal(commentWords({ ...comment, note: "it wanders" }, "UTC"), "it wanders");
   const erased = "2026-03-01T10:00:00Z";
   assert.equal(
-    commentWords({ ...comment, note: "it wanders", erased }),
+    commentWords({ ...comment, note: "it wanders", erased }, "UTC"),
     "it wanders (sound erased on 2026-03-01)",
   );
-  assert.equal(commentWords({ ...comment, erased }), "Erased on 2026-03-01");
+  assert.equal(commentWords({ ...comment, erased }, "UTC"), "Erased on 2026-03-01");
+  const late = "2026-03-01T23:30:00Z";
+  assert.equal(commentWords({ ...comment, erased: late }, "Europe/Berlin"), "Erased on 2026-03-02");
 });

@@ -1902,7 +1902,7 @@ export interface components {
             value: components["schemas"]["AnswerValue"];
         };
         /** @description A comment as a surgeon's browser sends it. */
-        NewComment: components["schemas"]["Origin"] & components["schemas"]["CommentContent"] & {
+        NewComment: components["schemas"]["Sight"] & components["schemas"]["Origin"] & components["schemas"]["CommentContent"] & {
             /**
              * Format: int64
              * @description Number of the frame that was on the screen.
@@ -2196,6 +2196,8 @@ export interface components {
         Question: components["schemas"]["QuestionKind"] & {
             /** @description Id of the question, unique in the protocol. */
             id: string;
+            /** @description Id of the recognition question to which this one belongs: it is asked only if that one is answered with yes. */
+            only_if_yes?: string | null;
             /** @description Whether the question can be left unanswered. */
             optional?: boolean;
             /** @description The question as the surgeon reads it. */
@@ -2527,6 +2529,22 @@ export interface components {
             setting?: number | null;
             /** @description The words, in order. */
             words: components["schemas"]["Words"][];
+        };
+        /**
+         * @description What a surgeon saw when a comment was made, as the page counted it. A slow link makes pictures smaller and fewer, so
+         *     “blurred” may be said of the link.
+         */
+        Sight: {
+            /**
+             * Format: int32
+             * @description Width of the picture on screen, pixels.
+             */
+            picture_width?: number | null;
+            /**
+             * Format: double
+             * @description Pictures drawn a second.
+             */
+            pictures_per_second?: number | null;
         };
         /** @description What the surgeon saw for a while. */
         SightSpan: components["schemas"]["PictureSize"] & {
@@ -2889,6 +2907,16 @@ export interface components {
             late: boolean;
             /** @description A researcher's note on the comment; for a voice comment, its transcript. */
             note?: string | null;
+            /**
+             * Format: int32
+             * @description Width of the picture on screen, pixels.
+             */
+            picture_width?: number | null;
+            /**
+             * Format: double
+             * @description Pictures that the surgeon saw a second.
+             */
+            pictures_per_second?: number | null;
             /**
              * Format: double
              * @description When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.

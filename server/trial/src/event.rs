@@ -125,6 +125,19 @@ pub enum EventKind {
     },
 }
 
+/// What the surgeon saw for a while, all of it of one size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    /// Segment that was inspected.
+    pub segment: SegmentId,
+    /// Size of the pictures.
+    pub size: PictureSize,
+    /// Number of pictures drawn.
+    pub pictures: u64,
+    /// For how long, milliseconds.
+    pub over_ms: u64,
+}
+
 impl EventKind {
     /// The kind's name, as in the database and in exports.
     #[must_use]
@@ -201,6 +214,35 @@ impl EventKind {
     pub const fn focal_power(&self) -> Option<FocalPower> {
         match self {
             Self::FocusedByHand { focal_power, .. } => Some(*focal_power),
+            _ => None,
+        }
+    }
+
+    /// Where the lens was before it was moved by hand; none for other events, and if it was moved by hand before.
+    #[must_use]
+    pub const fn left_at(&self) -> Option<FocalPower> {
+        match self {
+            Self::FocusedByHand { left_at, .. } => *left_at,
+            _ => None,
+        }
+    }
+
+    /// Whether a tablet that is away has the page open, but not on screen; none for other events.
+    #[must_use]
+    pub const fn hidden(&self) -> Option<bool> {
+        match self {
+            Self::TabletAway { hidden } => Some(*hidden),
+            _ => None,
+        }
+    }
+
+    /// What the surgeon saw; none for other events.
+    #[must_use]
+    pub const fn seen(&self) -> Option<Seen> {
+        match self {
+            Self::PicturesSeen { segment, size, pictures, over_ms } => {
+                Some(Seen { segment: *segment, size: *size, pictures: *pictures, over_ms: *over_ms })
+            }
             _ => None,
         }
     }

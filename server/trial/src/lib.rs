@@ -24,6 +24,7 @@ pub mod refusal;
 pub mod remark;
 pub mod role;
 pub mod session;
+pub mod sight;
 pub mod standing;
 pub mod study;
 pub mod tablet;

@@ -20,6 +20,9 @@ pub struct NewComment {
     /// Run of the server that counted the frame, as given in the frame's header.
     #[serde(default)]
     pub run: Option<i64>,
+    /// What the surgeon saw.
+    #[serde(flatten)]
+    pub sight: Sight,
     /// Device and time of the comment.
     #[serde(flatten)]
     pub origin: Origin,
@@ -27,6 +30,35 @@ pub struct NewComment {
     #[serde(flatten)]
     pub said: CommentContent,
 }
+
+/// What a surgeon saw when a comment was made, as the page counted it. A slow link makes pictures smaller and fewer, so
+/// “blurred” may be said of the link.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, ToSchema)]
+pub struct Sight {
+    /// Width of the picture on screen, pixels.
+    #[serde(default)]
+    pub picture_width: Option<u32>,
+    /// Pictures drawn a second.
+    #[serde(default)]
+    pub pictures_per_second: Option<f64>,
+}
+
+impl Sight {
+    /// The same without numbers that no page can have counted.
+    #[must_use]
+    pub fn plausible(self) -> Self {
+        Self {
+            picture_width: self.picture_width.filter(|width| (1..=MOST_PIXELS).contains(width)),
+            pictures_per_second: self.pictures_per_second.filter(|rate| (0.0..=MOST_A_SECOND).contains(rate)),
+        }
+    }
+}
+
+/// No picture is wider, in pixels.
+const MOST_PIXELS: u32 = 65_536;
+
+/// No screen shows more pictures a second.
+const MOST_A_SECOND: f64 = 1000.0;
 
 /// Device and time of a comment or answer, as the surgeon's page reports them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
@@ -144,4 +176,19 @@ pub struct Holding {
     pub device: DeviceId,
     /// Number of comments and answers whose saving the device has not seen confirmed, half-written ones included.
     pub holding: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_page_can_have_counted_is_not_kept() {
+        let sight = |width, rate| Sight { picture_width: Some(width), pictures_per_second: Some(rate) }.plausible();
+        let kept = Sight { picture_width: Some(512), pictures_per_second: Some(0.0) };
+        assert_eq!(sight(512, 0.0), kept);
+        assert_eq!(sight(0, -0.5), Sight::default());
+        assert_eq!(sight(u32::MAX, 1e9), Sight::default());
+        assert_eq!(Sight::default().plausible(), Sight::default());
+    }
 }

@@ -8,7 +8,7 @@ use parfocal_records::store::export::{ExportError, export};
 use parfocal_session::conductor::{ConductError, Studies, StudySite};
 use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
-use parfocal_trial::remark::{CommentContent, NewComment, Origin};
+use parfocal_trial::remark::{CommentContent, NewComment, Origin, Sight};
 use parfocal_trial::role::Role;
 use parfocal_trial::study::refusal::StudyRefusal;
 use parfocal_trial::study::signature::{Channel, Signature};
@@ -257,6 +257,7 @@ async fn a_session_of_a_study_takes_words_after_its_end_like_any_other() {
         segment: None,
         frame: None,
         run: None,
+        sight: Sight::default(),
         origin: Origin::default(),
         said: CommentContent::Text("one more thing".to_owned()),
     };

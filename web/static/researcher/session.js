@@ -8,13 +8,14 @@ import { drawMetric } from "./metric_drawing.js";
 import { Player } from "./player.js";
 import { lastComment, lengthOf, Scale } from "./timeline.js";
 import { drawTimeline } from "./timeline_drawing.js";
-import { commentWords, setAsideWords } from "./timeline_words.js";
+import { commentWords, seenWords, setAsideWords } from "./timeline_words.js";
 import { voicePlayer } from "./voice.js";
 
 const page = byId("session").dataset;
 const session = page.session ?? "";
 const ended = page.ended === "true";
 const unblinded = page.unblinded === "true";
+const zone = byId("zone").textContent ?? "";
 
 /** @type {Api.Timeline | null} */
 let timeline = null;
@@ -110,15 +111,22 @@ function seek(event) {
 
 /** @param {Api.TimelineComment[]} comments */
 function listComments(comments) {
-  setText(byId("comment-count"), comments.length === 0 ? "" : String(comments.length));
+  // What was taken back at once is listed, but counts no more.
+  const standing = comments.filter(({ withdrawn }) => !withdrawn).length;
+  setText(byId("comment-count"), comments.length === 0 ? "" : String(standing));
   lines = comments.map((comment, index) => {
-    const words = commentWords(comment);
+    const words = commentWords(comment, zone);
     const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);
     const kept = comment.withdrawn ? make("del", {}, words) : words;
     const said = isSaid ? kept : make("em", {}, kept);
     const late = comment.late && make("span", { className: "badge warn" }, "late");
     const back = comment.withdrawn && make("span", { className: "badge" }, "taken back at once");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
+    const seen = make(
+      "small",
+      { title: "What the surgeon saw: width of the picture, pictures a second" },
+      seenWords(comment),
+    );
     return make(
       "button",
       {
@@ -127,7 +135,7 @@ function listComments(comments) {
         onfocus: (/** @type {FocusEvent} */ event) => reach(event, index),
       },
       make("span", { className: "when" }, clockText(comment.seconds)),
-      make("span", { className: "muted" }, where),
+      make("span", { className: "muted where" }, where, seen),
       make("span", { className: "said" }, said, late && " ", late, back && " ", back),
     );
   });
@@ -241,7 +249,7 @@ function draw() {
   const figure = byId("timeline");
   scale = new Scale(lengthOf(timeline), Math.max(figure.clientWidth, NARROWEST_DRAWING));
   const recorded = player?.spans ?? [];
-  const drawn = drawTimeline(figure, timeline, { scale, withPath, policies, recorded, choose, jump });
+  const drawn = drawTimeline(figure, timeline, { scale, withPath, policies, recorded, zone, choose, jump });
   pointOut = drawn.pointOut;
 
   const showsMetric = hasMetric(timeline);

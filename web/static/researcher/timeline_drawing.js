@@ -31,11 +31,12 @@ const POLICY_NAME_WIDTH = 130;
  * @param {boolean} options.withPath whether to draw the focal path, which may reveal the policies
  * @param {string[]} options.policies the policy of each setting; empty while blinded
  * @param {{ from: number, to: number }[]} options.recorded the spans of time that were recorded
+ * @param {string} options.zone the time zone of the page
  * @param {(comment: number) => void} options.choose called when a comment's marker is pointed at
  * @param {(comment: number) => void} options.jump called when a comment's marker is tapped
  * @returns {{ pointOut: (comment: number) => void, movePlayhead: (seconds: number) => void }}
  */
-export function drawTimeline(figure, timeline, { scale, withPath, policies, recorded, choose, jump }) {
+export function drawTimeline(figure, timeline, { scale, withPath, policies, recorded, zone, choose, jump }) {
   const points = withPath ? timeline.points : [];
   const markers = timeline.comments.map((comment, index) => {
     const x = scale.x(comment.seconds);
@@ -72,7 +73,7 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
   const caption = make("figcaption");
   figure.replaceChildren(svg, caption);
   return {
-    pointOut: (index) => pointOut(figure, caption, markers, timeline.comments, index),
+    pointOut: (index) => pointOut(figure, caption, markers, timeline.comments, zone, index),
     movePlayhead: (seconds) => movePlayhead(playhead, scale.x(seconds)),
   };
 }
@@ -232,15 +233,16 @@ function setAsideMarker(answer, scale) {
  * @param {HTMLElement} caption
  * @param {Marker[]} markers
  * @param {Api.TimelineComment[]} comments
+ * @param {string} zone
  * @param {number} index
  */
-function pointOut(figure, caption, markers, comments, index) {
+function pointOut(figure, caption, markers, comments, zone, index) {
   const marker = markers[index];
   const comment = comments[index];
   if (!marker || !comment) return;
   for (const each of markers) each.group.classList.toggle("chosen", each === marker);
 
-  caption.textContent = commentWords(comment);
+  caption.textContent = commentWords(comment, zone);
   const rightmost = Math.max(figure.clientWidth - caption.offsetWidth, 0);
   const left = Math.min(Math.max(marker.x - caption.offsetWidth / 2, 0), rightmost);
   const isLow = marker.y > HEIGHT / 2;

@@ -1,6 +1,6 @@
 // Texts about the timeline.
 
-import { counted } from "../shared/text.js";
+import { counted, dayIn } from "../shared/text.js";
 
 /** @typedef {Api.Timeline} Timeline */
 
@@ -28,12 +28,25 @@ export function sightWords({ width, height, per_second: rate }) {
   return `The surgeon saw ${width}×${height}, ${rate.toFixed(1)} pictures a second`;
 }
 
-/** @param {Api.TimelineComment} comment */
-export function commentWords(comment) {
+/**
+ * Says what the surgeon saw when a comment was made; empty if that is not known.
+ *
+ * @param {Pick<Api.TimelineComment, "picture_width" | "pictures_per_second">} comment
+ */
+export function seenWords({ picture_width: width, pictures_per_second: rate }) {
+  if (width == null) return "";
+  return rate == null ? `${width} px` : `${width} px, ${rate.toFixed(0)}/s`;
+}
+
+/**
+ * @param {Api.TimelineComment} comment
+ * @param {string} zone the time zone of the page
+ */
+export function commentWords(comment, zone) {
   const { kind, note, erased } = comment;
   // A voice comment can be read once it was typed out. The text stays when the sound is erased.
-  if (kind === "voice" && note) return erased ? `${note} (sound erased on ${erased.slice(0, 10)})` : note;
-  if (erased) return `Erased on ${erased.slice(0, 10)}`;
+  if (kind === "voice" && note) return erased ? `${note} (sound erased on ${dayIn(erased, zone)})` : note;
+  if (erased) return `Erased on ${dayIn(erased, zone)}`;
   if (kind === "voice") return "Voice comment, not typed out yet";
   return kind === "mark" ? "Marked this moment" : comment.text;
 }

@@ -38,6 +38,22 @@ export function timeIn(moment, zone) {
 }
 
 /**
+ * The day in `zone`, as `2026-03-01`. If this browser does not know the zone, its own is used.
+ *
+ * @param {string} moment
+ * @param {string} zone such as `Europe/London`
+ */
+export function dayIn(moment, zone) {
+  // Swedish days are written as ISO 8601 has them.
+  const date = new Date(moment);
+  try {
+    return date.toLocaleDateString("sv-SE", { timeZone: zone });
+  } catch {
+    return date.toLocaleDateString("sv-SE");
+  }
+}
+
+/**
  * `1 comment`, `2 comments`.
  *
  * @param {number} count

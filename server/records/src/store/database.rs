@@ -6,6 +6,7 @@ use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use jiff::Timestamp;
@@ -69,6 +70,8 @@ pub(super) struct Inner {
     /// When this run began.
     pub(super) started: Stamp,
     pub(super) telemetry_counts: Counts,
+    /// Width of the picture on the surgeon's tablet, pixels; 0 if none shows one.
+    surgeon_picture: AtomicU32,
     pub(super) writes: Writes,
     /// Released when dropped, or by the kernel however the process ends.
     _lock: FolderLock,
@@ -150,6 +153,7 @@ impl Store {
             run,
             started,
             telemetry_counts: Counts::default(),
+            surgeon_picture: AtomicU32::new(0),
             writes: Writes::default(),
             _lock: lock,
         };
@@ -173,6 +177,17 @@ impl Store {
     #[must_use]
     pub fn telemetry_counts(&self) -> &Counts {
         &self.inner.telemetry_counts
+    }
+
+    /// Notes the width in pixels of the picture that the surgeon's tablet shows; `None` if none shows one. Telemetry has
+    /// it with each step.
+    pub fn note_surgeon_picture(&self, width: Option<u32>) {
+        self.inner.surgeon_picture.store(width.unwrap_or(0), Ordering::Relaxed);
+    }
+
+    /// That width.
+    pub(super) fn surgeon_picture(&self) -> Option<u32> {
+        Some(self.inner.surgeon_picture.load(Ordering::Relaxed)).filter(|width| *width > 0)
     }
 
     /// Closes the database. What was acknowledged is on disk even without this.

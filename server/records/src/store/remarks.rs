@@ -13,7 +13,7 @@ use super::values::{begin, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::question::AnswerValue;
-use parfocal_trial::remark::{CommentContent, Holding, Origin, WaitClock};
+use parfocal_trial::remark::{CommentContent, Holding, Origin, Sight, WaitClock};
 
 /// The outcome of keeping a comment or an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +90,8 @@ async fn insert_comment(
         .set("late", comment.late)
         .set("frame", comment.frame.map(u64::cast_signed))
         .set("frame_run", comment.frame_run)
+        .set("picture_width", comment.sight.picture_width)
+        .set("pictures_per_second", comment.sight.pictures_per_second)
         .set("kind", kind)
         .set("text", text.as_deref())
         .execute_once(&mut transaction)
@@ -249,6 +251,10 @@ fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
         segment: segment(row)?,
         frame: frame.map(i64::cast_unsigned),
         frame_run: row.try_get("frame_run")?,
+        sight: Sight {
+            picture_width: row.try_get("picture_width")?,
+            pictures_per_second: row.try_get("pictures_per_second")?,
+        },
         origin: origin(row)?,
         late: row.try_get("late")?,
         stamp: stamp(row)?,

@@ -11,7 +11,7 @@ use parfocal_base::clock::Moment;
 use parfocal_base::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::question::AnswerValue;
-use parfocal_trial::remark::{CommentContent, Origin};
+use parfocal_trial::remark::{CommentContent, Origin, Sight};
 use parfocal_trial::standing::{GivenAnswer, Standing, by_question};
 
 /// When something was recorded, by both clocks of the server.
@@ -36,6 +36,8 @@ pub struct Comment {
     pub frame: Option<u64>,
     /// The run that counted the frame.
     pub frame_run: Option<i64>,
+    /// What the surgeon saw, as the page reported it.
+    pub sight: Sight,
     /// Device and time of the comment, as the page reported them.
     pub origin: Origin,
     /// Whether it arrived too late to count.

@@ -45,6 +45,7 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
 
     while open {
         open = writer.collect(&mut receiver).await;
+        writer.see(store.surgeon_picture());
         writer.flush(&store).await;
 
         batches = batches.wrapping_add(1);
@@ -65,6 +66,8 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
 #[derive(Default)]
 struct Writer {
     waiting: Vec<StepRecord>,
+    /// For each of them the width of the picture on the surgeon's tablet.
+    seen: Vec<Option<u32>>,
     failing: bool,
     names: Names,
     /// Segments with steps that are written and not yet chained.
@@ -102,6 +105,11 @@ impl Writer {
         true
     }
 
+    /// Notes what the surgeon sees while the latest steps come in.
+    fn see(&mut self, width: Option<u32>) {
+        self.seen.resize(self.waiting.len(), width);
+    }
+
     async fn flush(&mut self, store: &Store) {
         let counts = store.telemetry_counts();
         let written = self.write(store).await;
@@ -112,6 +120,7 @@ impl Writer {
                 self.unsealed.extend(self.waiting.iter().filter_map(|record| record.segment));
                 self.latest = self.waiting.iter().map(|record| record.exposed_at).fold(self.latest, Moment::max);
                 self.waiting.clear();
+                self.seen.clear();
                 if std::mem::take(&mut self.failing) {
                     tracing::info!("telemetry is being written again");
                 }
@@ -126,6 +135,7 @@ impl Writer {
 
                 let too_many = self.waiting.len().saturating_sub(MOST_WAITING);
                 self.waiting.drain(..too_many);
+                self.seen.drain(..too_many);
                 counts.lost.fetch_add(too_many as u64, Ordering::Relaxed);
             }
         }
@@ -152,10 +162,10 @@ impl Writer {
 
     async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
         let mut transaction = begin(connection).await?;
-        for record in &self.waiting {
+        for (record, seen) in self.waiting.iter().zip(&self.seen) {
             let segment = self.names.segment(&mut transaction, record.segment).await?;
             let policy = self.names.policy(&mut transaction, record.policy.as_ref()).await?;
-            insert(&mut transaction, run, record, segment, policy).await?;
+            insert(&mut transaction, run, record, segment, policy, *seen).await?;
         }
         Ok(transaction.commit().await?)
     }
@@ -221,10 +231,11 @@ async fn insert(
     record: &StepRecord,
     segment: Option<i64>,
     policy: Option<i64>,
+    seen: Option<u32>,
 ) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO telemetry (run, frame, exposed_ns, segment, policy, asked, measured, metric, policy_micros,
-         latency_micros, held, optimal) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         latency_micros, held, optimal, picture_width) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(run)
     .bind(record.frame.cast_signed())
@@ -239,6 +250,7 @@ async fn insert(
     .bind(record.latency_micros)
     .bind(record.held.map(Hold::name))
     .bind(record.optimal.map(FocalPower::get))
+    .bind(seen.filter(|_| record.segment.is_some()))
     .execute(connection)
     .await?;
     Ok(())

@@ -35,6 +35,7 @@ impl Shared {
             segment,
             frame: new.frame,
             frame_run: new.run.filter(|run| (1..=self.store.run()).contains(run)),
+            sight: new.sight.plausible(),
             origin: new.origin.plausible(),
             late: grace.is_late(self.run_clock.time(stamp.at)),
             stamp,

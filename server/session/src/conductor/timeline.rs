@@ -113,6 +113,10 @@ pub struct TimelineComment {
     pub setting: Option<usize>,
     /// Number of the frame that was on screen.
     pub frame: Option<u64>,
+    /// Width of the picture on screen, pixels.
+    pub picture_width: Option<u32>,
+    /// Pictures that the surgeon saw a second.
+    pub pictures_per_second: Option<f64>,
     /// Whether it arrived too late to count.
     pub late: bool,
     /// The content of the comment; empty if it was erased.
@@ -206,6 +210,8 @@ impl Conductor {
             seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),
             frame: comment.frame,
+            picture_width: comment.sight.picture_width,
+            pictures_per_second: comment.sight.pictures_per_second,
             late: comment.late,
             said: comment.said,
         });

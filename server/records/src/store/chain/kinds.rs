@@ -151,6 +151,15 @@ const ALL: [Kept; 17] = [
             ("inspected_ms", "payload ->> 'inspected_ms'"),
             ("emergency", "CASE payload ->> 'emergency' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END"),
             ("reason", "payload ->> 'reason'"),
+            ("about", "payload ->> 'about'"),
+            // As a text, to the last digit.
+            ("focal_power", "payload -> 'focal_power'"),
+            ("left_at", "payload -> 'left_at'"),
+            ("hidden", "CASE payload ->> 'hidden' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END"),
+            ("picture_width", "payload ->> 'width'"),
+            ("picture_height", "payload ->> 'height'"),
+            ("pictures", "payload ->> 'pictures'"),
+            ("over_ms", "payload ->> 'over_ms'"),
         ],
         ..kept("event", EventRow::TABLE)
     },

@@ -17,7 +17,7 @@ use crate::store::StoreError;
 const MOST: i64 = 8192;
 
 /// Columns of `telemetry.csv` that are hashed.
-pub const OPEN: [&str; 7] = ["run", "frame", "exposed_ns", "asked", "measured", "held", "optimal"];
+pub const OPEN: [&str; 8] = ["run", "frame", "exposed_ns", "asked", "measured", "held", "optimal", "picture_width"];
 
 /// Columns of `policy_steps.csv` that are hashed.
 pub const SEALED: [&str; 5] = ["policy", "metric", "policy_micros", "latency_micros", "held"];
@@ -26,7 +26,7 @@ pub const SEALED: [&str; 5] = ["policy", "metric", "policy_micros", "latency_mic
 /// segment `?1`.
 const STEPS: &str = "SELECT t.run, t.frame, t.exposed_ns, t.asked, t.measured,
         iif(coalesce(t.held IN ('paused', 'lens-failed', 'camera-failed'), FALSE), 'true', 'false') AS held, t.optimal,
-        p.name AS step_policy, t.metric AS step_metric, t.policy_micros AS step_policy_micros,
+        t.picture_width, p.name AS step_policy, t.metric AS step_metric, t.policy_micros AS step_policy_micros,
         t.latency_micros AS step_latency_micros, t.held AS step_held
     FROM telemetry AS t LEFT JOIN policies AS p ON p.number = t.policy
     WHERE t.segment = (SELECT number FROM segments WHERE segment = ?1) ORDER BY t.number LIMIT ?3 OFFSET ?2";

@@ -22,6 +22,7 @@ use crate::store::{
     Answer, Comment, DeviceEvent, Erased, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
     StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
 };
+use parfocal_base::FocalPower;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
@@ -32,6 +33,7 @@ use parfocal_trial::protocol::Protocol;
 use parfocal_trial::question::QuestionKind;
 use parfocal_trial::remark::WaitClock;
 use parfocal_trial::session::{Inspection, inspections};
+use parfocal_trial::sight::{SegmentSight, sights_by_segment};
 use parfocal_trial::standing::Standing;
 
 /// The beginning of an export's description of itself.
@@ -244,9 +246,11 @@ impl Blinded {
 
     fn segment_rows(&self) -> Vec<SegmentRow> {
         let inspections = inspections(self.events.iter().map(|(_, event)| (event, &event.kind)));
+        let sights = sights_by_segment(self.events.iter().map(|(_, event)| &event.kind));
         let row = |(&segment, setting): (&SegmentId, usize)| {
             let inspection = inspections.iter().find(|inspection| inspection.segment == segment);
             let finished = inspection.and_then(Inspection::finished);
+            let sight = sights.get(&segment);
 
             SegmentRow {
                 session: self.session(),
@@ -258,6 +262,9 @@ impl Blinded {
                 inspected_seconds: inspection
                     .and_then(|inspection| inspection.inspected)
                     .map(|time| time.as_secs_f64()),
+                least_picture_width: sight.map(|sight| sight.least_width),
+                mean_picture_width: sight.map(SegmentSight::mean_width),
+                pictures_per_second: sight.map(SegmentSight::per_second),
             }
         };
 
@@ -279,6 +286,8 @@ impl Blinded {
                 text: text.map(Cow::into_owned),
                 frame: comment.frame,
                 frame_run: comment.frame_run,
+                picture_width: comment.sight.picture_width,
+                pictures_per_second: comment.sight.pictures_per_second,
                 wall: comment.stamp.wall,
                 run: *run,
                 monotonic_ns: nanoseconds(comment.stamp.at),
@@ -419,6 +428,7 @@ impl Blinded {
                 _ => (None, None),
             };
 
+            let seen = event.kind.seen();
             EventRow {
                 session: self.session(),
                 number: event.number,
@@ -432,6 +442,14 @@ impl Blinded {
                 inspected_ms: event.kind.inspected_ms(),
                 reason: reason.cloned(),
                 emergency,
+                about: event.kind.about(),
+                focal_power: event.kind.focal_power().map(FocalPower::get),
+                left_at: event.kind.left_at().map(FocalPower::get),
+                hidden: event.kind.hidden(),
+                picture_width: seen.map(|seen| seen.size.width),
+                picture_height: seen.map(|seen| seen.size.height),
+                pictures: seen.map(|seen| seen.pictures),
+                over_ms: seen.map(|seen| seen.over_ms),
             }
         };
 

@@ -130,6 +130,16 @@ table! {
         ),
         inspected_seconds: Option<f64> =
             means("Duration of the inspection without pauses; empty if it did not end").in_unit("s"),
+        least_picture_width: Option<u32> = means(
+            "Width of the smallest picture that the surgeon saw; a slow link makes pictures smaller; empty if no tablet \
+             drew one",
+        ).in_unit("px"),
+        mean_picture_width: Option<f64> = means(
+            "Width of the pictures that the surgeon saw, averaged over the time; empty if no tablet drew one",
+        ).in_unit("px"),
+        pictures_per_second: Option<f64> = means(
+            "Average number of pictures that the surgeon saw in a second; empty if no tablet drew one",
+        ).in_unit("1/s"),
     }
 }
 
@@ -158,6 +168,13 @@ table! {
             means("Number of the frame on the surgeon's screen; empty if the page did not send it").open(),
         frame_run: Option<i64> =
             means("Number of the server start that counted that frame; see runs; empty if frame is").open(),
+        picture_width: Option<u32> = means(
+            "Width of the picture on the surgeon's screen; a slow link makes it smaller; empty if the page did not \
+             send it",
+        ).in_unit("px").open(),
+        pictures_per_second: Option<f64> = means(
+            "Pictures that the page drew in a second, averaged over the two seconds before; empty if it did not send it",
+        ).in_unit("1/s").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
@@ -390,6 +407,29 @@ table! {
         ).sealed(),
         emergency: Option<bool> =
             means("Whether the session was still under way at its unblinding; empty for other events").open(),
+        about: Option<u32> = means(
+            "Number of the event whose reason this is; empty for other events than reason-given",
+        ).open(),
+        focal_power: Option<f64> = means(
+            "Focal power to which the lens was sent by hand; empty for other events than focused-by-hand",
+        ).in_unit("focal power, 0..1").open(),
+        left_at: Option<f64> = means(
+            "Focal power before the movement by hand, from which the segment continues; empty for other events, and if \
+             the lens was moved by hand before",
+        ).in_unit("focal power, 0..1").open(),
+        hidden: Option<bool> = means(
+            "Whether a tablet has the page open, but not on screen; empty for other events than tablet-away",
+        ).open(),
+        picture_width: Option<u32> = means(
+            "Width of the pictures on the surgeon's screen; empty for other events than pictures-seen",
+        ).in_unit("px").open(),
+        picture_height: Option<u32> =
+            means("Height of those pictures; empty for other events than pictures-seen").in_unit("px").open(),
+        pictures: Option<u64> =
+            means("Number of those pictures that were drawn; empty for other events than pictures-seen").open(),
+        over_ms: Option<u64> = means(
+            "Duration in which they were drawn, up to the event; empty for other events than pictures-seen",
+        ).in_unit("ms").open(),
     }
 }
 
@@ -710,6 +750,9 @@ table! {
         optimal: Option<f64> = means(
             "Best focal power for the frame; empty unless camera and lens are simulated",
         ).in_unit("focal power, 0..1"),
+        picture_width: Option<i64> = means(
+            "Width of the picture on the surgeon's tablet, to half a second; empty if no tablet showed one",
+        ).in_unit("px"),
     }
 }
 
