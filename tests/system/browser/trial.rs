@@ -258,18 +258,23 @@ async fn closing_questions(theatre: &Theatre) {
     for setting in [6, 4, 5, 3, 2, 1] {
         let top = format!("[aria-label='Put setting {setting} first']");
         until("the setting to be first", || async {
+            surgeon.show(&top).await;
             surgeon.try_click(&top).await;
             surgeon.text(".ranking li:first-child").await.contains(&format!("Setting {setting}"))
         })
         .await;
     }
-    surgeon.click("[aria-label='Move setting 4 up']").await;
-    surgeon.click("[aria-label='Move setting 4 down']").await;
+    for way in ["up", "down"] {
+        let arrow = format!("[aria-label='Move setting 4 {way}']");
+        surgeon.show(&arrow).await;
+        surgeon.click(&arrow).await;
+    }
     surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;
     surgeon.reload().await;
     surgeon.sees(".ranking li:nth-child(4)", "Setting 5").await;
     surgeon.sees(".ranking li:first-child .said", "“").await;
-    surgeon.click("[data-question=preference] .confirm").await;
+    surgeon.show("[data-question=preference] .confirm").await;
+    surgeon.tap_in_panel("[data-question=preference] .confirm").await;
     surgeon.sees("[data-question=preference] > .state", "Saved").await;
 
     half_a_questionnaire_on_a_second_tablet(theatre).await;
