@@ -7,6 +7,8 @@ use crate::networks::BINS;
 /// Places of the optimum, evenly spread over 0..=1.
 const PLACES: usize = 101;
 const PLACE_WIDTH: f64 = 1.0 / (PLACES - 1) as f64;
+/// So many places at each end of the range can be reached by turning back there.
+const END: usize = 6;
 /// Velocities of the optimum, evenly spread around 0.
 const SPEEDS: usize = 13;
 /// Difference between two velocities: focal power per frame.
@@ -133,11 +135,23 @@ impl Filter {
         let mut moved = vec![[0.0f32; PLACES]; SPEEDS];
         for (row, shares) in self.belief.iter().enumerate() {
             let (shift, parts) = three_cells(speed(row) / PLACE_WIDTH, STEP / PLACE_WIDTH);
-            for (place, share) in shares.iter().enumerate() {
+
+            // Far from the ends nothing turns back, so whole rows move at once.
+            let from = |offset: isize| &shares[(END as isize - shift - offset) as usize..][..PLACES - 2 * END];
+            let cells = moved[row][END..PLACES - END].iter_mut();
+            for (((out, one), two), three) in cells.zip(from(1)).zip(from(0)).zip(from(-1)) {
+                *out = parts[2] * one + parts[1] * two + parts[0] * three;
+            }
+
+            let near_an_end = (0..2 * END).chain(PLACES - 2 * END..PLACES);
+            for place in near_an_end {
                 for (offset, part) in (-1..=1).zip(parts) {
                     let (to, turned) = mirrored(place as isize + shift + offset, PLACES);
+                    if (END..PLACES - END).contains(&to) {
+                        continue;
+                    }
                     let row = if turned { SPEEDS - 1 - row } else { row };
-                    moved[row][to] += part * share;
+                    moved[row][to] += part * shares[place];
                 }
             }
         }
@@ -152,12 +166,12 @@ impl Filter {
     /// is divided by the square root of its age, since the comparisons of a frame share what is wrong with them.
     pub fn see(&mut self, comparisons: &[Comparison]) {
         for comparison in comparisons {
-            let weight = 1.0 / (comparison.lag as f32).sqrt();
-            for (row, shares) in self.belief.iter_mut().enumerate() {
-                let moved = comparison.lag as f64 * speed(row);
-                for (place, share) in shares.iter_mut().enumerate() {
-                    let optimum = place as f64 * PLACE_WIDTH;
-                    *share *= likelihood(comparison, optimum - moved, optimum).powf(weight);
+            match comparison.lag {
+                1 => self.weigh(comparison, |likelihood| likelihood),
+                4 => self.weigh(comparison, f32::sqrt),
+                lag => {
+                    let weight = 1.0 / (lag as f32).sqrt();
+                    self.weigh(comparison, |likelihood| likelihood.powf(weight));
                 }
             }
         }
@@ -167,6 +181,17 @@ impl Filter {
             self.belief.iter_mut().flatten().for_each(|share| *share /= sum);
         } else {
             *self = Self::default();
+        }
+    }
+
+    /// Multiplies each cell by its [`likelihood`], of which `aged` makes what counts at the comparison's age.
+    fn weigh(&mut self, comparison: &Comparison, aged: impl Fn(f32) -> f32) {
+        for (row, shares) in self.belief.iter_mut().enumerate() {
+            let moved = comparison.lag as f64 * speed(row);
+            for (place, share) in shares.iter_mut().enumerate() {
+                let optimum = place as f64 * PLACE_WIDTH;
+                *share *= aged(likelihood(comparison, optimum - moved, optimum));
+            }
         }
     }
 

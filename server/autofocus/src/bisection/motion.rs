@@ -1,5 +1,9 @@
 //! How far the scene moved between two frames, found by registering their whole surroundings. Sixteen times as many
 //! pixels as the patch has find the motion where the patch alone is too poor in detail.
+//!
+//! The Fourier transforms here take two things into account that halve the work each. Pictures are real, so half of the
+//! frequencies are the conjugates of the others, and two columns of pixels can be transformed as one of complex
+//! numbers. And only small motions are looked for, so most of the inverse transform is never computed.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -11,16 +15,31 @@ use parfocal_imaging::Surroundings;
 const SIDE: usize = Surroundings::SIDE;
 /// Largest motion along each axis that is looked for, in pixels a frame.
 const FARTHEST: isize = 24;
-/// A square of complex numbers, row after row: real and imaginary parts.
+/// Columns of pixels that are transformed at once, two in each complex number.
+const PAIRS: usize = SIDE / 2;
+/// Frequencies down the picture that are kept, from 0 to the highest, and some zeros, so that a row of them fills whole
+/// vector registers.
+const KEPT: usize = SIDE / 2 + 8;
+/// Motions to the right and to the left that are computed, each as many; at least [`FARTHEST`].
+const REACH: usize = 32;
+
+/// [`SIDE`] rows of complex numbers, real and imaginary parts.
 #[derive(Debug, Clone)]
-struct Complex {
-    re: Vec<[f32; SIDE]>,
-    im: Vec<[f32; SIDE]>,
+struct Rows<const WIDTH: usize> {
+    re: Vec<[f32; WIDTH]>,
+    im: Vec<[f32; WIDTH]>,
 }
 
-/// The Fourier transform of a frame's surroundings, less their mean, under a Hann window.
+impl<const WIDTH: usize> Rows<WIDTH> {
+    fn zeros() -> Self {
+        Self { re: vec![[0.0; WIDTH]; SIDE], im: vec![[0.0; WIDTH]; SIDE] }
+    }
+}
+
+/// The Fourier transform of a frame's surroundings, less their mean, under a Hann window: a row for each frequency
+/// across, in it those down from 0 to the highest.
 #[derive(Debug, Clone)]
-pub struct Spectrum(Complex);
+pub struct Spectrum(Rows<KEPT>);
 
 impl Spectrum {
     /// The transform of `levels` ([`Surroundings::levels`]).
@@ -29,14 +48,7 @@ impl Spectrum {
         let rows = levels.as_chunks::<SIDE>().0;
         let sum: f32 = rows.iter().map(|row| row.iter().sum::<f32>()).sum();
         let mean = sum / (SIDE * SIDE) as f32;
-
-        let windowed = |(row, down): (&[f32; SIDE], &f32)| -> [f32; SIDE] {
-            std::array::from_fn(|x| (row[x] - mean) * down * TABLES.window[x])
-        };
-        let re = rows.iter().zip(&TABLES.window).map(windowed).collect();
-        let im = vec![[0.0; SIDE]; SIDE];
-
-        Self(transformed(Complex { re, im }))
+        Self(transformed(rows, mean, &TABLES))
     }
 
     /// By how many pixels (right, down) what was seen in `self` has moved in the later frame `now`.
@@ -45,16 +57,17 @@ impl Spectrum {
     /// amplitude of each frequency and leaves its phase.
     #[must_use]
     pub fn motion_to(&self, now: &Self) -> (isize, isize) {
-        // The inverse transform is the conjugate of the transform of the conjugate, up to a factor. Only its real part
-        // is wanted, so conjugating once is enough.
-        let map = transformed(conjugate_cross_power(&self.0, &now.0)).re;
+        let map = correlation(&self.0, &now.0, &TABLES);
+        let value = |right: isize, down: isize| {
+            let row = down.rem_euclid(SIDE as isize) as usize;
+            if right < 0 { map.re[row][(right + REACH as isize) as usize] } else { map.im[row][right as usize] }
+        };
 
-        let mut best = map[0][0];
+        let mut best = value(0, 0);
         let mut motion = (0, 0);
         for down in -FARTHEST..=FARTHEST {
-            let row = &map[down.rem_euclid(SIDE as isize) as usize];
             for right in -FARTHEST..=FARTHEST {
-                let value = row[right.rem_euclid(SIDE as isize) as usize];
+                let value = value(right, down);
                 if value > best {
                     best = value;
                     motion = (right, down);
@@ -64,34 +77,6 @@ impl Spectrum {
 
         motion
     }
-}
-
-/// The conjugate of `conj(before) * now`, each divided by its size to the power 3/4. With the power 1 every frequency
-/// would count alike, noise included; with 0 the strongest few would decide.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn conjugate_cross_power(before: &Complex, now: &Complex) -> Complex {
-    const LEAST: f32 = 1e-9;
-
-    let mut out = Complex { re: vec![[0.0; SIDE]; SIDE], im: vec![[0.0; SIDE]; SIDE] };
-    for y in 0..SIDE {
-        let (a, b) = (&before.re[y], &before.im[y]);
-        let (c, d) = (&now.re[y], &now.im[y]);
-        let (re, im) = (&mut out.re[y], &mut out.im[y]);
-        for x in 0..SIDE {
-            let real = a[x] * c[x] + b[x] * d[x];
-            let imaginary = a[x] * d[x] - b[x] * c[x];
-            let root = (real * real + imaginary * imaginary).sqrt().sqrt();
-            let weight = 1.0 / (root * root.sqrt() + LEAST);
-            re[x] = weight * real;
-            im[x] = -weight * imaginary;
-        }
-    }
-    out
-}
-
-/// The two-dimensional discrete Fourier transform, with e^(-i...).
-fn transformed(square: Complex) -> Complex {
-    transposed(&down_columns(transposed(&down_columns(square, &TABLES)), &TABLES))
 }
 
 struct Tables {
@@ -115,22 +100,104 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     }
 });
 
-/// The transform of each column (Cooley and Tukey 1965). It works on whole rows at once, which become vector
-/// instructions.
+/// The two-dimensional discrete Fourier transform, with e^(-i...), of `levels` less `mean` under the window.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn down_columns(square: Complex, tables: &Tables) -> Complex {
-    let mut re: Vec<[f32; SIDE]> = tables.reversed.iter().map(|&row| square.re[row]).collect();
-    let mut im: Vec<[f32; SIDE]> = tables.reversed.iter().map(|&row| square.im[row]).collect();
+fn transformed(levels: &[[f32; SIDE]], mean: f32, tables: &Tables) -> Rows<KEPT> {
+    // The left half is the real part, the right half the imaginary one.
+    let mut halves = Rows::<PAIRS>::zeros();
+    for (y, line) in levels.iter().enumerate() {
+        let row = tables.reversed[y];
+        let down = tables.window[y];
+        for x in 0..PAIRS {
+            halves.re[row][x] = (line[x] - mean) * down * tables.window[x];
+            halves.im[row][x] = (line[PAIRS + x] - mean) * down * tables.window[PAIRS + x];
+        }
+    }
+    down_columns(&mut halves, tables);
 
+    // A real column's transform at the frequencies k and -k are conjugates, which tells the two halves apart.
+    let mut across = Rows::<KEPT>::zeros();
+    for k in 0..=SIDE / 2 {
+        let negative = (SIDE - k) % SIDE;
+        let (re, im) = (&halves.re[k], &halves.im[k]);
+        let (other_re, other_im) = (&halves.re[negative], &halves.im[negative]);
+        for x in 0..PAIRS {
+            let left = tables.reversed[x];
+            across.re[left][k] = 0.5 * (re[x] + other_re[x]);
+            across.im[left][k] = 0.5 * (im[x] - other_im[x]);
+            let right = tables.reversed[PAIRS + x];
+            across.re[right][k] = 0.5 * (im[x] + other_im[x]);
+            across.im[right][k] = 0.5 * (other_re[x] - re[x]);
+        }
+    }
+    down_columns(&mut across, tables);
+    across
+}
+
+/// The phase correlation, a row for each motion down: motions to the left by [`REACH`] to 1 in the real part, none and
+/// those to the right in the imaginary one.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn correlation(before: &Rows<KEPT>, now: &Rows<KEPT>, tables: &Tables) -> Rows<REACH> {
+    let mut power = conjugate_cross_power(before, now, tables);
+    down_columns(&mut power, tables);
+
+    // Both maps, to the left and to the right, are real, so they are transformed as one of complex numbers.
+    let mut maps = Rows::<REACH>::zeros();
+    for k in 0..SIDE {
+        // The frequencies that are not kept are the conjugates of those that are.
+        let (kept, sign) = if k <= SIDE / 2 { (k, 1.0) } else { (SIDE - k, -1.0) };
+        let row = tables.reversed[k];
+        for x in 0..REACH {
+            let left = SIDE - REACH + x;
+            maps.re[row][x] = power.re[left][kept] - sign * power.im[x][kept];
+            maps.im[row][x] = sign * power.im[left][kept] + power.re[x][kept];
+        }
+    }
+    down_columns(&mut maps, tables);
+    maps
+}
+
+/// The conjugate of `conj(before) * now`, each divided by its size to the power 3/4. With the power 1 every frequency
+/// would count alike, noise included; with 0 the strongest few would decide. Rows are in the order that
+/// [`down_columns`] takes.
+///
+/// The inverse transform is the conjugate of the transform of the conjugate, up to a factor. Only its real part is
+/// wanted, so conjugating once is enough.
+#[inline(always)]
+fn conjugate_cross_power(before: &Rows<KEPT>, now: &Rows<KEPT>, tables: &Tables) -> Rows<KEPT> {
+    const LEAST: f32 = 1e-9;
+
+    let mut out = Rows::zeros();
+    for y in 0..SIDE {
+        let (a, b) = (&before.re[y], &before.im[y]);
+        let (c, d) = (&now.re[y], &now.im[y]);
+        let row = tables.reversed[y];
+        let (re, im) = (&mut out.re[row], &mut out.im[row]);
+        for x in 0..KEPT {
+            let real = a[x] * c[x] + b[x] * d[x];
+            let imaginary = a[x] * d[x] - b[x] * c[x];
+            let root = (real * real + imaginary * imaginary).sqrt().sqrt();
+            let weight = 1.0 / (root * root.sqrt() + LEAST);
+            re[x] = weight * real;
+            im[x] = -weight * imaginary;
+        }
+    }
+    out
+}
+
+/// The transform of each column, in place (Cooley and Tukey 1965). Row `k` is expected at `reversed[k]`. It works on
+/// whole rows at once, which become vector instructions.
+#[inline(always)]
+fn down_columns<const WIDTH: usize>(rows: &mut Rows<WIDTH>, tables: &Tables) {
     let mut half = 1;
     while half < SIDE {
         for start in (0..SIDE).step_by(2 * half) {
             for k in 0..half {
                 let cos = tables.cos[k * (SIDE / 2 / half)];
                 let sin = tables.sin[k * (SIDE / 2 / half)];
-                let (upper_re, lower_re) = pair(&mut re, start + k, start + k + half);
-                let (upper_im, lower_im) = pair(&mut im, start + k, start + k + half);
-                for x in 0..SIDE {
+                let (upper_re, lower_re) = pair(&mut rows.re, start + k, start + k + half);
+                let (upper_im, lower_im) = pair(&mut rows.im, start + k, start + k + half);
+                for x in 0..WIDTH {
                     let turned_re = lower_re[x] * cos - lower_im[x] * sin;
                     let turned_im = lower_re[x] * sin + lower_im[x] * cos;
                     lower_re[x] = upper_re[x] - turned_re;
@@ -142,34 +209,17 @@ fn down_columns(square: Complex, tables: &Tables) -> Complex {
         }
         half *= 2;
     }
-
-    Complex { re, im }
 }
 
 /// Rows `first` and `second`, which is greater.
 #[inline(always)]
-fn pair(rows: &mut [[f32; SIDE]], first: usize, second: usize) -> (&mut [f32; SIDE], &mut [f32; SIDE]) {
+fn pair<const WIDTH: usize>(
+    rows: &mut [[f32; WIDTH]],
+    first: usize,
+    second: usize,
+) -> (&mut [f32; WIDTH], &mut [f32; WIDTH]) {
     let (upper, lower) = rows.split_at_mut(second);
     (&mut upper[first], &mut lower[0])
-}
-
-fn transposed(square: &Complex) -> Complex {
-    // Block by block, so that reads and writes stay in the cache.
-    const BLOCK: usize = 16;
-    let turned = |rows: &[[f32; SIDE]]| {
-        let mut out = vec![[0.0; SIDE]; SIDE];
-        for top in (0..SIDE).step_by(BLOCK) {
-            for left in (0..SIDE).step_by(BLOCK) {
-                for y in top..top + BLOCK {
-                    for x in left..left + BLOCK {
-                        out[x][y] = rows[y][x];
-                    }
-                }
-            }
-        }
-        out
-    };
-    Complex { re: turned(&square.re), im: turned(&square.im) }
 }
 
 #[cfg(test)]
@@ -179,23 +229,27 @@ mod tests {
     use parfocal_devices::simulation::texture::texture;
     use parfocal_imaging::GrayImage;
 
+    /// The transform at one frequency by its definition, term by term.
+    fn by_definition(levels: &[f32], across: usize, down: usize) -> (f64, f64) {
+        let mean = f64::from(levels.iter().sum::<f32>()) / (SIDE * SIDE) as f64;
+        let window = |i: usize| 0.5 - 0.5 * (TAU * (i + 1) as f64 / (SIDE + 1) as f64).cos();
+        levels.iter().enumerate().fold((0.0, 0.0), |(re, im), (i, level)| {
+            let (x, y) = (i % SIDE, i / SIDE);
+            let turn = -TAU * ((across * x + down * y) % SIDE) as f64 / SIDE as f64;
+            let level = (f64::from(*level) - mean) * window(x) * window(y);
+            (re + level * turn.cos(), im + level * turn.sin())
+        })
+    }
+
     #[test]
-    fn the_transform_of_a_wave_is_two_peaks() {
-        // cos(2 pi (3 x + 5 y) / 128) has half of all pixels at the frequency (3, 5), and half at (-3, -5).
-        let wave = |y: usize, x: usize| (TAU * (3 * x + 5 * y) as f64 / SIDE as f64).cos() as f32;
-        let re = (0..SIDE).map(|y| std::array::from_fn(|x| wave(y, x))).collect();
-        let found = transformed(Complex { re, im: vec![[0.0; SIDE]; SIDE] });
-        for y in 0..SIDE {
-            for x in 0..SIDE {
-                let expected = if (y, x) == (5, 3) || (y, x) == (123, 125) { 8192.0 } else { 0.0 };
-                assert!((found.re[y][x] - expected).abs() < 0.1 && found.im[y][x].abs() < 0.1, "{y} {x}");
-            }
+    fn the_transform_is_what_its_definition_says() {
+        let picture = texture(2, SIDE);
+        let Spectrum(found) = Spectrum::of(&picture.data);
+        for (across, down) in [(0, 0), (3, 5), (4, 5), (125, 5), (64, 64), (70, 3), (127, 60), (1, 64)] {
+            let (re, im) = by_definition(&picture.data, across, down);
+            let found = (f64::from(found.re[across][down]), f64::from(found.im[across][down]));
+            assert!((found.0 - re).hypot(found.1 - im) < 0.5, "{across} {down}: {found:?} {re} {im}");
         }
-        // The sine has its peaks in the imaginary part, with the sign of e^(-i...).
-        let sine = |x: usize| (TAU * 3.0 * x as f64 / SIDE as f64).sin() as f32;
-        let re = (0..SIDE).map(|_| std::array::from_fn(sine)).collect();
-        let found = transformed(Complex { re, im: vec![[0.0; SIDE]; SIDE] });
-        assert!((found.im[0][3] + 8192.0).abs() < 0.1 && (found.im[0][125] - 8192.0).abs() < 0.1);
     }
 
     /// The square of `picture` with its corner at `(x, y)`.
