@@ -73,8 +73,8 @@ const fn whole_benchmark() -> usize {
 }
 
 /// The recipes that ship. Ours have the policy's name; those that train its weights further end in `-refined`,
-/// `-relief` or `-adapted`. The paper's end in `-paper`.
-const SHIPPED: [(&str, &str); 11] = [
+/// `-relief`, `-glass` or `-adapted`. The paper's end in `-paper`.
+const SHIPPED: [(&str, &str); 12] = [
     ("mgm-learned", include_str!("../../../../../policies/mgm-learned.toml")),
     ("mlr-learned", include_str!("../../../../../policies/mlr-learned.toml")),
     ("cnn-learned", include_str!("../../../../../policies/cnn-learned.toml")),
@@ -85,6 +85,7 @@ const SHIPPED: [(&str, &str); 11] = [
     ("parfocal", include_str!("../../../../../policies/parfocal.toml")),
     ("parfocal-refined", include_str!("../../../../../policies/parfocal-refined.toml")),
     ("parfocal-relief", include_str!("../../../../../policies/parfocal-relief.toml")),
+    ("parfocal-glass", include_str!("../../../../../policies/parfocal-glass.toml")),
     ("parfocal-adapted", include_str!("../../../../../policies/parfocal-adapted.toml")),
 ];
 
@@ -183,7 +184,7 @@ mod tests {
     fn every_shipped_recipe_is_sound_and_makes_its_policy() {
         for name in names() {
             let recipe = Recipe::parse(shipped(name).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
-            let suffixes = ["-paper", "-refined", "-relief", "-adapted"];
+            let suffixes = ["-paper", "-refined", "-relief", "-glass", "-adapted"];
             let policy = suffixes.iter().fold(name, |name, suffix| name.trim_end_matches(suffix));
             assert_eq!(recipe.policy, policy);
         }
