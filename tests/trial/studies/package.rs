@@ -140,7 +140,7 @@ async fn other_programs_read_what_was_said_with_its_types_and_labels() {
     assert!(width.parse::<usize>().unwrap() >= "01-MAR-2026 09:00:00.000".len(), "{format}");
 
     let label = found["labels"]["sessions"]["practice"].as_str().unwrap();
-    assert_eq!(label, "Whether it is practice, never to be mixed with real data");
+    assert_eq!(label, "Whether the session is practice, which must not be mixed with trial data");
     assert_eq!(found["values"]["sessions"]["practice"]["1.0"], "yes");
 
     let sessions = rows(&package, "sessions");
@@ -171,7 +171,8 @@ async fn the_script_loads_the_tables_into_r() {
     assert_eq!(lines.next().unwrap().trim(), "POSIXct POSIXt character logical");
     assert_eq!(
         lines.next().unwrap().trim(),
-        "What was said, as it was said; empty for a mark and for voice; of a withdrawal the key of the other comment"
+        "Text of the comment, word for word; for a withdrawal the key of the comment taken back; empty for a mark and \
+         for voice, and if the text was erased"
     );
     for said in said() {
         assert!(printed.contains(said.trim_end()), "{printed}");
