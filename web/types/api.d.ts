@@ -64,7 +64,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Moves the session on; repeating an action changes nothing. Answers with the session as it is then. */
+        /** Advances the session; repeating an action changes nothing. Returns the session after the action. */
         post: operations["operator_act"];
         delete?: never;
         options?: never;
@@ -143,7 +143,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Records a participant's consent. Answers with the session as it is then. */
+        /** Records a participant's consent. Returns the session after that. */
         post: operations["operator_consent"];
         delete?: never;
         options?: never;
@@ -547,7 +547,10 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets that range. */
+        /**
+         * The sound of a voice comment, as far as it has arrived, for a player: with its duration, which browsers do not write
+         *     into what they record. Exports have it as it arrived. A request for a range of bytes gets that range.
+         */
         get: operations["researcher_recording"];
         put?: never;
         post?: never;
@@ -744,7 +747,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Moves the session on; repeating an action changes nothing. Answers with the session as it is then. */
+        /** Advances the session; repeating an action changes nothing. Returns the session after the action. */
         post: operations["surgeon_act"];
         delete?: never;
         options?: never;
@@ -1404,7 +1407,7 @@ export interface components {
         Analysis: {
             /** @description SHA-256 of the study's definition. */
             definition_sha256: string;
-            /** @description Names of the definition's sites of which no session is here. */
+            /** @description Names of the definition's sites that have no session in this analysis. */
             missing_sites: string[];
             /** @description Notes that apply to all figures. */
             notes: string[];
@@ -1630,7 +1633,7 @@ export interface components {
             about: string;
             /** @description When it was recorded, by the server's wall clock. */
             at: string;
-            /** @description Who recorded it. */
+            /** @description Role that recorded it. */
             by: components["schemas"]["Role"];
             /** @description When its words were erased, by the server's wall clock; none if they were not. */
             erased?: string | null;
@@ -1784,7 +1787,7 @@ export interface components {
             camera: boolean;
             /** @description Whether the lens takes commands. */
             lens: boolean;
-            /** @description What is wrong, the worst first. */
+            /** @description Problems, the most severe first. */
             problems: components["schemas"]["Problem"][];
             /** @description Whether the camera or the lens is simulated. */
             simulated: boolean;
@@ -1844,7 +1847,7 @@ export interface components {
             /** @description Description of the event. */
             text: string;
         };
-        /** @description A wish for a backup. */
+        /** @description A request for a backup. */
         MakeBackup: {
             /** @description The lead's own passphrase, entered again. */
             passphrase: string;
@@ -1989,7 +1992,7 @@ export interface components {
             reason_wanted?: components["schemas"]["ReasonWanted"] | null;
             /** @description Name of the session's study; none outside studies. */
             study?: string | null;
-            /** @description Why the disk has not taken the `unrecorded` event; none if that is not known. */
+            /** @description Why the `unrecorded` event is not on disk yet; none if that is not known. */
             unrecorded_because?: string | null;
             /** @description Whether the participant withdrew. */
             withdrawn: boolean;
@@ -2025,14 +2028,14 @@ export interface components {
             better?: string | null;
             /**
              * Format: double
-             * @description Highest possible value, if there is one.
+             * @description Highest possible value; none if there is no limit.
              */
             highest?: number | null;
             /** @description Label for people. */
             label: string;
             /**
              * Format: double
-             * @description Lowest possible value, if there is one.
+             * @description Lowest possible value; none if there is no limit.
              */
             lowest?: number | null;
             /** @description Name: question and measure, or a quantity of the focal power. */
@@ -2142,7 +2145,7 @@ export interface components {
         Problem: {
             /** @description What it is, for programs. */
             code: components["schemas"]["Code"];
-            /** @description How bad it is: `degraded` or `failing`. */
+            /** @description Severity: `degraded` or `failing`. */
             condition: components["schemas"]["Condition"];
             /** @description What it is, in one sentence for people. */
             message: string;
@@ -2326,7 +2329,7 @@ export interface components {
             recording?: components["schemas"]["Record"] | null;
             /**
              * Format: int64
-             * @description Of these, the bytes that recordings leave free.
+             * @description Bytes of these that recordings leave free.
              */
             reserve_bytes?: number | null;
             /**
@@ -2387,15 +2390,18 @@ export interface components {
         SessionDetail: components["schemas"]["SessionLine"] & {
             /** @description Algorithm that drew the order. */
             algorithm: string;
-            /** @description Answers that count, in the order they were given; none once the participant has withdrawn. */
+            /** @description Answers that count, in the order of entry; none once the participant has withdrawn. */
             answers: components["schemas"]["AnswerLine"][];
-            /** @description SHA-256 with which the order was committed to when the session was made. */
+            /** @description SHA-256 published when the session was made, which commits to the order. */
             commitment: string;
             /** @description The participant's consents, oldest first; the latest counts. */
             consents: components["schemas"]["ConsentLine"][];
             /** @description Corrections, oldest first. Once the participant has withdrawn, only those of the participant. */
             corrections: components["schemas"]["CorrectionLine"][];
-            /** @description Time, by the server's clock, until which what arrives counts; none while the session is under way. */
+            /**
+             * @description Time, by the server's clock, until which arriving comments and answers count; none while the session is under
+             *     way.
+             */
             counts_until?: string | null;
             /** @description Everything that happened, oldest first. */
             log: components["schemas"]["LogLine"][];
@@ -2416,38 +2422,38 @@ export interface components {
         SessionLine: {
             /**
              * Format: int64
-             * @description Comments kept.
+             * @description Number of comments recorded.
              */
             comments: number;
-            /** @description The right code, where that was corrected. */
+            /** @description Corrected code of the participant; none if it was not corrected. */
             corrected_participant?: string | null;
-            /** @description When it was made, by the server's wall clock. */
+            /** @description When the session was made, by the server's wall clock. */
             created: string;
-            /** @description Whether that was while it was under way. */
+            /** @description Whether it was unblinded while it was under way. */
             emergency: boolean;
             /**
              * Format: int64
-             * @description Settings inspected to the end.
+             * @description Number of settings inspected to the end.
              */
             finished_settings: number;
-            /** @description Participant's code, as it was recorded. */
+            /** @description Code of the participant, as it was recorded. */
             participant: string;
-            /** @description Whether it is practice. */
+            /** @description Whether it is a practice session. */
             practice: boolean;
-            /** @description Protocol's name. */
+            /** @description Name of the protocol. */
             protocol: string;
             /** @description Session. */
             session: components["schemas"]["SessionId"];
             /**
              * Format: int64
-             * @description Settings in all.
+             * @description Number of settings in the session.
              */
             settings: number;
-            /** @description How far it came. */
+            /** @description State of the session. */
             status: components["schemas"]["SessionStatus"];
-            /** @description The study that it belongs to; none where it is outside any study. */
+            /** @description The study that it belongs to; none if it belongs to none. */
             study?: string | null;
-            /** @description Whether it was told which policies ran. */
+            /** @description Whether it was unblinded. */
             unblinded: boolean;
             /** @description Whether the participant withdrew: its data stay out of exports. */
             withdrawn: boolean;
@@ -2475,7 +2481,7 @@ export interface components {
             question: string;
             /**
              * Format: double
-             * @description When it was given, in seconds: the time that it waited on the surgeon's device is subtracted.
+             * @description When the answer was given, in seconds: the time that it waited on the surgeon's device is subtracted.
              */
             seconds: number;
             /** @description Setting, from 1; none for a closing question. */
@@ -2622,7 +2628,7 @@ export interface components {
         StudyAction: {
             /** @enum {string} */
             change: "open";
-            /** @description Whether to open it the first time even though its plan cannot work as it is meant. */
+            /** @description Whether to open it the first time although its plan has concerns. */
             despite_concerns?: boolean;
         } | {
             /** @enum {string} */
@@ -2647,7 +2653,7 @@ export interface components {
             analysis: string;
             /** @description The line to print, publish or mail before the first session; none until the orders are drawn. */
             commitment_line?: string | null;
-            /** @description What in the plan cannot work as it is meant, in sentences; empty once the study is open. */
+            /** @description Concerns about the plan, in sentences; empty once the study is open. */
             concerns: string[];
             /** @description The definition, byte for byte. */
             definition: string;
@@ -2729,9 +2735,9 @@ export interface components {
         StudyLogLine: {
             /** @description When it happened, by the wall clock. */
             at: string;
-            /** @description Where it came from: a role, or the command line. */
+            /** @description How the event was recorded: by a role, or on the command line. */
             by: string;
-            /** @description The person who did it, as given in the signature. */
+            /** @description Name of the person, as given in the signature. */
             person: string;
             /** @description Reason for the change. */
             reason: string;
@@ -2838,7 +2844,7 @@ export interface components {
              * @description Seconds of inspection left in the segment when the view was sent; none outside inspection.
              */
             remaining_seconds?: number | null;
-            /** @description The surgeon's own words about each setting, in the order they were said; empty outside the closing questions. */
+            /** @description The surgeon's own words about each setting, in the order of entry; empty outside the closing questions. */
             said: string[][];
             segment?: components["schemas"]["SegmentId"] | null;
             /** @description Random id of the session. */
@@ -2903,7 +2909,7 @@ export interface components {
             frame?: number | null;
             /** @description The comment's key. */
             key: components["schemas"]["IdempotencyKey"];
-            /** @description Whether it arrived after the time in which what a surgeon's device held still counted. */
+            /** @description Whether it arrived too late to count. */
             late: boolean;
             /** @description A researcher's note on the comment; for a voice comment, its transcript. */
             note?: string | null;
@@ -2919,7 +2925,7 @@ export interface components {
             pictures_per_second?: number | null;
             /**
              * Format: double
-             * @description When it was said, in seconds: the time that it waited on the surgeon's device is subtracted.
+             * @description When the comment was made, in seconds: the time that it waited on the surgeon's device is subtracted.
              */
             seconds: number;
             /** @description Setting, from 1; none outside settings. */
@@ -3052,7 +3058,7 @@ export interface components {
             account?: string | null;
             /** @description When it was recorded, by the server's wall clock. */
             at: string;
-            /** @description Who recorded it. */
+            /** @description Role that recorded it. */
             by: components["schemas"]["Role"];
             /** @description Reason for the withdrawal. */
             reason: string;
@@ -3063,7 +3069,7 @@ export interface components {
         Words: {
             /** @description Whether its words were erased. */
             erased: boolean;
-            /** @description Whether it arrived after the time in which what a surgeon's device held still counted. */
+            /** @description Whether it arrived too late to count. */
             late: boolean;
             /** @description The question that it answers; none for a comment. */
             question?: string | null;
@@ -3088,7 +3094,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description On to the role's page */
+            /** @description Redirect to the role's page */
             303: {
                 headers: {
                     [name: string]: unknown;
@@ -3114,7 +3120,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3124,7 +3130,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3134,7 +3140,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3192,7 +3198,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3202,7 +3208,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3212,7 +3218,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3270,7 +3276,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3280,7 +3286,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3290,7 +3296,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3343,7 +3349,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Another role does this */
+            /** @description The action belongs to another role */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -3361,7 +3367,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3371,7 +3377,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It does not fit where the session stands */
+            /** @description The action does not fit the state of the session */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -3390,7 +3396,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -3400,7 +3406,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3419,7 +3425,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3488,7 +3494,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3498,7 +3504,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3508,7 +3514,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3553,7 +3559,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The camera was asked */
+            /** @description The camera received the request */
             204: {
                 headers: {
                     [name: string]: unknown;
@@ -3580,7 +3586,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3609,7 +3615,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -3619,7 +3625,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3629,7 +3635,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Outside the camera's bounds */
+            /** @description The value is outside the camera's bounds */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -3638,7 +3644,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3658,7 +3664,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The camera was asked, but the log could not be written */
+            /** @description The camera received the request, but the log could not be written */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -3706,7 +3712,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3716,7 +3722,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3726,7 +3732,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3795,7 +3801,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3805,7 +3811,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3815,7 +3821,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -3897,7 +3903,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -3917,7 +3923,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -3927,7 +3933,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -3946,7 +3952,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4019,7 +4025,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4029,7 +4035,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is under way */
+            /** @description The session is under way */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -4048,7 +4054,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -4058,7 +4064,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4078,7 +4084,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4159,7 +4165,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4188,7 +4194,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -4198,7 +4204,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4218,7 +4224,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4291,7 +4297,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4311,7 +4317,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -4321,7 +4327,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4340,7 +4346,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4409,7 +4415,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4419,7 +4425,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4429,7 +4435,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4502,7 +4508,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4531,7 +4537,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -4541,7 +4547,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4561,7 +4567,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4629,7 +4635,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4639,7 +4645,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4649,7 +4655,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4731,7 +4737,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4760,7 +4766,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -4770,7 +4776,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4789,7 +4795,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4858,7 +4864,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4868,7 +4874,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4878,7 +4884,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -4946,7 +4952,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -4956,7 +4962,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -4966,7 +4972,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5038,7 +5044,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5048,7 +5054,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description There is an account of this name or this display name */
+            /** @description An account of this name or display name exists */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5067,7 +5073,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -5077,7 +5083,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5105,7 +5111,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5188,7 +5194,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5198,7 +5204,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is the last lead who can sign in */
+            /** @description The account is of the last lead who can sign in */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5217,7 +5223,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -5227,7 +5233,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5255,7 +5261,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5323,7 +5329,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5333,7 +5339,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5343,7 +5349,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5415,7 +5421,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5435,7 +5441,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -5445,7 +5451,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5473,7 +5479,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5551,7 +5557,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5561,7 +5567,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5571,7 +5577,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5640,7 +5646,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5650,7 +5656,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5660,7 +5666,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5740,7 +5746,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5750,7 +5756,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5760,7 +5766,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5843,7 +5849,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5872,7 +5878,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -5882,7 +5888,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -5892,7 +5898,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It makes no sense, or no reason was given */
+            /** @description The correction does not fit the record, or no reason was given */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -5901,7 +5907,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -5981,7 +5987,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -5991,7 +5997,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Its participant withdrew */
+            /** @description The participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6000,7 +6006,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6010,7 +6016,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6093,7 +6099,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6122,7 +6128,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -6132,7 +6138,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6151,7 +6157,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6234,7 +6240,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6263,7 +6269,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -6273,7 +6279,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6292,7 +6298,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6376,7 +6382,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6386,7 +6392,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded, or its participant withdrew */
+            /** @description The session is not unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6395,7 +6401,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6405,7 +6411,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6485,7 +6491,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6495,7 +6501,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded, or its participant withdrew */
+            /** @description The session is not unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6504,7 +6510,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6514,7 +6520,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6605,7 +6611,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6615,7 +6621,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded, or its participant withdrew */
+            /** @description The session is not unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6624,7 +6630,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6713,7 +6719,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6723,7 +6729,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Its participant withdrew */
+            /** @description The participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6732,7 +6738,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6742,7 +6748,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6825,7 +6831,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -6835,7 +6841,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Its order would tell that of another session of its balanced set, or something may be outstanding */
+            /** @description The order would reveal that of another session of its balanced set, or comments and answers may be outstanding */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -6854,7 +6860,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -6864,7 +6870,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -6892,7 +6898,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -6948,7 +6954,7 @@ export interface operations {
                     "audio/ogg;codecs=opus": number[];
                 };
             };
-            /** @description A part of it */
+            /** @description A part of the recording */
             206: {
                 headers: {
                     [name: string]: unknown;
@@ -6975,7 +6981,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No such session or recording, or it was erased */
+            /** @description No such session or recording, or the recording was erased */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -6984,7 +6990,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7003,14 +7009,14 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It has no such part */
+            /** @description The recording has no such part */
             416: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7020,7 +7026,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7103,7 +7109,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7132,7 +7138,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -7142,7 +7148,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7161,7 +7167,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7230,7 +7236,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7240,7 +7246,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7250,7 +7256,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7323,7 +7329,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7333,7 +7339,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description There is a study of this name */
+            /** @description A study of this name exists */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -7352,7 +7358,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -7362,7 +7368,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7381,7 +7387,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7461,7 +7467,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7471,7 +7477,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7481,7 +7487,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7561,7 +7567,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7571,7 +7577,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is not unblinded */
+            /** @description The study is not unblinded */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -7580,7 +7586,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7590,7 +7596,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7671,7 +7677,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7681,7 +7687,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is not unblinded */
+            /** @description The study is not unblinded */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -7690,7 +7696,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7700,7 +7706,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7765,7 +7771,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Nobody is signed in who may, the passphrase is wrong, or the study names others who may unblind */
+            /** @description Nobody with the right is signed in, the passphrase is wrong, or the study lets other people unblind */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -7783,7 +7789,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7793,7 +7799,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It does not fit where the study stands */
+            /** @description The change does not fit the stage of the study */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -7812,7 +7818,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -7822,7 +7828,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7850,7 +7856,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -7921,7 +7927,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -7931,7 +7937,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -7941,7 +7947,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8025,7 +8031,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8035,7 +8041,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has no session to export, or is not unblinded */
+            /** @description The study has no session to export, or is not unblinded */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -8054,7 +8060,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8064,7 +8070,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8084,7 +8090,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8156,7 +8162,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No export of it is finished */
+            /** @description No export of the study is finished */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -8165,7 +8171,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8175,7 +8181,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8185,7 +8191,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8230,7 +8236,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Signed in: a cookie, or a token where it was asked for */
+            /** @description Signed in: a cookie, or a token if the request asked for it */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -8249,7 +8255,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Name and passphrase do not belong together, the account is disabled, or another site made the request */
+            /** @description The name or passphrase is wrong, the account is disabled, or another site made the request */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -8258,7 +8264,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8287,7 +8293,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8297,7 +8303,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8307,7 +8313,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The new passphrase is too short, or the one before */
+            /** @description The new passphrase is too short, or the same as before */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -8325,7 +8331,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8382,7 +8388,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8392,7 +8398,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8402,7 +8408,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8464,7 +8470,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Another role does this */
+            /** @description The action belongs to another role */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -8482,7 +8488,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8492,7 +8498,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It does not fit where the session stands */
+            /** @description The action does not fit the state of the session */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -8511,7 +8517,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8521,7 +8527,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8541,7 +8547,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8622,7 +8628,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8632,7 +8638,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been asked yet, or the key stands for another answer */
+            /** @description The question is not asked yet, or the key belongs to another answer */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -8651,7 +8657,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8661,7 +8667,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8680,7 +8686,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8760,7 +8766,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8770,7 +8776,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The key stands for another comment */
+            /** @description The key belongs to another comment */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -8789,7 +8795,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8799,7 +8805,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8818,7 +8824,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -8898,7 +8904,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -8918,7 +8924,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -8928,7 +8934,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -8948,7 +8954,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9016,7 +9022,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9026,7 +9032,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9036,7 +9042,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9110,7 +9116,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9130,7 +9136,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -9140,7 +9146,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9150,7 +9156,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Not what the page sends */
+            /** @description The body is malformed */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -9159,7 +9165,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9254,7 +9260,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9264,7 +9270,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Another piece stands in its place */
+            /** @description The recording has another piece in this place */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -9283,7 +9289,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is not said to be application/json */
+            /** @description The Content-Type is not application/json */
             415: {
                 headers: {
                     [name: string]: unknown;
@@ -9293,7 +9299,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9303,7 +9309,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No sound that browsers record, or too large */
+            /** @description The sound is of an unknown kind, or too large */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -9312,7 +9318,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9355,7 +9361,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Let in: the role's cookie, and on to its page */
+            /** @description The role's cookie, and a redirect to its page */
             303: {
                 headers: {
                     [name: string]: unknown;
@@ -9372,7 +9378,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Not a key of this server, or of a session that has ended */
+            /** @description The key is not of this server, or its session has ended */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -9381,7 +9387,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9391,7 +9397,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9401,7 +9407,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9432,7 +9438,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description It does its work: `ok`, or `degraded` where something needs a person */
+            /** @description The server works: `ok`, or `degraded` if a person has to act */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -9451,7 +9457,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9461,7 +9467,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9471,7 +9477,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9481,7 +9487,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It cannot do its work: `failing` */
+            /** @description The server cannot do its work: `failing` */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -9511,7 +9517,7 @@ export interface operations {
                 };
                 content?: never;
             };
-            /** @description No WebSocket was asked for */
+            /** @description The request is not for a WebSocket */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9529,7 +9535,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9539,7 +9545,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9558,7 +9564,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9617,7 +9623,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9627,7 +9633,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9637,7 +9643,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9697,7 +9703,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9707,7 +9713,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9717,7 +9723,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9777,7 +9783,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9787,7 +9793,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9797,7 +9803,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9866,7 +9872,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9876,7 +9882,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9886,7 +9892,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -9956,7 +9962,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -9966,7 +9972,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -9976,7 +9982,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10057,7 +10063,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10067,7 +10073,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10077,7 +10083,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10147,7 +10153,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10157,7 +10163,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10167,7 +10173,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10248,7 +10254,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10258,7 +10264,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10268,7 +10274,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10349,7 +10355,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10359,7 +10365,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It is not unblinded */
+            /** @description The study is not unblinded */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -10368,7 +10374,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10378,7 +10384,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10441,7 +10447,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10451,7 +10457,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10461,7 +10467,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10506,7 +10512,7 @@ export interface operations {
                 };
                 content?: never;
             };
-            /** @description It is as the browser has it */
+            /** @description The browser's copy is current */
             304: {
                 headers: {
                     [name: string]: unknown;
@@ -10532,7 +10538,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10542,7 +10548,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10552,7 +10558,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10611,7 +10617,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10621,7 +10627,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10631,7 +10637,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10691,7 +10697,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10701,7 +10707,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10711,7 +10717,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10771,7 +10777,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10781,7 +10787,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10791,7 +10797,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10851,7 +10857,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10861,7 +10867,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10871,7 +10877,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -10930,7 +10936,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -10940,7 +10946,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -10950,7 +10956,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -11009,7 +11015,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -11019,7 +11025,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -11029,7 +11035,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -11088,7 +11094,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -11098,7 +11104,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -11108,7 +11114,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;
@@ -11139,7 +11145,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description The answer has arrived; it says nothing else */
+            /** @description The connection works; the answer is empty */
             204: {
                 headers: {
                     [name: string]: unknown;
@@ -11156,7 +11162,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It took too long */
+            /** @description The request took too long */
             408: {
                 headers: {
                     [name: string]: unknown;
@@ -11166,7 +11172,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server listens on a loopback address and was asked for by another name */
+            /** @description The server listens on a loopback address, and the request names another host */
             421: {
                 headers: {
                     [name: string]: unknown;
@@ -11176,7 +11182,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The server failed; its log says more */
+            /** @description The server failed; see its log */
             500: {
                 headers: {
                     [name: string]: unknown;

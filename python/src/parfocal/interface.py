@@ -123,7 +123,7 @@ class Analysis(TypedDict):
     """SHA-256 of the study's definition."""
 
     missing_sites: builtins.list[str]
-    """Names of the definition's sites of which no session is here."""
+    """Names of the definition's sites that have no session in this analysis."""
 
     notes: builtins.list[str]
     """Notes that apply to all figures."""
@@ -282,13 +282,13 @@ class Comparison(TypedDict):
     """Which end is better, if known: `higher` or `lower`."""
 
     highest: NotRequired[float | None]
-    """Highest possible value, if there is one."""
+    """Highest possible value; none if there is no limit."""
 
     label: str
     """Label for people."""
 
     lowest: NotRequired[float | None]
-    """Lowest possible value, if there is one."""
+    """Lowest possible value; none if there is no limit."""
 
     outcome: str
     """Name: question and measure, or a quantity of the focal power."""
@@ -366,7 +366,7 @@ class CorrectionLine(TypedDict):
     """When it was recorded, by the server's wall clock."""
 
     by: Role
-    """Who recorded it."""
+    """Role that recorded it."""
 
     erased: NotRequired[str | None]
     """When its words were erased, by the server's wall clock; none if they were not."""
@@ -491,7 +491,7 @@ class Health(TypedDict):
     """Whether the lens takes commands."""
 
     problems: builtins.list[Problem]
-    """What is wrong, the worst first."""
+    """Problems, the most severe first."""
 
     simulated: bool
     """Whether the camera or the lens is simulated."""
@@ -550,7 +550,7 @@ class LogLine(TypedDict):
     """Description of the event."""
 
 class MakeBackup(TypedDict):
-    """A wish for a backup."""
+    """A request for a backup."""
 
     passphrase: str
     """The lead's own passphrase, entered again."""
@@ -735,8 +735,8 @@ class OperatorView(TypedDict):
     """Seconds of inspection left in the segment when the view was sent; none outside inspection."""
 
     said: builtins.list[builtins.list[str]]
-    """The surgeon's own words about each setting, in the order they were said; empty outside the
-    closing questions."""
+    """The surgeon's own words about each setting, in the order of entry; empty outside the closing
+    questions."""
 
     segment: NotRequired[SegmentId | None]
 
@@ -790,7 +790,7 @@ class OperatorView(TypedDict):
     """Name of the session's study; none outside studies."""
 
     unrecorded_because: NotRequired[str | None]
-    """Why the disk has not taken the `unrecorded` event; none if that is not known."""
+    """Why the `unrecorded` event is not on disk yet; none if that is not known."""
 
     withdrawn: bool
     """Whether the participant withdrew."""
@@ -822,13 +822,13 @@ class Outcome(TypedDict):
     """Which end is better, if known: `higher` or `lower`."""
 
     highest: NotRequired[float | None]
-    """Highest possible value, if there is one."""
+    """Highest possible value; none if there is no limit."""
 
     label: str
     """Label for people."""
 
     lowest: NotRequired[float | None]
-    """Lowest possible value, if there is one."""
+    """Lowest possible value; none if there is no limit."""
 
     outcome: str
     """Name: question and measure, or a quantity of the focal power."""
@@ -941,7 +941,7 @@ class Problem(TypedDict):
     """What it is, for programs."""
 
     condition: Condition
-    """How bad it is: `degraded` or `failing`."""
+    """Severity: `degraded` or `failing`."""
 
     message: str
     """What it is, in one sentence for people."""
@@ -1071,7 +1071,7 @@ class RecordingStatus(TypedDict):
     recording: NotRequired[Record | None]
 
     reserve_bytes: NotRequired[int | None]
-    """Of these, the bytes that recordings leave free."""
+    """Bytes of these that recordings leave free."""
 
     seconds: NotRequired[float | None]
     """Seconds since it began."""
@@ -1127,43 +1127,43 @@ class SessionDetail(TypedDict):
     """A session in detail, for the researcher. Contains the policies only after it was unblinded."""
 
     comments: int
-    """Comments kept."""
+    """Number of comments recorded."""
 
     corrected_participant: NotRequired[str | None]
-    """The right code, where that was corrected."""
+    """Corrected code of the participant; none if it was not corrected."""
 
     created: str
-    """When it was made, by the server's wall clock."""
+    """When the session was made, by the server's wall clock."""
 
     emergency: bool
-    """Whether that was while it was under way."""
+    """Whether it was unblinded while it was under way."""
 
     finished_settings: int
-    """Settings inspected to the end."""
+    """Number of settings inspected to the end."""
 
     participant: str
-    """Participant's code, as it was recorded."""
+    """Code of the participant, as it was recorded."""
 
     practice: bool
-    """Whether it is practice."""
+    """Whether it is a practice session."""
 
     protocol: str
-    """Protocol's name."""
+    """Name of the protocol."""
 
     session: SessionId
     """Session."""
 
     settings: int
-    """Settings in all."""
+    """Number of settings in the session."""
 
     status: SessionStatus
-    """How far it came."""
+    """State of the session."""
 
     study: NotRequired[str | None]
-    """The study that it belongs to; none where it is outside any study."""
+    """The study that it belongs to; none if it belongs to none."""
 
     unblinded: bool
-    """Whether it was told which policies ran."""
+    """Whether it was unblinded."""
 
     withdrawn: bool
     """Whether the participant withdrew: its data stay out of exports."""
@@ -1172,10 +1172,10 @@ class SessionDetail(TypedDict):
     """Algorithm that drew the order."""
 
     answers: builtins.list[AnswerLine]
-    """Answers that count, in the order they were given; none once the participant has withdrawn."""
+    """Answers that count, in the order of entry; none once the participant has withdrawn."""
 
     commitment: str
-    """SHA-256 with which the order was committed to when the session was made."""
+    """SHA-256 published when the session was made, which commits to the order."""
 
     consents: builtins.list[ConsentLine]
     """The participant's consents, oldest first; the latest counts."""
@@ -1184,8 +1184,8 @@ class SessionDetail(TypedDict):
     """Corrections, oldest first. Once the participant has withdrawn, only those of the participant."""
 
     counts_until: NotRequired[str | None]
-    """Time, by the server's clock, until which what arrives counts; none while the session is under
-    way."""
+    """Time, by the server's clock, until which arriving comments and answers count; none while the
+    session is under way."""
 
     log: builtins.list[LogLine]
     """Everything that happened, oldest first."""
@@ -1209,43 +1209,43 @@ class SessionLine(TypedDict):
     """A session in a list. Says nothing of policies."""
 
     comments: int
-    """Comments kept."""
+    """Number of comments recorded."""
 
     corrected_participant: NotRequired[str | None]
-    """The right code, where that was corrected."""
+    """Corrected code of the participant; none if it was not corrected."""
 
     created: str
-    """When it was made, by the server's wall clock."""
+    """When the session was made, by the server's wall clock."""
 
     emergency: bool
-    """Whether that was while it was under way."""
+    """Whether it was unblinded while it was under way."""
 
     finished_settings: int
-    """Settings inspected to the end."""
+    """Number of settings inspected to the end."""
 
     participant: str
-    """Participant's code, as it was recorded."""
+    """Code of the participant, as it was recorded."""
 
     practice: bool
-    """Whether it is practice."""
+    """Whether it is a practice session."""
 
     protocol: str
-    """Protocol's name."""
+    """Name of the protocol."""
 
     session: SessionId
     """Session."""
 
     settings: int
-    """Settings in all."""
+    """Number of settings in the session."""
 
     status: SessionStatus
-    """How far it came."""
+    """State of the session."""
 
     study: NotRequired[str | None]
-    """The study that it belongs to; none where it is outside any study."""
+    """The study that it belongs to; none if it belongs to none."""
 
     unblinded: bool
-    """Whether it was told which policies ran."""
+    """Whether it was unblinded."""
 
     withdrawn: bool
     """Whether the participant withdrew: its data stay out of exports."""
@@ -1277,7 +1277,8 @@ class SetAside(TypedDict):
     """The question's identifier."""
 
     seconds: float
-    """When it was given, in seconds: the time that it waited on the surgeon's device is subtracted."""
+    """When the answer was given, in seconds: the time that it waited on the surgeon's device is
+    subtracted."""
 
     setting: NotRequired[int | None]
     """Setting, from 1; none for a closing question."""
@@ -1323,6 +1324,16 @@ class SettingWords(TypedDict):
 
     words: builtins.list[Words]
     """The words, in order."""
+
+class Sight(TypedDict):
+    """What a surgeon saw when a comment was made, as the page counted it. A slow link makes pictures
+    smaller and fewer, so “blurred” may be said of the link."""
+
+    picture_width: NotRequired[int | None]
+    """Width of the picture on screen, pixels."""
+
+    pictures_per_second: NotRequired[float | None]
+    """Pictures drawn a second."""
 
 SightSpan = TypedDict("SightSpan", {"height": "int", "width": "int", "from": "float", "per_second": "float", "to": "float"})
 """What the surgeon saw for a while."""
@@ -1448,7 +1459,7 @@ class StudyDetail(TypedDict):
     """The line to print, publish or mail before the first session; none until the orders are drawn."""
 
     concerns: builtins.list[str]
-    """What in the plan cannot work as it is meant, in sentences; empty once the study is open."""
+    """Concerns about the plan, in sentences; empty once the study is open."""
 
     definition: str
     """The definition, byte for byte."""
@@ -1527,10 +1538,10 @@ class StudyLogLine(TypedDict):
     """When it happened, by the wall clock."""
 
     by: str
-    """Where it came from: a role, or the command line."""
+    """How the event was recorded: by a role, or on the command line."""
 
     person: str
-    """The person who did it, as given in the signature."""
+    """Name of the person, as given in the signature."""
 
     reason: str
     """Reason for the change."""
@@ -1661,8 +1672,8 @@ class SurgeonView(TypedDict):
     """Seconds of inspection left in the segment when the view was sent; none outside inspection."""
 
     said: builtins.list[builtins.list[str]]
-    """The surgeon's own words about each setting, in the order they were said; empty outside the
-    closing questions."""
+    """The surgeon's own words about each setting, in the order of entry; empty outside the closing
+    questions."""
 
     segment: NotRequired[SegmentId | None]
 
@@ -1835,13 +1846,13 @@ class WholeSessions(TypedDict):
     """Which end is better, if known: `higher` or `lower`."""
 
     highest: NotRequired[float | None]
-    """Highest possible value, if there is one."""
+    """Highest possible value; none if there is no limit."""
 
     label: str
     """Label for people."""
 
     lowest: NotRequired[float | None]
-    """Lowest possible value, if there is one."""
+    """Lowest possible value; none if there is no limit."""
 
     outcome: str
     """Name: question and measure, or a quantity of the focal power."""
@@ -1880,7 +1891,7 @@ class WithdrawalLine(TypedDict):
     """When it was recorded, by the server's wall clock."""
 
     by: Role
-    """Who recorded it."""
+    """Role that recorded it."""
 
     reason: str
     """Reason for the withdrawal."""
@@ -1895,7 +1906,7 @@ class Words(TypedDict):
     """Whether its words were erased."""
 
     late: bool
-    """Whether it arrived after the time in which what a surgeon's device held still counted."""
+    """Whether it arrived too late to count."""
 
     question: NotRequired[str | None]
     """The question that it answers; none for a comment."""
@@ -1950,8 +1961,8 @@ class OperatorRequests:
         self._call = call
 
     def act(self, *, session: SessionId, **fields: Any) -> OperatorView | None:
-        """Moves the session on; repeating an action changes nothing. Answers with the session as it is
-        then."""
+        """Advances the session; repeating an action changes nothing. Returns the session after the
+        action."""
         return self._call("POST", "/api/operator/actions", body={"session": session, **fields})
 
     def offer(self) -> CameraOffer:
@@ -1972,7 +1983,7 @@ class OperatorRequests:
         return self._call("GET", "/api/operator/choices")
 
     def consent(self, *, given_on: str, medium: Medium, obtained_by: str, text_version: str, session: SessionId) -> OperatorView | None:
-        """Records a participant's consent. Answers with the session as it is then."""
+        """Records a participant's consent. Returns the session after that."""
         return self._call("POST", "/api/operator/consents", body={"given_on": given_on, "medium": medium, "obtained_by": obtained_by, "text_version": text_version, "session": session})
 
     def dismiss(self, *, session: SessionId) -> OperatorView | None:
@@ -2071,8 +2082,9 @@ class ResearcherRequests:
         return self._call("POST", f"/api/researcher/sessions/{session}/unblind", answer="nothing", body={"despite_outstanding": despite_outstanding, "passphrase": passphrase, "reason": reason})
 
     def recording(self, session: str | int, comment: str | int) -> bytes:
-        """The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets
-        that range."""
+        """The sound of a voice comment, as far as it has arrived, for a player: with its duration,
+        which browsers do not write into what they record. Exports have it as it arrived. A request
+        for a range of bytes gets that range."""
         return self._call("GET", f"/api/researcher/sessions/{session}/voice/{comment}", answer="bytes")
 
     def withdraw(self, session: str | int, *, reason: str) -> None:
@@ -2149,8 +2161,8 @@ class SurgeonRequests:
         self._call = call
 
     def act(self, *, session: SessionId, **fields: Any) -> SurgeonView | None:
-        """Moves the session on; repeating an action changes nothing. Answers with the session as it is
-        then."""
+        """Advances the session; repeating an action changes nothing. Returns the session after the
+        action."""
         return self._call("POST", "/api/surgeon/actions", body={"session": session, **fields})
 
     def answer(self, *, key: IdempotencyKey, question: str, session: SessionId, value: AnswerValue, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, segment: SegmentId | None = None) -> None:
@@ -2159,10 +2171,10 @@ class SurgeonRequests:
         counts."""
         return self._call("POST", "/api/surgeon/answers", answer="nothing", body={"client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "key": key, "question": question, "segment": segment, "session": session, "value": value})
 
-    def comment(self, *, key: IdempotencyKey, session: SessionId, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, frame: int | None = None, run: int | None = None, segment: SegmentId | None = None, **fields: Any) -> None:
+    def comment(self, *, key: IdempotencyKey, session: SessionId, picture_width: int | None = None, pictures_per_second: float | None = None, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, frame: int | None = None, run: int | None = None, segment: SegmentId | None = None, **fields: Any) -> None:
         """Stores a comment: once this has answered, it is on disk. A comment sent again with the same
         key is stored once."""
-        return self._call("POST", "/api/surgeon/comments", answer="nothing", body={"client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "frame": frame, "key": key, "run": run, "segment": segment, "session": session, **fields})
+        return self._call("POST", "/api/surgeon/comments", answer="nothing", body={"picture_width": picture_width, "pictures_per_second": pictures_per_second, "client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "frame": frame, "key": key, "run": run, "segment": segment, "session": session, **fields})
 
     def holding(self, *, device: DeviceId, holding: int, session: SessionId) -> None:
         """Notes how much of a session a surgeon's device still holds, so that nobody unblinds it
@@ -2251,8 +2263,8 @@ class AsyncOperatorRequests:
         self._call = call
 
     def act(self, *, session: SessionId, **fields: Any) -> Awaitable[OperatorView | None]:
-        """Moves the session on; repeating an action changes nothing. Answers with the session as it is
-        then."""
+        """Advances the session; repeating an action changes nothing. Returns the session after the
+        action."""
         return self._call("POST", "/api/operator/actions", body={"session": session, **fields})
 
     def offer(self) -> Awaitable[CameraOffer]:
@@ -2273,7 +2285,7 @@ class AsyncOperatorRequests:
         return self._call("GET", "/api/operator/choices")
 
     def consent(self, *, given_on: str, medium: Medium, obtained_by: str, text_version: str, session: SessionId) -> Awaitable[OperatorView | None]:
-        """Records a participant's consent. Answers with the session as it is then."""
+        """Records a participant's consent. Returns the session after that."""
         return self._call("POST", "/api/operator/consents", body={"given_on": given_on, "medium": medium, "obtained_by": obtained_by, "text_version": text_version, "session": session})
 
     def dismiss(self, *, session: SessionId) -> Awaitable[OperatorView | None]:
@@ -2372,8 +2384,9 @@ class AsyncResearcherRequests:
         return self._call("POST", f"/api/researcher/sessions/{session}/unblind", answer="nothing", body={"despite_outstanding": despite_outstanding, "passphrase": passphrase, "reason": reason})
 
     def recording(self, session: str | int, comment: str | int) -> Awaitable[bytes]:
-        """The sound of a voice comment, as far as it has arrived. A request for a range of bytes gets
-        that range."""
+        """The sound of a voice comment, as far as it has arrived, for a player: with its duration,
+        which browsers do not write into what they record. Exports have it as it arrived. A request
+        for a range of bytes gets that range."""
         return self._call("GET", f"/api/researcher/sessions/{session}/voice/{comment}", answer="bytes")
 
     def withdraw(self, session: str | int, *, reason: str) -> Awaitable[None]:
@@ -2450,8 +2463,8 @@ class AsyncSurgeonRequests:
         self._call = call
 
     def act(self, *, session: SessionId, **fields: Any) -> Awaitable[SurgeonView | None]:
-        """Moves the session on; repeating an action changes nothing. Answers with the session as it is
-        then."""
+        """Advances the session; repeating an action changes nothing. Returns the session after the
+        action."""
         return self._call("POST", "/api/surgeon/actions", body={"session": session, **fields})
 
     def answer(self, *, key: IdempotencyKey, question: str, session: SessionId, value: AnswerValue, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, segment: SegmentId | None = None) -> Awaitable[None]:
@@ -2460,10 +2473,10 @@ class AsyncSurgeonRequests:
         counts."""
         return self._call("POST", "/api/surgeon/answers", answer="nothing", body={"client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "key": key, "question": question, "segment": segment, "session": session, "value": value})
 
-    def comment(self, *, key: IdempotencyKey, session: SessionId, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, frame: int | None = None, run: int | None = None, segment: SegmentId | None = None, **fields: Any) -> Awaitable[None]:
+    def comment(self, *, key: IdempotencyKey, session: SessionId, picture_width: int | None = None, pictures_per_second: float | None = None, client_millis: int | None = None, device: DeviceId | None = None, sequence: int | None = None, waited_by: WaitClock | None = None, waited_millis: int | None = None, frame: int | None = None, run: int | None = None, segment: SegmentId | None = None, **fields: Any) -> Awaitable[None]:
         """Stores a comment: once this has answered, it is on disk. A comment sent again with the same
         key is stored once."""
-        return self._call("POST", "/api/surgeon/comments", answer="nothing", body={"client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "frame": frame, "key": key, "run": run, "segment": segment, "session": session, **fields})
+        return self._call("POST", "/api/surgeon/comments", answer="nothing", body={"picture_width": picture_width, "pictures_per_second": pictures_per_second, "client_millis": client_millis, "device": device, "sequence": sequence, "waited_by": waited_by, "waited_millis": waited_millis, "frame": frame, "key": key, "run": run, "segment": segment, "session": session, **fields})
 
     def holding(self, *, device: DeviceId, holding: int, session: SessionId) -> Awaitable[None]:
         """Notes how much of a session a surgeon's device still holds, so that nobody unblinds it

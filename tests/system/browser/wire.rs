@@ -1,5 +1,9 @@
 //! Parses a recorded connection: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade, WebSocket messages (RFC 6455).
 
+use std::io::Read;
+
+use flate2::read::GzDecoder;
+
 use super::proxy::Connection;
 
 /// Something that the browser received.
@@ -59,13 +63,25 @@ fn body(head: &str, rest: &[u8]) -> (Vec<u8>, usize) {
         })
     };
 
-    assert_eq!(header("content-encoding"), None, "a compressed answer cannot be searched");
-    if header("transfer-encoding").is_some() {
-        return chunks(rest);
+    let (body, length) = if header("transfer-encoding").is_some() {
+        chunks(rest)
+    } else {
+        let length = header("content-length").map_or(0, |length| length.parse().unwrap());
+        let length = usize::min(length, rest.len());
+        (rest[..length].to_vec(), length)
+    };
+
+    // Only what is read can be searched.
+    match header("content-encoding").as_deref() {
+        None => (body, length),
+        Some("gzip") => {
+            let mut unpacked = Vec::new();
+            // The last answer may have been cut off when the browser went away.
+            let _ = GzDecoder::new(body.as_slice()).read_to_end(&mut unpacked);
+            (unpacked, length)
+        }
+        Some(other) => panic!("an answer in {other} cannot be searched"),
     }
-    let length = header("content-length").map_or(0, |length| length.parse().unwrap());
-    let length = usize::min(length, rest.len());
-    (rest[..length].to_vec(), length)
 }
 
 fn chunks(rest: &[u8]) -> (Vec<u8>, usize) {

@@ -217,7 +217,7 @@ table! {
         revision: usize =
             means("Number of the answer among those to the same question, in the order of entry, from 1"),
         counts: bool = means("Whether the answer counts: of those that are not late, only the last entered does"),
-        value: Option<String> = means(
+        value: String = means(
             "Answer as it stands after this revision, as JSON; a late answer as entered; the text \"\" if erased. By kind: \
              a text; a Likert point from 1; a position from 0 to 100 (visual-analogue); 1 no, 2 not sure, 3 yes \
              (recognition); the settings from best to worst, or with ties the rank of each setting (ranking); ten \
@@ -225,7 +225,7 @@ table! {
              100), then 1 or 2 for the scale chosen of each pair, 0 for an open item (nasa-tlx, surg-tlx). The \
              table scores has the same as numbers",
         ),
-        given_value: Option<String> = means(
+        given_value: String = means(
             "The part of the answer that was entered this time, as JSON, before it was joined with the \
              questionnaire's earlier items; the text \"\" if erased",
         ).sealed(),
