@@ -19,14 +19,14 @@ test("a recording says its length and what is wrong with it", () => {
   assert.match(voiceWords({ ...WHOLE, media_type: null }), /Nothing of the recording/);
 });
 
-test("a voice comment reads as it was typed out, also once its sound is gone", () => {
+test("a voice comment is shown as its transcript, also once its sound is erased", () => {
   const comment = /** @type {Api.TimelineComment} */ ({
     kind: "voice",
     note: null,
     erased: null,
     voice: WHOLE,
   });
-  assert.equal(commentWords(comment, "UTC"), "Voice comment, not typed out yet");
+  assert.equal(commentWords(comment, "UTC"), "Voice comment, not transcribed yet");
   assert.equal(commentWords({ ...comment, note: "it wanders" }, "UTC"), "it wanders");
   const erased = "2026-03-01T10:00:00Z";
   assert.equal(

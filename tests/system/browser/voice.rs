@@ -204,7 +204,7 @@ async fn a_comment_is_held_spoken_let_go_played_and_typed_out() {
     })
     .await;
 
-    researcher.click_labelled("#comment-list .beside", "Type out").await;
+    researcher.click_labelled("#comment-list .beside", "Transcribe").await;
     researcher.sees("#correct-heading", "Transcribe the comment").await;
     assert_eq!(researcher.count("#correct-dialog audio").await, 1, "it can be heard while it is typed");
     researcher.type_into("#correct-new", "It follows my hand").await;

@@ -13,7 +13,7 @@ import { voicePlayer } from "./voice.js";
  * @property {{ label: string, options: { value: string, text: string }[] }} [which] a list to choose from
  * @property {{ label: string, value: string, hint: string }} [text] a field to write in
  * @property {string} [reason] the initial text of the field for the reason
- * @property {HTMLElement} [player] plays the recording that is typed out
+ * @property {HTMLElement} [player] plays the recording to transcribe
  * @property {(which: string) => void} [chosen] called when an option of the list is chosen
  * @property {(answer: { which: string, text: string, reason: string }) => Promise<void>} done
  */
@@ -132,7 +132,7 @@ export function askNote(session, key, old) {
 }
 
 /**
- * Asks for the text of a voice comment, typed out from its recording.
+ * Asks for the transcript of a voice comment.
  *
  * @param {string} session
  * @param {Api.TimelineComment} comment

@@ -154,7 +154,7 @@ function listComments(comments) {
 function besideComment(comment) {
   const { key, kind, note, erased } = comment;
   const isVoice = kind === "voice";
-  // The note on a voice comment is the text that was typed out. It is shown in the line itself.
+  // The note on a voice comment is its transcript. It is shown in the line itself.
   const noted = note && !isVoice ? make("p", { className: "note" }, `Note: ${note}`) : null;
   const button = (
     /** @type {string} */ label,
@@ -162,7 +162,7 @@ function besideComment(comment) {
     /** @type {() => void} */ onclick,
   ) => make("button", { type: "button", className: `small ${level}`, onclick }, label);
   const write = () => (isVoice ? askTranscript(session, comment) : askNote(session, key, note ?? ""));
-  const deeds = ended ? [button(isVoice ? "Type out…" : "Note…", "", write)] : [];
+  const deeds = ended ? [button(isVoice ? "Transcribe…" : "Note…", "", write)] : [];
   // If only the sound was erased, the typed words can still be erased.
   const hasWords = !erased || (isVoice && note);
   if (ended && kind !== "mark" && hasWords) {

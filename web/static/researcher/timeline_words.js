@@ -44,10 +44,10 @@ export function seenWords({ picture_width: width, pictures_per_second: rate }) {
  */
 export function commentWords(comment, zone) {
   const { kind, note, erased } = comment;
-  // A voice comment can be read once it was typed out. The text stays when the sound is erased.
+  // A voice comment can be read once it has a transcript. The transcript stays when the sound is erased.
   if (kind === "voice" && note) return erased ? `${note} (sound erased on ${dayIn(erased, zone)})` : note;
   if (erased) return `Erased on ${dayIn(erased, zone)}`;
-  if (kind === "voice") return "Voice comment, not typed out yet";
+  if (kind === "voice") return "Voice comment, not transcribed yet";
   return kind === "mark" ? "Marked this moment" : comment.text;
 }
 

@@ -104,7 +104,7 @@ pub fn withdrawn(session: SessionId, site: &str) -> AnalysedSession {
     AnalysedSession { session, surgeon: None, site: site.to_owned(), counts: false, remark: Some(WITHDRAWN.to_owned()) }
 }
 
-/// The words of a comment. `typed` is what a researcher typed out of a voice comment; `erased` is whether the comment
+/// The words of a comment. `typed` is the transcript of a voice comment; `erased` is whether the comment
 /// itself was erased.
 pub fn comment_words(said: CommentContent, typed: Option<&str>, late: bool, erased: bool) -> Option<Words> {
     let is_typed = said == CommentContent::Voice && typed.is_some();
@@ -112,7 +112,7 @@ pub fn comment_words(said: CommentContent, typed: Option<&str>, late: bool, eras
         CommentContent::Text(text) | CommentContent::Quick(text) => text,
         CommentContent::Mark => "Marked a moment".to_owned(),
         // A voice comment can be read once it is transcribed.
-        CommentContent::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
+        CommentContent::Voice => typed.unwrap_or("Voice comment, not transcribed yet").to_owned(),
         CommentContent::Withdrawal(_) => return None,
     };
     // The sound may be erased while its transcript is kept.
