@@ -115,6 +115,12 @@ fn a_jpeg_with_any_damage_is_refused() {
         assert!(!output.status.success() && told.contains(&format!("{name}: damaged or cut short: ")), "{told}");
     }
 
+    // The rest of a scan whose hole was read as too few pixels. libjpeg warns of longer rests only.
+    let end = whole.len() - 2;
+    let rest = write(&folder, "rest.jpg", &[&whole[..end], b"\x5A\x3C\x71", &whole[end..]].concat());
+    let told = complaint(&inspect(&["--json"], &[&rest]));
+    assert!(told.contains("rest.jpg: damaged or cut short: it holds more data than its pixels need"), "{told}");
+
     // A phone's short video may follow the picture; it is not part of it.
     let followed = [&whole[..], b"\0\0\0\x18ftypmp42 and more \xFF\xDA and more"].concat();
     assert_eq!(values(&write(&folder, "followed.jpg", &followed))["width"], 320);

@@ -6,7 +6,7 @@ use std::io::Cursor;
 use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, ImageDecoder};
-use turbojpeg::{Colorspace, DecompressHeader, Decompressor, Image, PixelFormat};
+use turbojpeg::{Colorspace, DecompressHeader, Decompressor, Image, PixelFormat, ScalingFactor};
 
 use super::picture::{DecodeError, check_size};
 
@@ -40,6 +40,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     let mut pixels = vec![0; pitch * height];
     let image = Image { pixels: pixels.as_mut_slice(), width, pitch, height, format };
     decompressor.decompress(bytes, image).map_err(damaged)?;
+    if has_spare_data(&mut decompressor, bytes, (width, height)) {
+        return Err(DecodeError::Damaged("it holds more data than its pixels need".to_owned()));
+    }
 
     let size = (width as u32, height as u32);
     let picture = match format {
@@ -77,6 +80,52 @@ pub(super) fn chunk(
         return Err(DecodeError::Damaged(format!("a part of {width}x{height} pixels has {}x{}", size.0, size.1)));
     }
     Ok(found[..width * height * channels].iter().copied().map(u16::from).collect())
+}
+
+/// Whether the last scan holds more data than its pixels need. After a hole, what is left may be read as too few pixels;
+/// libjpeg says nothing of a rest of up to 8 bytes. Without its last byte, a scan without damage is too short.
+fn has_spare_data(decompressor: &mut Decompressor, bytes: &[u8], (width, height): (usize, usize)) -> bool {
+    let Some(end) = last_scan_end(bytes) else { return false };
+    let shorter = bytes[..end].strip_suffix(b"\xFF\0").unwrap_or(&bytes[..end - 1]);
+    let shorter = [shorter, b"\xFF\xD9"].concat();
+
+    // The pixels do not matter: few are computed.
+    let factor = ScalingFactor::ONE_EIGHTH;
+    if decompressor.set_scaling_factor(factor).is_err() {
+        return false;
+    }
+    let (width, height) = (factor.scale(width), factor.scale(height));
+    let mut pixels = vec![0; width * height];
+    let image = Image { pixels: pixels.as_mut_slice(), width, pitch: width, height, format: PixelFormat::GRAY };
+    decompressor.decompress(&shorter, image).is_ok()
+}
+
+/// The place after the data of the last scan before the picture's end.
+fn last_scan_end(bytes: &[u8]) -> Option<usize> {
+    const SCAN: u8 = 0xDA;
+    const END: u8 = 0xD9;
+    let mut end = None;
+    let mut at = 2;
+    while let [first, marker, rest @ ..] = bytes.get(at..)? {
+        match (first, *marker) {
+            (0xFF, END) => break,
+            // Bytes that fill up, and markers without content.
+            (0xFF, 0xFF) => at += 1,
+            (0xFF, 0 | 1 | 0xD0..=0xD8) => at += 2,
+            (0xFF, marker) => {
+                let &[high, low, ..] = rest else { return end };
+                at += 2 + usize::from(u16::from_be_bytes([high, low]));
+                if marker == SCAN {
+                    // Data go on to a marker that is no restart of them.
+                    let goes_on = |pair: &[u8]| pair[0] != 0xFF || matches!(pair[1], 0 | 0xD0..=0xD7);
+                    at += bytes.get(at..)?.windows(2).take_while(|pair| goes_on(pair)).count();
+                    end = Some(at);
+                }
+            }
+            _ => at += 1,
+        }
+    }
+    end
 }
 
 /// Printing colours as RGB. Files hold them inverted: 255 is no ink.
