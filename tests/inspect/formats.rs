@@ -71,6 +71,35 @@ fn packed_samples_of_twelve_bit_keep_their_values() {
 }
 
 #[test]
+fn a_tiff_stored_as_jpeg_is_read_unless_it_is_damaged() {
+    let folder = TempDir::new().unwrap();
+    let whole = fs::read(vectors().join("jpeg.tif")).unwrap();
+    let [found, expected] = ["jpeg.tif", "gray.png"].map(|name| values(&vectors().join(name))["mgm"].as_f64().unwrap());
+    assert!((found / expected - 1.0).abs() < 0.05, "{found} instead of about {expected}");
+
+    // The second half of the file is the data of strips.
+    let middle = whole.len() * 3 / 4;
+    let zeros = [&whole[..middle], &[0; 60], &whole[middle + 60..]].concat();
+    let output = inspect(&["--json"], &[&write(&folder, "zeros.tif", &zeros)]);
+    let told = complaint(&output);
+    assert!(!output.status.success() && told.contains("zeros.tif: damaged or cut short: "), "{told}");
+}
+
+#[test]
+fn a_tiff_without_a_part_of_its_pixels_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let whole = fs::read(vectors().join("one-bit.fill-order-1.tif")).unwrap();
+    // The field with the length of the only strip: tag 279, a LONG, once.
+    let field = b"\x17\x01\x04\0\x01\0\0\0";
+    let length = whole.windows(field.len()).position(|bytes| bytes == field).unwrap() + field.len();
+    let mut empty = whole.clone();
+    empty[length..length + 4].fill(0);
+    let output = inspect(&["--json"], &[&write(&folder, "empty.tif", &empty)]);
+    let told = complaint(&output);
+    assert!(!output.status.success() && told.contains("part 1 of 1 of a page is missing"), "{told}");
+}
+
+#[test]
 fn pictures_that_are_not_read_are_counted() {
     for (name, pages) in [("pages.tif", 5), ("stack.ome.tif", 6), ("stack.imagej.tif", 6)] {
         let output = inspect(&["--json"], &[&vectors().join(name)]);

@@ -77,6 +77,9 @@ one_bit("one-bit.fill-order-2.tif", 2)
 # 12 bit, packed: the samples times 16 and a little.
 write("twelve-bit.tif", gray.astype("u2") * 16 + 9, bitspersample=12, photometric="minisblack")
 
+# Stored as JPEG, with the tables of all strips beside them.
+write("jpeg.tif", gray, compression="jpeg", photometric="minisblack", rowsperstrip=16)
+
 # Cannot be read.
 write("zstd.tif", gray, compression="zstd")
 

@@ -53,33 +53,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     picture.ok_or(DecodeError::TooLarge)
 }
 
-/// The samples of a strip or tile of a TIFF, whose `tables` all of its chunks share. It may be larger than `width` x
-/// `height` pixels of `channels` samples. With `rgb` its colours are RGB although nothing in it says so.
-pub(super) fn chunk(
-    tables: &[u8],
-    stored: &[u8],
-    (width, height): (usize, usize),
-    channels: usize,
-    rgb: bool,
-) -> Result<Vec<u16>, DecodeError> {
-    /// Adobe's mark: what follows is not YCbCr.
-    const PLAIN: &[u8] = b"\xFF\xEE\0\x0EAdobe\0\x64\0\0\0\0\0";
+/// Checks a strip or tile of a TIFF, whose `tables` all of its parts share. One with any damage is an error.
+pub(super) fn check_part(tables: &[u8], stored: &[u8]) -> Result<(), DecodeError> {
     // Both begin with a mark of the beginning, and the tables end with one of the end.
     let tables = tables.get(2..tables.len().saturating_sub(2)).unwrap_or_default();
-    let mark = if rgb { PLAIN } else { &[] };
-    let whole = [&b"\xFF\xD8"[..], mark, tables, stored.get(2..).unwrap_or_default()].concat();
-
-    let picture = read(&whole)?;
-    let size = (picture.width() as usize, picture.height() as usize);
-    let found = match &picture {
-        DynamicImage::ImageLuma8(gray) if channels == 1 => gray.as_raw(),
-        DynamicImage::ImageRgb8(rgb) if channels == 3 => rgb.as_raw(),
-        _ => return Err(DecodeError::OtherPixels(format!("JPEG with {channels} samples per pixel"))),
-    };
-    if size.0 != width || size.1 < height {
-        return Err(DecodeError::Damaged(format!("a part of {width}x{height} pixels has {}x{}", size.0, size.1)));
-    }
-    Ok(found[..width * height * channels].iter().copied().map(u16::from).collect())
+    let whole = [&b"\xFF\xD8"[..], tables, stored.get(2..).unwrap_or_default()].concat();
+    read(&whole).map(|_| ())
 }
 
 /// Whether the last scan holds more data than its pixels need. After a hole, what is left may be read as too few pixels;
