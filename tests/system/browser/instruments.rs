@@ -36,7 +36,7 @@ fn state(question: &str) -> String {
 }
 
 /// The operator prepares a session. It cannot start before the consent is recorded.
-async fn prepare(theatre: &Theatre) {
+pub async fn prepare(theatre: &Theatre) {
     let operator = &theatre.operator;
     until("the dialog for a new participant", || async {
         operator.is("#participant-dialog", "open").await || {

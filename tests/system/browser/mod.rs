@@ -12,6 +12,7 @@ mod camera_card;
 mod checks_card;
 mod course;
 pub mod driver;
+mod fits;
 mod full_disk;
 mod instruments;
 mod keyboard;
