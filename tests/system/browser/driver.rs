@@ -344,9 +344,8 @@ impl Browser {
 impl Browser {
     /// Waits until the element is shown and its text contains `text`.
     pub async fn sees(&self, css: &str, text: &str) {
-        if !comes_true(|| async { self.text(css).await.contains(text) }).await {
-            panic!("{css} never says '{text}', but '{}'", self.text(css).await);
-        }
+        let seen = comes_true(|| async { self.text(css).await.contains(text) }).await;
+        assert!(seen, "{css} never says '{text}', but '{}'", self.text(css).await);
     }
 
     /// Waits until nothing that `css` selects is shown.

@@ -8,12 +8,14 @@ use crate::question::{Question, QuestionKind};
 const WORDS: [&str; 3] = ["No", "Not sure", "Yes"];
 
 /// Whether `point` is one of the three answers.
+#[must_use]
 pub fn fits(point: u8) -> bool {
     (1..=WORDS.len()).contains(&usize::from(point))
 }
 
 /// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether the
 /// recognition question `id` is about all settings.
+#[must_use]
 pub fn follow_up(id: &str, closing: bool) -> Question {
     let text = if closing {
         "Which settings did you recognise, and by what? Give their numbers."
@@ -30,11 +32,13 @@ pub fn follow_up(id: &str, closing: bool) -> Question {
 }
 
 /// 1 for no, 2 for not sure, 3 for yes.
+#[must_use]
 pub fn measures(point: u8) -> Vec<Measure> {
     vec![Measure::item("recognised", "Recognised: 1 no, 2 not sure, 3 yes", given(point))]
 }
 
 /// The answer in words.
+#[must_use]
 pub fn in_words(point: u8) -> String {
     let word = usize::from(point).checked_sub(1).and_then(|place| WORDS.get(place));
     word.map_or_else(|| point.to_string(), |word| (*word).to_owned())

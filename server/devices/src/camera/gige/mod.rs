@@ -75,9 +75,10 @@ impl GigeCamera {
                 let size =
                     device.as_ref().map_or_else(|| setup.expected_size(), |device| (device.width, device.height));
                 let shared = Arc::new(Shared::missing(settings.clock, &format!("camera {}", setup.id), &trouble));
-                match &device {
-                    Some(device) => shared.found(device),
-                    None => tracing::warn!("{trouble}; looking for it"),
+                if let Some(device) = &device {
+                    shared.found(device);
+                } else {
+                    tracing::warn!("{trouble}; looking for it");
                 }
                 let _ = tell.send(Ok((size, Arc::clone(&shared))));
                 worker::run(&shared, &setup, device, size);
