@@ -4,7 +4,9 @@ use image::{DynamicImage, ImageBuffer};
 use tiff_reader::Ifd;
 
 use super::super::picture::DecodeError;
-use super::JPEG;
+
+/// The compression JPEG, as it has been stored since 1995.
+pub(super) const JPEG: u16 = 7;
 
 /// What a page's samples mean.
 #[derive(Clone, Copy, PartialEq, Eq)]

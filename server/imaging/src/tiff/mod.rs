@@ -11,7 +11,7 @@ use tiff_reader::{Ifd, OpenOptions, ParseBudgets, TagValue, TiffError, TiffFile}
 
 use super::jpeg_read;
 use super::picture::{DecodeError, LARGEST_MEMORY, Samples, check_size};
-use colours::Colours;
+use colours::{Colours, JPEG};
 
 /// Numbers of the fields that `tiff-reader` does not name.
 mod tag {
@@ -22,9 +22,6 @@ mod tag {
     pub const COLOUR_MAP: u16 = 320;
     pub const JPEG_TABLES: u16 = 347;
 }
-
-/// JPEG as it has been stored since 1995.
-const JPEG: u16 = 7;
 
 /// What the directories of a file may hold. More is taken for damaged.
 const BUDGETS: ParseBudgets = ParseBudgets {
