@@ -180,7 +180,10 @@ async function act(action) {
     tell(byId("trouble"), "");
   } catch (error) {
     const refused = error instanceof Refused;
-    notice.ask(refused ? "Tap to continue" : "The server did not answer. Tap again.");
+    // Not the notice of the next setting, which may stand there by now and which nobody has tapped.
+    if (action.action === "acknowledge" && isStillMeant(action)) {
+      notice.ask(refused ? "Tap to continue" : "The server did not answer. Tap again.");
+    }
     if (refused && error.status < 500) await refresh();
     if (isStillMeant(action)) {
       tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
