@@ -73,7 +73,7 @@ def test_colours_are_those_of_the_program(made: Path, tmp_path: Path) -> None:
     apart = np.abs(recording.rgb(0).astype(int) - expected)
     # The program computes in whole numbers, and cuts what is several times as bright as white.
     below_white = (recording.reflectance(0) <= 1).all("wavelength").to_numpy()
-    assert below_white.mean() > 0.9
+    assert below_white.mean() > 0.5
     assert apart[below_white].max() <= 3
     assert apart.mean() < 0.6
 

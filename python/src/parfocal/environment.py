@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -66,7 +66,7 @@ class _Simulation:
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, bufsize=0
         )
-        self._finalizer = weakref.finalize(self, _end, self._process)
+        self._finalizer = weakref.finalize(self, _end, self._process, self._log)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests = self._process.stdin
@@ -109,9 +109,7 @@ class _Simulation:
 
     def close(self) -> None:
         """End the program."""
-        self._finalizer.detach()
-        _end(self._process)
-        self._log.close()
+        self._finalizer()
 
     def _ask(self, request: bytes) -> _Seen:
         if self._requests.closed:
@@ -160,7 +158,7 @@ def _write(pipe: Any, data: bytes) -> None:
         left = left[pipe.write(left) :]
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             pipe.close()
@@ -170,6 +168,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+    log.close()
 
 
 class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]]):
