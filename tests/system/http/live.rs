@@ -347,15 +347,25 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
 
     drop(surgeon);
     operator.until(|told| told["tablet"]["presence"] == "silent" && told["tablet"]["away_seconds"].is_u64()).await;
-    operator.until(|told| told["view"]["paused_by"] == "tablet-away").await;
+    // The session may have followed before the sign was sent, so the server is asked, at each status.
+    let view = async || {
+        let answer = server.get_as("operator", "/api/operator/session").send().await.unwrap();
+        answer.json::<Value>().await.unwrap()
+    };
+    while view().await["paused_by"] != "tablet-away" {
+        operator.until(|told| told["type"] == "status").await;
+    }
+
     let mut back = Page::open(&server, "surgeon").await;
     back.watch(5).await;
-    operator.until(|told| told["tablet"]["presence"] == "present").await;
-    let logged = |told: &Value, text: &str| {
-        told["view"]["log"].as_array().is_some_and(|log| log.iter().any(|line| line["text"] == text))
+    let is_back = |view: &Value| {
+        view["log"].as_array().unwrap().iter().any(|line| line["text"] == "The surgeon’s tablet is back")
     };
-    operator.until(|told| logged(told, "The surgeon’s tablet is back")).await;
-    let view = server.get_as("operator", "/api/operator/session").send().await.unwrap().json::<Value>().await.unwrap();
+    while !is_back(&view().await) {
+        operator.until(|told| told["type"] == "status").await;
+    }
+
+    let view = view().await;
     let told: Vec<&str> = view["log"].as_array().unwrap().iter().filter_map(|line| line["text"].as_str()).collect();
     assert!(told.iter().any(|text| text.starts_with("Setting 1 seen at 512x272")), "{told:?}");
     assert!(told.contains(&"Paused: the surgeon’s tablet is away"), "{told:?}");
