@@ -224,26 +224,6 @@ fn only_mosaics_have_sizes() {
 }
 
 #[test]
-fn what_a_system_keeps_beside_pictures_is_passed_over() {
-    let folder = TempDir::new().unwrap();
-    let good = folder.path().join("disc.png");
-    disc().save(&good).unwrap();
-    let own = ["Thumbs.db", "desktop.ini", "._disc.png"].map(|name| folder.path().join(name));
-    for path in &own {
-        fs::write(path, "not a picture").unwrap();
-    }
-
-    let all: Vec<&Path> = own.iter().map(PathBuf::as_path).chain([good.as_path()]).collect();
-    let output = inspect(&["--json"], &all);
-    assert_eq!(
-        (output.status.code(), objects(&output).len()),
-        (Some(0), 1),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-}
-
-#[test]
 fn bad_files_are_named_and_the_others_still_inspected() {
     let folder = TempDir::new().unwrap();
     let good = folder.path().join("disc.png");

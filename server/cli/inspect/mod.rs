@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::output::{Failure, print};
 use parfocal_autofocus::{mgm, mlr};
-use parfocal_base::files::{is_systems_own, replace};
+use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
 use parfocal_devices::camera::footage::{is_raw, read_picture};
@@ -61,10 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut reports = Vec::new();
     let mut failed = 0;
 
-    // A shell's `*` also names what an operating system keeps beside the pictures.
-    let several = arguments.paths.len() > 1;
-    let systems_own = |path: &Path| path.file_name().is_some_and(is_systems_own);
-    for path in arguments.paths.iter().filter(|path| !(several && systems_own(path))) {
+    for path in &arguments.paths {
         match inspector.inspect(path) {
             Ok(report) if arguments.json => print(&(serde_json::to_string(&report)? + "\n"))?,
             Ok(report) => reports.push(report),
