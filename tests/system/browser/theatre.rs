@@ -60,20 +60,24 @@ pub fn start_again(server: &mut Server) {
 }
 
 impl Browser {
-    /// Waits for the panel over the picture whose heading contains `heading`, and until it takes taps: right after it
-    /// has appeared it takes none.
+    /// Waits for the panel over the picture whose heading contains `heading`, and until it takes taps.
     pub async fn sees_panel(&self, heading: &str) {
         self.sees("#panel h2", heading).await;
-        until("the panel to take taps", || async { self.count("#panel[data-fresh]").await == 0 }).await;
+        self.may_tap("#panel h2").await;
     }
 
     /// Taps `css` in the panel over the picture, once the panel takes taps.
     pub async fn tap_in_panel(&self, css: &str) {
+        self.may_tap(css).await;
+        self.click(css).await;
+    }
+
+    /// Waits until the panel with `css` takes taps: right after it has appeared it takes none.
+    async fn may_tap(&self, css: &str) {
         until("the panel to take taps", || async {
             self.count(css).await > 0 && self.count("#panel[data-fresh]").await == 0
         })
         .await;
-        self.click(css).await;
     }
 }
 

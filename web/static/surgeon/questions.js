@@ -40,7 +40,7 @@ const SUS_ITEMS = [
   "I needed to learn a lot of things before I could get going with this system.",
 ];
 
-/** Up to this many questions, the number of answers given is not shown. */
+/** From this many questions on, the number of answers given is shown. */
 const AT_A_GLANCE = 3;
 
 /** Recognition questions are answered with 1 for no, 2 for not sure, 3 for yes. */

@@ -2,7 +2,15 @@
 
 use super::report::{Analysis, ProtocolAnalysis};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::export::{Row, Table, means, table};
+use parfocal_records::store::export::{Meaning, Row, Table, means, table};
+
+const WITH_VALUE: Meaning = means("Number of settings with a value");
+const WITHOUT_VALUE: Meaning = means("Number of settings without a value");
+const MEAN: Meaning = means("Mean over the settings, in the outcome's unit; empty without a value");
+const MEDIAN: Meaning = means("Median, in the outcome's unit; empty without a value");
+const DEVIATION: Meaning = means(
+    "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two values",
+);
 
 table! {
     name: "analysis_sessions",
@@ -58,14 +66,11 @@ table! {
         better: Option<&'static str> =
             means("Better end of the scale: higher or lower; empty if neither is known to be better"),
         policy: String = means("Name of the policy"),
-        n: usize = means("Number of settings with a value"),
-        missing: usize = means("Number of settings without a value"),
-        mean: Option<f64> = means("Mean over the settings, in the outcome's unit; empty without a value"),
-        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
-        sd: Option<f64> = means(
-            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
-             values",
-        ),
+        n: usize = WITH_VALUE,
+        missing: usize = WITHOUT_VALUE,
+        mean: Option<f64> = MEAN,
+        median: Option<f64> = MEDIAN,
+        sd: Option<f64> = DEVIATION,
     }
 }
 
@@ -83,14 +88,11 @@ table! {
         surgeons: usize = means("Number of surgeons of the site whose sessions count"),
         sessions: usize = means("Number of sessions of the site that count"),
         policy: String = means("Name of the policy"),
-        n: usize = means("Number of settings with a value"),
-        missing: usize = means("Number of settings without a value"),
-        mean: Option<f64> = means("Mean over the settings, in the outcome's unit; empty without a value"),
-        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
-        sd: Option<f64> = means(
-            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
-             values",
-        ),
+        n: usize = WITH_VALUE,
+        missing: usize = WITHOUT_VALUE,
+        mean: Option<f64> = MEAN,
+        median: Option<f64> = MEDIAN,
+        sd: Option<f64> = DEVIATION,
     }
 }
 
@@ -190,11 +192,8 @@ table! {
         n: usize = means("Number of sessions with an answer"),
         missing: usize = means("Number of sessions without an answer"),
         mean: Option<f64> = means("Mean over the sessions, in the outcome's unit; empty without a value"),
-        median: Option<f64> = means("Median, in the outcome's unit; empty without a value"),
-        sd: Option<f64> = means(
-            "Standard deviation of the sample (divided by n - 1), in the outcome's unit; empty with fewer than two \
-             values",
-        ),
+        median: Option<f64> = MEDIAN,
+        sd: Option<f64> = DEVIATION,
     }
 }
 
