@@ -29,6 +29,7 @@ pub mod screenshots;
 pub mod scripts;
 mod study_page;
 mod tabs;
+mod taps;
 mod theatre;
 mod trial;
 mod view;

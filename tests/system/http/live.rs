@@ -1,6 +1,7 @@
 //! The live stream: paced by its viewers, silent for hidden pages, and without a trace of the policy for surgeons.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
 use reqwest::header::AUTHORIZATION;
@@ -13,6 +14,9 @@ use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async, tungsten
 use tungstenite::Message;
 
 use crate::support::Server;
+
+/// What does not come in this time never comes.
+const PATIENCE: Duration = Duration::from_mins(2);
 
 /// The client end of a page's stream.
 pub struct Page {
@@ -99,24 +103,22 @@ impl Page {
 
     /// Waits for a state message that is `wanted`, acknowledging the frames that come in between.
     pub async fn until(&mut self, wanted: impl Fn(&Value) -> bool) {
-        loop {
-            match self.message().await {
-                Message::Text(text) if wanted(&serde_json::from_str(&text).unwrap()) => return,
-                Message::Binary(frame) => self.drawn(&unpack(&frame)).await,
-                _ => {}
+        let told = async {
+            loop {
+                match self.message().await {
+                    Message::Text(text) if wanted(&serde_json::from_str(&text).unwrap()) => return,
+                    Message::Binary(frame) => self.drawn(&unpack(&frame)).await,
+                    _ => {}
+                }
             }
-        }
+        };
+        let in_time = tokio::time::timeout(PATIENCE, told).await.is_ok();
+        assert!(in_time, "waited {PATIENCE:?} for a message; the last one: {:?}", self.told().last());
     }
 
     /// Waits for a frame with a belief, and returns the belief.
     pub async fn until_belief(&mut self) -> Vec<Value> {
-        loop {
-            let frame = self.frame().await;
-            self.drawn(&frame).await;
-            if let Some(belief) = frame.header["belief"].as_array() {
-                return belief.clone();
-            }
-        }
+        self.watch_until(|header| header["belief"].is_array()).await.header["belief"].as_array().unwrap().clone()
     }
 
     /// Acknowledges that `frame` is drawn.
@@ -139,12 +141,18 @@ impl Page {
 
     /// Acknowledges frames until one fits, and returns that one.
     pub async fn watch_until(&mut self, fits: impl Fn(&Value) -> bool) -> Frame {
-        loop {
-            let frame = self.frame().await;
-            self.drawn(&frame).await;
-            if fits(&frame.header) {
-                return frame;
+        let watched = async {
+            loop {
+                let frame = self.frame().await;
+                self.drawn(&frame).await;
+                if fits(&frame.header) {
+                    return frame;
+                }
             }
+        };
+        match tokio::time::timeout(PATIENCE, watched).await {
+            Ok(frame) => frame,
+            Err(_) => panic!("waited {PATIENCE:?} for a picture that fits; the last message: {:?}", self.heard.last()),
         }
     }
 
@@ -365,10 +373,19 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
         operator.until(|told| told["type"] == "status").await;
     }
 
-    let view = view().await;
-    let told: Vec<&str> = view["log"].as_array().unwrap().iter().filter_map(|line| line["text"].as_str()).collect();
-    assert!(told.iter().any(|text| text.starts_with("Setting 1 seen at 512x272")), "{told:?}");
-    assert!(told.contains(&"Paused: the surgeon’s tablet is away"), "{told:?}");
+    // The size of the picture belongs to the record. For the operator it would push out what people did.
+    let texts = |of: &Value| {
+        let lines = of["log"].as_array().unwrap().iter();
+        lines.map(|line| line["text"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let seen = |texts: &[String]| texts.iter().any(|text| text.starts_with("Setting 1 seen at 512x272"));
+    let shown = texts(&view().await);
+    assert!(!seen(&shown) && shown.contains(&"Paused: the surgeon’s tablet is away".to_owned()), "{shown:?}");
+
+    let record = format!("/api/researcher/sessions/{}", session.as_str().unwrap());
+    let record = server.get_as("researcher", &record).send().await.unwrap().json::<Value>().await.unwrap();
+    let recorded = texts(&record);
+    assert!(seen(&recorded), "{recorded:?}");
 }
 
 /// The emergency: pause, then the lens by hand. Neither asks for anything.

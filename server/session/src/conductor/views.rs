@@ -117,5 +117,8 @@ fn log(course: &Course) -> Vec<LogLine> {
         let text = format!("{text}{unrecorded}");
         LogLine { at: event.wall, by: event.by, account, text, erasable_event: None }
     };
-    course.events.iter().rev().take(LATEST).map(line).collect()
+    // The size of the picture changes again and again on a weak network, and would push out what people did. It stands
+    // beside the tablet's sign as it is now.
+    let deeds = course.events.iter().rev().filter(|event| event.kind.seen().is_none());
+    deeds.take(LATEST).map(line).collect()
 }
