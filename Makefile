@@ -16,7 +16,11 @@ package:
 	@cargo auditable build --release --locked $(FEATURES)
 	@FEATURES="$(FEATURES)" deploy/release
 
-.PHONY: run test package check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
+# A container image of that package, as root: deploy/container/README.md.
+container: package
+	@deploy/container/build
+
+.PHONY: run test package container check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
