@@ -2,6 +2,7 @@
 //! own libraries.
 
 mod damage;
+mod spectrum;
 mod step;
 mod view;
 
@@ -111,10 +112,13 @@ fn made_up(folder: &TempDir, frames: usize) -> PathBuf {
 }
 
 fn made_up_of(folder: &TempDir, frames: usize, size: (usize, usize)) -> PathBuf {
+    made_up_by(folder, frames, size, &Calibration::default())
+}
+
+fn made_up_by(folder: &TempDir, frames: usize, size: (usize, usize), calibration: &Calibration) -> PathBuf {
     let path = folder.path().join("recording");
-    let calibration = Calibration::default();
-    let writer = Writer::create(&path, header(), size, &calibration).unwrap();
-    camera::calibration::save(&path.join(CALIBRATION), &calibration, &[]).unwrap();
+    let writer = Writer::create(&path, header(), size, calibration).unwrap();
+    camera::calibration::save(&path.join(CALIBRATION), calibration, &[]).unwrap();
 
     let recorder = Recorder::start(writer, Moment::from_nanos(1_000_000_000)).unwrap();
     for frame in 0..frames {

@@ -3,6 +3,7 @@
 mod cube;
 mod info;
 mod record;
+mod spectrum;
 mod step;
 mod video;
 mod view_info;
@@ -24,6 +25,8 @@ enum Action {
     Info(info::Arguments),
     /// Save a frame as a cube of 16 bands that ENVI and Spectral Python read.
     Cube(cube::Arguments),
+    /// Print the spectrum at a place: mean and spread of each band, as counts and reflectance.
+    Spectrum(spectrum::Arguments),
     /// Save a recording, or a part of it, as a video or as pictures.
     Video(video::Arguments),
     /// Step a policy over a recording: a table of what it sees in each frame, and what it asks of the lens.
@@ -39,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::Record(arguments) => record::run(arguments),
         Action::Info(arguments) => info::run(arguments),
         Action::Cube(arguments) => cube::run(arguments),
+        Action::Spectrum(arguments) => spectrum::run(arguments),
         Action::Video(arguments) => video::run(arguments),
         Action::Step(arguments) => step::run(arguments),
     }

@@ -96,6 +96,12 @@ impl Calibration {
         })
     }
 
+    /// Whether a white target was measured. Without, counts say nothing about reflectance.
+    #[must_use]
+    pub fn has_white(&self) -> bool {
+        self.white != Reference::PerBand([self.full_scale(); BANDS])
+    }
+
     /// How exports and reports name it: name, unit, version and date.
     #[must_use]
     pub fn title(&self) -> String {

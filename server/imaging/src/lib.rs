@@ -20,8 +20,10 @@ mod reconstruct;
 mod reduce;
 mod references;
 mod size;
+mod spectrum;
 mod tiff;
 mod view;
+mod white_balance;
 mod ycc;
 
 pub use calibration::{BANDS, Band, Calibration, Reference};
@@ -39,5 +41,6 @@ pub use reconstruct::Reconstructor;
 pub use reduce::{fill_block_means, in_blocks, reduced};
 pub use references::{Average, BadReference};
 pub use size::Size;
+pub use spectrum::{BadCircle, Circle, Level, Spectrum, SpectrumSum};
 pub use view::{Scale, Square, Surroundings, View, WIDER, block_means};
 pub use ycc::YccImage;

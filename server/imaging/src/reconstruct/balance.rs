@@ -1,7 +1,8 @@
 //! White balance by references per pixel, in whole numbers: [`DARK`] for dark, [`WHITE`] for white.
 
-use crate::calibration::{BANDS, Calibration, Reference};
+use crate::calibration::Calibration;
 use crate::frame::{CELL, MosaicFrame};
+use crate::white_balance::WhiteBalance;
 
 /// The value of a sample as dark as the dark reference; above 0, so that noise below dark is kept.
 pub(crate) const DARK: f32 = 2048.0;
@@ -12,10 +13,6 @@ pub(crate) const WHITE: f32 = DARK + 16_384.0;
 /// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
 /// than a cast.
 const LOW_BITS: f32 = 8_388_608.0;
-
-/// If a pixel's span from dark to white is below this share of its band's mean span, the pixel gets the band's gain:
-/// its own would amplify noise.
-const LEAST_SPAN: f32 = 0.1;
 
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
 #[derive(Debug, Clone)]
@@ -34,23 +31,10 @@ impl PixelBalance {
             return None;
         }
 
-        let mean_dark = calibration.dark.band_means();
-        let mean_white = calibration.white.band_means();
-        let counts = |reference: &Reference, means: &[f32; BANDS], index: usize| match reference {
-            Reference::PerPixel(frame) => f32::from(frame.samples()[index]),
-            Reference::PerBand(_) => means[band(index, width)],
-        };
-
+        let balance = WhiteBalance::new(calibration, width);
         let (gains, offsets) = (0..width * height)
-            .map(|index| {
-                let dark = counts(&calibration.dark, &mean_dark, index);
-                let white = counts(&calibration.white, &mean_white, index);
-
-                // A dead pixel, or one outside the content area, sees almost no white. It gets the gain of its band.
-                let band = band(index, width);
-                let of_band = mean_white[band] - mean_dark[band];
-                let span = if white - dark > LEAST_SPAN * of_band { white - dark } else { of_band };
-
+            .map(|place| {
+                let (dark, span) = balance.at(place);
                 let gain = (WHITE - DARK) / span;
                 (gain, DARK - dark * gain)
             })
@@ -86,8 +70,4 @@ impl PixelBalance {
             }
         }
     }
-}
-
-fn band(index: usize, width: usize) -> usize {
-    CELL * (index / width % CELL) + index % width % CELL
 }

@@ -1,0 +1,112 @@
+//! `parfocal recording spectrum`: what each band shows at a place, as a table.
+
+use std::io;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::cli::output::{Failure, print};
+use parfocal_base::files::replace;
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{Calibration, Circle, Spectrum, SpectrumSum};
+use parfocal_recording::{Recording, by_wavelength};
+
+/// Arguments of `parfocal recording spectrum`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the recording.
+    folder: PathBuf,
+    /// The place, in samples of the mosaic from its left and upper edge.
+    #[arg(long, value_name = "X,Y", value_parser = place, allow_hyphen_values = true)]
+    at: (f64, f64),
+    /// Take all cells whose middle is this near to the place, in samples. With 0, the cell there.
+    #[arg(long, value_name = "SAMPLES", default_value_t = 0.0, allow_hyphen_values = true)]
+    radius: f64,
+    /// The frames, from 0: one, or the first and the last.
+    #[arg(long, value_name = "N or A..B", value_parser = frames, default_value = "0")]
+    frames: (usize, usize),
+    /// Write the table there instead of printing it.
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// A row of the table. A cell is empty where no white reference makes reflectances of counts.
+#[derive(Debug, Serialize)]
+struct Row {
+    wavelength_nm: f64,
+    fwhm_nm: f64,
+    counts: f64,
+    counts_spread: f64,
+    reflectance: Option<f64>,
+    reflectance_spread: Option<f64>,
+}
+
+/// Prints or writes the table, the bands in order of wavelength.
+///
+/// # Errors
+/// If the place or a frame is not in the recording, a frame is damaged, or the table cannot be written.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let recording = Recording::open(&arguments.folder)?;
+    let calibration = calibration::read(&recording.calibration())?;
+
+    let (x, y) = arguments.at;
+    let circle = Circle { x, y, radius: arguments.radius };
+    let mut sum = SpectrumSum::new(&calibration, circle, recording.size()).map_err(|bad| bad.to_string())?;
+    let (first, last) = arguments.frames;
+    for frame in first..=last {
+        sum.add(&recording.frame(frame)?);
+    }
+    let spectrum = sum.spectrum();
+
+    let table = table(&calibration, &spectrum).map_err(|error| error.to_string())?;
+    let Some(out) = &arguments.out else {
+        print(&String::from_utf8_lossy(&table))?;
+        eprintln!("{}", summary(&spectrum));
+        return Ok(());
+    };
+    replace(out, &table).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+    print(&format!("{} in {}\n", summary(&spectrum), out.display()))
+}
+
+fn table(calibration: &Calibration, spectrum: &Spectrum) -> io::Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for band in by_wavelength(calibration) {
+        let reflectance = spectrum.reflectance.map(|levels| levels[band]);
+        table.serialize(Row {
+            wavelength_nm: calibration.bands[band].centre_nm,
+            fwhm_nm: calibration.bands[band].fwhm_nm,
+            counts: spectrum.counts[band].mean,
+            counts_spread: spectrum.counts[band].spread,
+            reflectance: reflectance.map(|level| level.mean),
+            reflectance_spread: reflectance.map(|level| level.spread),
+        })?;
+    }
+    table.into_inner().map_err(|error| io::Error::other(error.to_string()))
+}
+
+fn summary(spectrum: &Spectrum) -> String {
+    let of = |number: usize, what: &str| format!("{number} {what}{}", if number == 1 { "" } else { "s" });
+    let mut text = format!("{} in {}", of(spectrum.cells, "cell"), of(spectrum.frames, "frame"));
+    if spectrum.reflectance.is_none() {
+        text.push_str("; counts alone, since the sensor was recorded without a white reference");
+    }
+    if spectrum.saturated > 0 {
+        text.push_str(&format!("; {} at full scale, so the true values are higher", of(spectrum.saturated, "sample")));
+    }
+    text
+}
+
+fn place(text: &str) -> Result<(f64, f64), String> {
+    let number = |text: &str| text.trim().parse().ok().filter(|number: &f64| number.is_finite());
+    text.split_once(',')
+        .and_then(|(x, y)| Some((number(x)?, number(y)?)))
+        .ok_or_else(|| "must be two numbers, such as 1024,544".to_owned())
+}
+
+fn frames(text: &str) -> Result<(usize, usize), String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if first <= last => Ok((first, last)),
+        _ => Err("must be a frame's number, or the first and the last, such as 0..49".to_owned()),
+    }
+}
