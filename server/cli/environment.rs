@@ -121,7 +121,7 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
     }
 
     if !folders.is_empty() {
-        let bench = BenchScenes::read(&folders)?;
+        let bench = BenchScenes::read(&folders, None)?;
         for doubt in &bench.doubts {
             tell(format_args!("note: {doubt}"));
         }

@@ -8,6 +8,7 @@ use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::named::without_systems_own;
 use super::output::{Failure, bar, print};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{FieldOfView, Registry, scripted, shipped};
@@ -16,6 +17,7 @@ use parfocal_base::notices::tell;
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::recorded::ScanFolder;
 use parfocal_devices::simulation::phantom::Trajectory;
+use parfocal_imaging::PixelFormat;
 use parfocal_learning::evaluation::evaluate;
 use parfocal_learning::evaluation::report::Subject;
 use parfocal_learning::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
@@ -49,6 +51,10 @@ pub struct Arguments {
         conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"]
     )]
     stacks: Vec<String>,
+    /// Format of .raw and .bin files in --stacks: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
+    /// length.
+    #[arg(long, value_name = "FORMAT", requires = "stacks")]
+    raw: Option<PixelFormat>,
     /// Tell the policies how fast the optic blurs: pixels (standard deviation) for a change of focal power by 1, as
     /// `parfocal scan info` measures them; with --stacks also `measured`, each stack by its own pictures.
     #[arg(long, value_name = "PIXELS|measured")]
@@ -109,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         vec![(String::new(), shard)]
     } else {
-        arguments.merge.iter().map(|file| read_shard(file)).collect::<Result<_, _>>()?
+        without_systems_own(&arguments.merge).into_iter().map(|file| read_shard(file)).collect::<Result<_, _>>()?
     };
 
     let (report, outcomes) = merge(shards)?;
@@ -260,7 +266,8 @@ impl Arguments {
 /// Evaluates on focal stacks.
 fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
-    let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
+    let named = without_systems_own(&arguments.stacks).into_iter();
+    let sources: Vec<StackSource> = named.map(|text| StackSource::parse(text, arguments.raw)).collect();
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
     let told = match arguments.blur {

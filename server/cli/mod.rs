@@ -13,6 +13,7 @@ mod inspect;
 mod interrupt;
 mod lens;
 mod library;
+mod named;
 mod output;
 mod policies;
 mod recording;

@@ -12,6 +12,7 @@ use rand_chacha::ChaCha12Rng;
 
 use super::export::join;
 use super::library::protocols;
+use super::named::without_systems_own;
 use super::output::{Failure, print};
 use super::study_analysis;
 use super::wait::wait_for;
@@ -230,7 +231,7 @@ async fn show(show: &Show) -> Result<(), Failure> {
 fn merge(merge: &Merge) -> Result<(), Failure> {
     let mut sources = Vec::new();
     let mut left_out = Vec::new();
-    for site in &merge.sites {
+    for site in without_systems_own(&merge.sites) {
         left_out.extend(package::left_out(site)?);
         for export in package::exports_of(site)? {
             sources.push(Source::open(&export)?);

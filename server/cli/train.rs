@@ -6,10 +6,12 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
+use super::named::without_systems_own;
 use super::output::{Failure, print};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
+use parfocal_imaging::PixelFormat;
 use parfocal_learning::training::recipe::LEG;
 use parfocal_learning::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use parfocal_learning::training::run::comparison::{TrainedRun, markdown};
@@ -66,6 +68,10 @@ struct Training {
     /// is kept for validation. Not needed with `--resume`.
     #[arg(long, value_name = "DIR", num_args = 1..)]
     scans: Vec<String>,
+    /// Format of .raw and .bin files in --scans: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one
+    /// of their length. Not needed with `--resume`.
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
     /// Where to compute.
     #[arg(long, value_enum, default_value = "cpu")]
     device: Compute,
@@ -92,7 +98,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
-    let runs = folders.iter().map(|folder| TrainedRun::read(folder)).collect::<Result<Vec<_>, _>>()?;
+    let runs = without_systems_own(folders)
+        .into_iter()
+        .map(|folder| TrainedRun::read(folder))
+        .collect::<Result<Vec<_>, _>>()?;
     print(&if json { serde_json::to_string(&runs)? + "\n" } else { markdown(&runs) })
 }
 
@@ -181,7 +190,8 @@ fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
 }
 
 fn sources(arguments: &Training) -> Sources {
-    Sources { footage: arguments.footage.clone(), scans: arguments.scans.clone() }
+    let scans = without_systems_own(&arguments.scans).into_iter().cloned().collect();
+    Sources { footage: arguments.footage.clone(), scans, raw: arguments.raw }
 }
 
 fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {

@@ -224,6 +224,29 @@ fn only_mosaics_have_sizes() {
 }
 
 #[test]
+fn a_systems_own_files_beside_pictures_are_passed_over_by_name() {
+    let folder = TempDir::new().unwrap();
+    let good = folder.path().join("disc.png");
+    disc().save(&good).unwrap();
+    let own = ["Thumbs.db", "desktop.ini", "._disc.png"].map(|name| write(&folder, name, b"no picture"));
+
+    let all: Vec<&Path> = own.iter().map(PathBuf::as_path).chain([good.as_path()]).collect();
+    let output = inspect(&["--json"], &all);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), objects(&output).len()), (Some(0), 1), "{told}");
+    assert_eq!(told.lines().count(), 3, "{told}");
+    for path in &own {
+        let line = format!("passed over: {}, a file of the operating system", path.display());
+        assert!(told.lines().any(|found| found == line), "{told}");
+    }
+
+    // Alone it is somebody's question.
+    let output = inspect(&[], &[&own[0]]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(complaint(&output).contains("Thumbs.db: not a PNG, JPEG or TIFF picture"), "{}", complaint(&output));
+}
+
+#[test]
 fn bad_files_are_named_and_the_others_still_inspected() {
     let folder = TempDir::new().unwrap();
     let good = folder.path().join("disc.png");

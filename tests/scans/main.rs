@@ -5,6 +5,7 @@ mod bench;
 mod evaluation;
 mod from_stack;
 mod import;
+mod raw;
 mod tiff;
 
 use std::fs;

@@ -113,3 +113,34 @@ fn recordings_are_taken_as_scans_or_stacks_and_every_fifth_is_kept() {
         assert!(refused.status.code() == Some(1) && told.contains(expected), "{wrong}: {told}");
     }
 }
+
+#[test]
+fn a_stack_of_raw_mosaics_is_trained_on_in_the_format_that_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let stack = folder.path().join("stack");
+    std::fs::create_dir_all(&stack).unwrap();
+    let sharp = texture(3, 512);
+    for plane in 0..7_u8 {
+        let picture = gaussian_blur(&sharp, 0.8 * (f64::from(plane) - 3.0).abs());
+        // A cell of 4x4 samples for each pixel, as counts of 12 bit in two bytes.
+        let count = |index: usize| (picture.data[index / 2048 / 4 * 512 + index % 2048 / 4].round() as u16) << 4;
+        let bytes: Vec<u8> = (0..2048 * 1088).flat_map(|index| count(index).to_le_bytes()).collect();
+        std::fs::write(stack.join(format!("{plane}.raw")), bytes).unwrap();
+    }
+
+    let run = folder.path().join("run");
+    let scans = [stack.to_str().unwrap().to_owned()];
+    let raw = |format: &str| Sources { raw: Some(format.parse().unwrap()), ..on(&scans) };
+    let begin = |sources: &Sources, out: &Path| {
+        Run::begin(small("mgm-learned", 2 * LEG), 7, sources, out, None, tch::Device::Cpu)
+    };
+
+    let guessed = begin(&on(&scans), &folder.path().join("guessed")).err().unwrap().to_string();
+    assert!(guessed.contains("but Mono10 ends at 1023; give --raw Mono12 or Mono16"), "{guessed}");
+
+    assert!(!train(begin(&raw("Mono12"), &run).unwrap(), 1));
+    assert_eq!(again(&run, &[]), Ok(LEG), "the checkpoint knows the format");
+    let other = ResumeRequest { name: "mgm-learned".to_owned(), sources: raw("Mono16"), ..ResumeRequest::default() };
+    let error = Run::resume(&run, &other, tch::Device::Cpu).err().unwrap().to_string();
+    assert!(error.contains("begun on other scans"), "{error}");
+}

@@ -145,6 +145,51 @@ pub fn is_systems_own(name: &OsStr) -> bool {
     name.starts_with('.') || ["Thumbs.db", "desktop.ini"].iter().any(|own| name.eq_ignore_ascii_case(own))
 }
 
+/// Whether the folder at `path` is missing, or holds nothing but [files of operating systems](is_systems_own).
+///
+/// # Errors
+/// If it cannot be read.
+pub fn is_new_or_empty(path: &Path) -> io::Result<bool> {
+    let entries = match fs::read_dir(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Ok(!path.exists()),
+        entries => entries?,
+    };
+    for entry in entries {
+        if !is_systems_own(&entry?.file_name()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Renames the finished folder `whole` to `out`, a folder beside it that [is new or empty](is_new_or_empty). What an
+/// operating system keeps in `out` stays there.
+///
+/// # Errors
+/// If it cannot be renamed. `out` is as before then.
+pub fn put_folder(whole: &Path, out: &Path) -> io::Result<()> {
+    let has_files = fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
+    if !has_files {
+        return fs::rename(whole, out);
+    }
+    if !is_new_or_empty(out)? {
+        return Err(io::ErrorKind::DirectoryNotEmpty.into());
+    }
+
+    let aside = whole.with_extension("before");
+    fs::rename(out, &aside)?;
+    if let Err(error) = fs::rename(whole, out) {
+        fs::rename(&aside, out)?;
+        return Err(error);
+    }
+    for entry in fs::read_dir(&aside)? {
+        let entry = entry?;
+        fs::rename(entry.path(), out.join(entry.file_name()))?;
+    }
+    fs::remove_dir(aside)
+}
+
 /// All files below `folder`, at any depth, without [those of operating systems](is_systems_own): their paths relative
 /// to `folder`, sorted.
 ///
@@ -205,6 +250,32 @@ pub fn is_partial(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_takes_a_place_where_only_a_systems_own_files_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let whole = || {
+            let whole = folder.path().join("whole");
+            fs::create_dir(&whole).unwrap();
+            fs::write(whole.join("new"), "new").unwrap();
+            whole
+        };
+
+        assert!(is_new_or_empty(&out).unwrap());
+        put_folder(&whole(), &out).unwrap();
+        assert!(!is_new_or_empty(&out).unwrap() && !is_new_or_empty(&out.join("new")).unwrap());
+        assert!(put_folder(&whole(), &out).is_err());
+        fs::remove_dir_all(folder.path().join("whole")).unwrap();
+
+        fs::remove_file(out.join("new")).unwrap();
+        fs::write(out.join("desktop.ini"), "kept").unwrap();
+        assert!(is_new_or_empty(&out).unwrap());
+        put_folder(&whole(), &out).unwrap();
+        assert_eq!(fs::read_to_string(out.join("new")).unwrap(), "new");
+        assert_eq!(fs::read_to_string(out.join("desktop.ini")).unwrap(), "kept");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+    }
 
     #[test]
     fn an_existing_file_is_replaced_and_nothing_is_left_beside_it() {

@@ -9,6 +9,7 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
+use super::named::without_systems_own;
 use super::output::{Failure, print};
 use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;
@@ -61,11 +62,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut reports = Vec::new();
     let mut failed = 0;
 
-    for path in &arguments.paths {
+    let paths = without_systems_own(&arguments.paths);
+    for path in &paths {
         match inspector.inspect(path) {
             Ok(report) if arguments.json => print(&(serde_json::to_string(&report)? + "\n"))?,
             Ok(report) => reports.push(report),
-            Err(failure) if arguments.paths.len() == 1 => return Err(failure),
+            Err(failure) if paths.len() == 1 => return Err(failure),
             Err(failure) => {
                 tell(format_args!("parfocal: {failure}"));
                 failed += 1;
@@ -79,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     if failed > 0 {
-        return Err(format!("cannot inspect {failed} of {} files", arguments.paths.len()).into());
+        return Err(format!("cannot inspect {failed} of {} files", paths.len()).into());
     }
     Ok(())
 }

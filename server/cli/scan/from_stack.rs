@@ -8,6 +8,7 @@ use super::info;
 use crate::cli::output::{Failure, bar, poses, print};
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES};
+use parfocal_imaging::PixelFormat;
 use parfocal_learning::scans::benchmark::SEED;
 use parfocal_learning::scans::recording::{Cut, from_stack};
 use parfocal_learning::scans::stack::FocalStack;
@@ -22,7 +23,7 @@ const PLANES: usize = 21;
 /// Arguments of `parfocal scan from-stack`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of pictures of one still scene, each at another position of focus. The position is
+    /// Folder of pictures or raw mosaics of one still scene, each at another position of focus. The position is
     /// the one number in which the names differ, or else the order of the names. Or a TIFF with a page for each
     /// position: plain, OME-TIFF or `ImageJ`'s.
     folder: PathBuf,
@@ -33,6 +34,10 @@ pub struct Arguments {
     /// `page,position`, pages counted from 1.
     #[arg(long, value_name = "FILE")]
     list: Option<PathBuf>,
+    /// Format of .raw and .bin files: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
+    /// length.
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
     /// Planes that each pose sees, fewer than the stack has; by default about half of them, 21 at most.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(3..=1000))]
     planes: Option<u16>,
@@ -55,7 +60,7 @@ pub struct Arguments {
 /// # Errors
 /// If the pictures are not a focal stack, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into())?;
+    let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into(), arguments.raw)?;
     for note in check(&stack)? {
         tell(format_args!("note: {note}"));
     }

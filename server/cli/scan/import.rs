@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use crate::cli::output::{Failure, bar, poses, print};
+use parfocal_imaging::PixelFormat;
 use parfocal_learning::scans::recording::{Imported, import};
 
 /// Arguments of `parfocal scan import`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of pictures named like `pose0001_f0.350.png`: number of the pose, and focal power from 0 to 1.
+    /// Folder of pictures or raw mosaics named like `pose0001_f0.350.png`: number of the pose, and focal power
+    /// from 0 to 1.
     folder: PathBuf,
     /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]
@@ -20,6 +22,10 @@ pub struct Arguments {
     /// pictures.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: Option<u8>,
+    /// Format of .raw and .bin files: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
+    /// length.
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
 }
 
 /// Imports the pictures.
@@ -27,7 +33,7 @@ pub struct Arguments {
 /// # Errors
 /// If the pictures are not a scan, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let imported = Imported::look(&arguments.folder)?.of_bits(arguments.bits);
+    let imported = Imported::look(&arguments.folder)?.of_bits(arguments.bits).of_raw(arguments.raw);
     let progress = bar(imported.len(), 0);
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy().into_owned();
     let camera = arguments.camera.clone().unwrap_or(folder);

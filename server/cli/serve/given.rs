@@ -13,6 +13,7 @@ use crate::cli::output::Failure;
 use parfocal_autofocus::{Registry, scripted, shipped};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Clock;
+use parfocal_base::files::is_new_or_empty;
 use parfocal_dashboard::http::keys::Keys;
 use parfocal_dashboard::tls::Certificates;
 use parfocal_devices::camera::{self, CameraSettings, calibration};
@@ -158,7 +159,7 @@ fn registry(arguments: &Arguments, problems: &mut Problems) -> Registry {
 
 /// Whether there is something at `folder` besides an empty folder.
 fn is_used(folder: &Path) -> bool {
-    folder.exists() && folder.read_dir().map_or(true, |mut entries| entries.next().is_some())
+    !is_new_or_empty(folder).unwrap_or(false)
 }
 
 /// The certificates; none without TLS. A local authority is kept in the data folder, so that must be `locked`.

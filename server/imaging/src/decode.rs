@@ -34,22 +34,51 @@ const BY_LENGTH: [PixelFormat; 4] =
 /// If `bytes` has another length.
 pub fn decode_raw(bytes: &[u8], format: Option<PixelFormat>) -> Result<(MosaicFrame, PixelFormat), DecodeError> {
     let (width, height) = SENSOR_SIZE;
-    let count = width * height;
+    let found = raw_format(bytes.len(), format)?;
+    if let Some(given) = format {
+        check_counts(bytes, given)?;
+    }
+
+    let mut samples = vec![0; width * height];
+    if found == PixelFormat::Mono10 {
+        samples.iter_mut().zip(words(bytes)).for_each(|(sample, word)| *sample = word);
+    } else {
+        found.unpack(bytes, &mut samples);
+    }
+    Ok((MosaicFrame::new(width, height, samples)?, found))
+}
+
+/// The format of a raw mosaic of `length` bytes: `format`, or if it is `None`, the one of this length.
+///
+/// # Errors
+/// If a mosaic has another length.
+pub fn raw_format(length: usize, format: Option<PixelFormat>) -> Result<PixelFormat, DecodeError> {
+    let count = SENSOR_SIZE.0 * SENSOR_SIZE.1;
     let known = format.map_or_else(|| BY_LENGTH.to_vec(), |format| vec![format]);
-    let Some(format) = known.iter().copied().find(|format| format.bytes(count) == bytes.len()) else {
+    known.iter().copied().find(|format| format.bytes(count) == length).ok_or_else(|| {
         let sized = |format: &PixelFormat| format!("{format} {} bytes", format.bytes(count));
         let expected = known.iter().map(sized).collect::<Vec<_>>().join(", ");
-        return Err(DecodeError::RawLength { expected, found: bytes.len() });
-    };
+        DecodeError::RawLength { expected, found: length }
+    })
+}
 
-    let mut samples = vec![0; count];
-    if format == PixelFormat::Mono10 {
-        let words = bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair));
-        samples.iter_mut().zip(words).for_each(|(sample, word)| *sample = word);
-    } else {
-        format.unpack(bytes, &mut samples);
+/// Refuses counts that do not fit `format`, if it has two bytes for each.
+fn check_counts(bytes: &[u8], format: PixelFormat) -> Result<(), DecodeError> {
+    let wide = [PixelFormat::Mono10, PixelFormat::Mono12, PixelFormat::Mono16];
+    if !wide.contains(&format) {
+        return Ok(());
     }
-    Ok((MosaicFrame::new(width, height, samples)?, format))
+
+    let largest = words(bytes).max().unwrap_or(0);
+    if largest <= format.white() {
+        return Ok(());
+    }
+    let fit = wide.iter().filter(|other| largest <= other.white()).map(|other| other.name());
+    Err(DecodeError::RawCounts { largest, format, fit: fit.collect::<Vec<_>>().join(" or ") })
+}
+
+fn words(bytes: &[u8]) -> impl Iterator<Item = u16> {
+    bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair))
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ mod ycc;
 
 pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
-pub use decode::{decode, decode_raw, is_mosaic};
+pub use decode::{decode, decode_raw, is_mosaic, raw_format};
 pub use develop::{Developed, Developer};
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
 pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};

@@ -91,6 +91,16 @@ pub enum DecodeError {
         /// Bytes given.
         found: usize,
     },
+    /// A raw mosaic with counts that its format cannot have.
+    #[error("holds a count of {largest}, but {format} ends at {}; give --raw {fit}", format.white())]
+    RawCounts {
+        /// The largest count.
+        largest: u16,
+        /// The format in which it was to be read.
+        format: PixelFormat,
+        /// Formats that can have it, for people.
+        fit: String,
+    },
 }
 
 /// Width and height that may be decoded.

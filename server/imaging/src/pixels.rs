@@ -48,6 +48,17 @@ impl PixelFormat {
         }
     }
 
+    /// The greatest count.
+    #[must_use]
+    pub const fn white(self) -> u16 {
+        match self {
+            Self::Mono8 => 0xFF,
+            Self::Mono10 | Self::Mono10p => 0x3FF,
+            Self::Mono12 | Self::Mono12p => 0xFFF,
+            Self::Mono16 => 0xFFFF,
+        }
+    }
+
     /// Unpacks `bytes` into `samples`, scaled to 10 bit; stops at the end of the shorter one.
     pub fn unpack(self, bytes: &[u8], samples: &mut [u16]) {
         match self {

@@ -15,6 +15,7 @@ use super::layout::DESCRIPTION;
 use super::reading::Recording;
 use super::view::HEADER;
 use super::view_reading::ViewRecording;
+use parfocal_base::files::is_systems_own;
 
 /// What a recording is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
@@ -158,7 +159,9 @@ pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<FoundRecording
     let mut names: Vec<String> = Vec::new();
     for entry in entries {
         let entry = entry.map_err(RecordingError::unreadable(recordings))?;
-        names.extend(entry.file_name().into_string());
+        if !is_systems_own(&entry.file_name()) {
+            names.extend(entry.file_name().into_string());
+        }
     }
     // In the order in which they were made: SESSION, SESSION-2, …, SESSION-10.
     names.sort_by(|a, b| a.len().cmp(&b.len()).then_with(|| a.cmp(b)));

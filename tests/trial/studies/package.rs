@@ -241,7 +241,14 @@ async fn files_of_operating_systems_are_passed_over_and_named() {
     assert!(verified.contains(".DS_Store, ._comments.csv, desktop.ini, voice/._a.webm"), "{verified}");
 
     let joined = folder.path().join("joined");
-    done(&["study", "merge", text(&package), "--out", text(&joined)]);
+    // A file manager looked into the new folder, and `*` names what it leaves among the sites.
+    std::fs::create_dir(&joined).unwrap();
+    std::fs::write(joined.join(".DS_Store"), "another").unwrap();
+    let beside = folder.path().join("Thumbs.db");
+    std::fs::write(&beside, "").unwrap();
+    done(&["study", "merge", text(&beside), text(&package), "--out", text(&joined)]);
+    assert_eq!(std::fs::read_to_string(joined.join(".DS_Store")).unwrap(), "another");
+    std::fs::remove_file(joined.join(".DS_Store")).unwrap();
     let copied = joined.join("sessions").join(session_name);
     assert!(!copied.join(".DS_Store").exists() && !joined.join("sessions/.DS_Store").exists());
 
@@ -418,4 +425,23 @@ async fn a_package_that_was_made_before_something_was_taken_back_is_handed_out_n
     trial.conductor.erase(Role::Researcher, kept, erasure).await.unwrap();
     given_up().await;
     assert_eq!(make().await, StudyExportState::Ready { unblinded: false, sessions: 1 });
+}
+
+#[test]
+fn a_file_that_is_no_package_is_named_with_what_to_give_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("joined.zip"), b"PK\x03\x04").unwrap();
+    let refused = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+        let output = command.args(arguments).current_dir(folder.path()).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+
+    let told = refused(&["study", "analyse", "joined.zip"]);
+    assert!(told.contains("joined.zip is not a package of a study") && told.contains("unpack a ZIP file"), "{told}");
+    let told = refused(&["study", "merge", "joined.zip", "--out", "x"]);
+    assert!(told.contains("joined.zip is neither the export") && told.contains("unpack a ZIP file"), "{told}");
+    let told = refused(&["study", "analyse", "joint"]);
+    assert!(told.contains("there is no package 'joint' here") && told.contains("--data-dir"), "{told}");
 }

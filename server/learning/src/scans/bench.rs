@@ -11,6 +11,7 @@ use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
 use super::stack::source::{ScaledStack, StackSource, UnfitStack};
 use parfocal_devices::camera::recorded::{HEADER, ScanError, ScanFolder};
+use parfocal_imaging::PixelFormat;
 
 /// One folder in this many is kept for validation.
 const KEPT_OF: usize = 5;
@@ -52,15 +53,16 @@ pub enum BenchError {
 
 impl BenchScenes {
     /// Reads the recordings in `folders`. Each is a recorded scan or a focal stack. For a stack, `DIR:PLANES` says how
-    /// many planes make the range 0..=1.
+    /// many planes make the range 0..=1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of
+    /// their length.
     ///
     /// # Errors
     /// If a folder is missing, or what is in it cannot be used.
-    pub fn read(folders: &[String]) -> Result<Self, BenchError> {
+    pub fn read(folders: &[String], raw: Option<PixelFormat>) -> Result<Self, BenchError> {
         let mut hash = Sha256::new();
         let mut doubts = Vec::new();
         let recordings: Vec<Vec<Scene>> =
-            folders.iter().map(|folder| recording(folder, &mut hash, &mut doubts)).collect::<Result<_, _>>()?;
+            folders.iter().map(|folder| recording(folder, raw, &mut hash, &mut doubts)).collect::<Result<_, _>>()?;
 
         let is_kept = |index: usize| index % KEPT_OF == KEPT_OF - 1;
         let scenes = |kept: bool| -> Vec<Scene> {
@@ -78,7 +80,12 @@ impl BenchScenes {
 }
 
 /// The scenes of one folder.
-fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Result<Vec<Scene>, BenchError> {
+fn recording(
+    folder: &str,
+    raw: Option<PixelFormat>,
+    hash: &mut Sha256,
+    doubts: &mut Vec<String>,
+) -> Result<Vec<Scene>, BenchError> {
     if Path::new(folder).join(HEADER).exists() {
         let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Patches, &|| ())?;
         if scan.poses().len() < 2 {
@@ -88,7 +95,7 @@ fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Resul
         return Ok(vec![Scene::Recorded(Arc::new(scan))]);
     }
 
-    let source = StackSource::parse(folder);
+    let source = StackSource::parse(folder, raw);
     if !source.folder.exists() {
         return Err(BenchError::NoFolder(folder.to_owned()));
     }

@@ -6,6 +6,7 @@ pub mod benchmark;
 pub mod clip;
 pub mod detail;
 pub mod footage;
+pub mod mosaics;
 mod photography;
 pub mod pictures;
 pub mod planes;

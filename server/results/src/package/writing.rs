@@ -15,7 +15,7 @@ use super::parquet::ParquetFile;
 use super::source::{LeftOut, SESSIONS, Source, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, playable, r, redcap, spss};
-use parfocal_base::files::{files_below, is_systems_own, sync_folder_of, write_through};
+use parfocal_base::files::{files_below, is_new_or_empty, is_systems_own, put_folder, sync_folder_of, write_through};
 use parfocal_records::store::export::{ExportFiles, SUMS};
 use parfocal_trial::voice::MediaType;
 
@@ -73,9 +73,7 @@ pub fn write(
 
     fill(sources, sessions, left_out, temporary.path(), told)?;
 
-    // An existing empty folder is replaced.
-    let _ = fs::remove_dir(out);
-    fs::rename(temporary.keep(), out).map_err(PackageError::unwritable(out))?;
+    put_folder(&temporary.keep(), out).map_err(PackageError::unwritable(out))?;
     sync_folder_of(out);
 
     let sites: BTreeSet<&String> = sources.iter().map(|source| &source.site).collect();
@@ -90,11 +88,8 @@ pub fn write(
 }
 
 fn check_new(out: &Path) -> Result<(), PackageError> {
-    let unwritable = PackageError::unwritable(out);
-    if out.is_file() || out.is_dir() && fs::read_dir(out).map_err(unwritable)?.next().is_some() {
-        return Err(PackageError::Exists(out.to_owned()));
-    }
-    Ok(())
+    let is_free = is_new_or_empty(out).map_err(PackageError::unwritable(out))?;
+    if is_free { Ok(()) } else { Err(PackageError::Exists(out.to_owned())) }
 }
 
 fn fill(

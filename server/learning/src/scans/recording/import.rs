@@ -5,14 +5,17 @@ use std::path::{Path, PathBuf};
 
 use super::import_error::ImportError;
 use super::{PosePictures, shot};
+use crate::scans::mosaics::RawMosaics;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::footage::picture_head;
+use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
 use parfocal_devices::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
-use parfocal_imaging::{GrayImage, PatchArea, Picture, PictureFile, Reconstructor, SENSOR_SIZE, content_area};
+use parfocal_imaging::{
+    GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
+};
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
@@ -20,6 +23,8 @@ pub struct Imported {
     poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>>,
     /// Bits of the samples in 16-bit files, if the caller knows them.
     bits: Option<u8>,
+    /// The format of raw mosaics, if the caller knows it.
+    raw: Option<PixelFormat>,
 }
 
 impl Imported {
@@ -59,7 +64,7 @@ impl Imported {
             return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
         }
 
-        let imported = Self { poses, bits: None };
+        let imported = Self { poses, bits: None, raw: None };
         imported.check_powers()?;
         Ok(imported)
     }
@@ -91,6 +96,12 @@ impl Imported {
     #[must_use]
     pub fn of_bits(self, bits: Option<u8>) -> Self {
         Self { bits, ..self }
+    }
+
+    /// Reads raw mosaics in this format. If it is `None`, in the one of their length.
+    #[must_use]
+    pub fn of_raw(self, raw: Option<PixelFormat>) -> Self {
+        Self { raw, ..self }
     }
 
     /// Number of poses.
@@ -126,7 +137,9 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         focal_powers: imported.powers(),
     };
 
-    let mut reader = Reader { reconstructor: Reconstructor::default(), first: None, largest: None, scale: 1.0 };
+    let mosaics = RawMosaics::new(imported.raw);
+    let mut reader =
+        Reader { reconstructor: Reconstructor::default(), mosaics, first: None, largest: None, scale: 1.0 };
     // Checks all sizes before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
     reader.set_scale(imported.bits)?;
@@ -177,6 +190,7 @@ fn patch(pictures: &[GrayImage]) -> Option<PatchArea> {
 /// Reads pictures and checks that all are of one size.
 struct Reader {
     reconstructor: Reconstructor,
+    mosaics: RawMosaics,
     first: Option<(PathBuf, (usize, usize))>,
     /// The largest sample of all 16-bit pictures, and the file that holds it.
     largest: Option<(u16, PathBuf)>,
@@ -186,9 +200,14 @@ struct Reader {
 
 impl Reader {
     /// Compares a picture's size with the first one's. Reads only the beginning of the file, except of one with 16-bit
-    /// samples, whose largest counts.
+    /// samples, whose largest counts, and of a raw mosaic.
     fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
+        if is_raw(path) {
+            self.read(path)?;
+            return self.check(path, SENSOR_SIZE);
+        }
+
         let head = picture_head(path).map_err(unreadable)?;
         let size = PictureFile::open(&head).and_then(|file| file.single()?.size(0));
         let picture = |error| ImportError::Picture { path: path.to_owned(), error };
@@ -246,6 +265,12 @@ impl Reader {
     fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
         let bytes = std::fs::read(path).map_err(unreadable)?;
+        if is_raw(path) {
+            let frame = self.mosaics.read(path, &bytes);
+            let frame = frame.map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+            return Ok(Picture::Mosaic(frame).into_gray(&mut self.reconstructor));
+        }
+
         let opened = PictureFile::open(&bytes).and_then(PictureFile::single);
         let wide = opened.as_ref().is_ok_and(PictureFile::is_wide);
         let picture = opened.and_then(|file| file.read(0, false));
@@ -282,11 +307,11 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
 
 /// Pose and focal power of a name like `pose0001_f0.350.png`; `None` for any other file.
 fn parse(name: &str) -> Option<Result<(usize, FocalPower), String>> {
-    let (stem, extension) = name.rsplit_once('.')?;
-    if !["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
+    if !is_picture(Path::new(name)) && !is_raw(Path::new(name)) {
         return None;
     }
 
+    let (stem, _) = name.rsplit_once('.')?;
     let (pose, power) = stem.strip_prefix("pose")?.split_once("_f")?;
     let number = pose.parse::<usize>().map_err(|_| format!("'{pose}' is not the number of a pose"));
     let power = power
@@ -305,6 +330,7 @@ mod tests {
         let parsed = |name| parse(name).map(|parsed| parsed.map(|(pose, power)| (pose, power.get())));
         assert_eq!(parsed("pose0012_f0.350.png"), Some(Ok((12, 0.35))));
         assert_eq!(parsed("pose3_f1.TIFF"), Some(Ok((3, 1.0))));
+        assert_eq!(parsed("pose3_f1.raw"), Some(Ok((3, 1.0))));
         assert_eq!(parsed("notes.txt"), None);
         assert_eq!(parsed("overview.png"), None);
         assert!(parsed("pose1_f1.5.png").unwrap().unwrap_err().contains("from 0 to 1"));

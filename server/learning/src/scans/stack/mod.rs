@@ -10,8 +10,10 @@ pub mod source;
 
 use std::path::{Path, PathBuf};
 
-use parfocal_devices::camera::footage::{is_raw, pictures_in, read_picture};
-use parfocal_imaging::{GrayImage, Reconstructor, decode, in_blocks};
+use super::mosaics::{RawMosaics, mosaics_in};
+use parfocal_base::notices::tell;
+use parfocal_devices::camera::footage::{is_raw, pictures_in};
+use parfocal_imaging::{GrayImage, Picture, PixelFormat, Reconstructor, decode, in_blocks};
 
 pub use plane::{LEAST_PLANES, Plane, StackError};
 use positions::{file_name, listed, named};
@@ -59,25 +61,35 @@ impl FocalStack {
     /// Reads the pictures in `folder`, made smaller by blocks of `scale` x `scale` pixels. Positions are
     /// those of `list` (lines of `name,position`), else the one number in which the names differ, else
     /// the natural order of names. `folder` may also be a TIFF with a page for each position, which `list` counts
-    /// from 1.
+    /// from 1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of their length.
     ///
     /// # Errors
     /// If a picture or the list cannot be read, or the pictures are not a stack.
-    pub fn load(folder: &Path, list: Option<&Path>, scale: usize) -> Result<Self, StackError> {
+    pub fn load(
+        folder: &Path,
+        list: Option<&Path>,
+        scale: usize,
+        raw: Option<PixelFormat>,
+    ) -> Result<Self, StackError> {
+        if folder.is_file() && is_raw(folder) {
+            return Err(StackError::OneMosaic(folder.to_owned()));
+        }
         if folder.is_file() {
             return Self::new(pages::planes(folder, list, scale)?);
         }
 
-        let files = pictures_or_mosaics_in(folder)?;
+        let files = pictures_or_mosaics_in(folder, raw.is_some())?;
         let placed = match list {
             Some(list) => listed(list)?.into_iter().map(|(name, at)| (folder.join(name), at)).collect(),
             None => named(files),
         };
 
         let mut reconstructor = Reconstructor::default();
+        let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
-            let picture = if is_raw(&path) { read_picture(&path, &bytes, false) } else { decode(&bytes, false) };
+            let picture =
+                if is_raw(&path) { mosaics.read(&path, &bytes).map(Picture::Mosaic) } else { decode(&bytes, false) };
             let picture = picture.map_err(|source| StackError::Picture { path: path.clone(), source })?;
             let gray = picture.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
@@ -190,14 +202,26 @@ fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
     }
 }
 
-/// The pictures in a folder, or if it has none, its raw mosaics.
-fn pictures_or_mosaics_in(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
-    pictures_in(folder).or_else(|error| {
-        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| is_raw(path)).collect();
-        files.sort();
-        if files.is_empty() { Err(error.into()) } else { Ok(files) }
-    })
+/// The pictures in a folder, or if it has none, or `raw` are wanted, its raw mosaics.
+fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, StackError> {
+    let mosaics = mosaics_in(folder);
+    let pictures = match pictures_in(folder) {
+        Err(error) if mosaics.is_empty() => return Err(error.into()),
+        pictures => pictures.unwrap_or_default(),
+    };
+
+    let left_out = |count: usize, kind: &str| {
+        if count > 0 {
+            tell(format_args!("note: {} also holds {count} {kind}, which are left out", folder.display()));
+        }
+    };
+    if pictures.is_empty() || raw && !mosaics.is_empty() {
+        left_out(pictures.len(), "pictures");
+        Ok(mosaics)
+    } else {
+        left_out(mosaics.len(), "raw mosaics");
+        Ok(pictures)
+    }
 }
 
 #[cfg(test)]

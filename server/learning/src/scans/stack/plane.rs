@@ -41,6 +41,9 @@ pub enum StackError {
         /// Why it cannot be decoded.
         source: DecodeError,
     },
+    /// One raw mosaic.
+    #[error("{} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}", .0.display())]
+    OneMosaic(PathBuf),
     /// The pages of a file are not a stack.
     #[error("{}: {reason}", path.display())]
     Pages {

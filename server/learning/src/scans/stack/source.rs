@@ -8,7 +8,7 @@ use super::optics::Optics;
 use super::{FocalStack, Plane, StackError};
 use crate::scans::planes::{PlaneStack, PlanesError};
 use parfocal_base::BlurRate;
-use parfocal_imaging::{GrayImage, in_blocks};
+use parfocal_imaging::{GrayImage, PixelFormat, in_blocks};
 
 /// The two scales: names, and the width in pixels to which a stack's pictures are reduced as nearly as possible. It is
 /// unknown how soft a lens's best picture is on the sensor, so each stack is used at both.
@@ -49,6 +49,8 @@ pub struct StackSource {
     pub folder: PathBuf,
     /// Planes of the range; if it is `None`, two fifths of the stack's, but at least 6.
     pub planes: Option<usize>,
+    /// The format of raw mosaics; if it is `None`, the one of their length.
+    pub raw: Option<PixelFormat>,
 }
 
 /// A stack's pictures at one scale.
@@ -74,13 +76,13 @@ impl ScaledStack {
 }
 
 impl StackSource {
-    /// The source that `DIR` or `DIR:PLANES` names.
+    /// The source that `DIR` or `DIR:PLANES` names, with raw mosaics in the format `raw` if there are any.
     #[must_use]
-    pub fn parse(text: &str) -> Self {
+    pub fn parse(text: &str, raw: Option<PixelFormat>) -> Self {
         let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
         match split {
-            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes) },
-            None => Self { folder: text.into(), planes: None },
+            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes), raw },
+            None => Self { folder: text.into(), planes: None, raw },
         }
     }
 
@@ -96,7 +98,7 @@ impl StackSource {
     /// # Errors
     /// If the stack cannot be read, or its pictures are not a stack.
     pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
-        let stack = FocalStack::load(&self.folder, None, 1)?;
+        let stack = FocalStack::load(&self.folder, None, 1, self.raw)?;
         let mut doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
         let stack = match stack.even() {
             Ok((even, note)) => {
@@ -137,7 +139,11 @@ mod tests {
 
     #[test]
     fn a_source_may_say_how_many_planes_make_the_range() {
-        assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
-        assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
+        let parsed = |text: &str| {
+            let source = StackSource::parse(text, None);
+            (source.folder, source.planes)
+        };
+        assert_eq!(parsed("a/b:21"), ("a/b".into(), Some(21)));
+        assert_eq!(parsed("a:b/c"), ("a:b/c".into(), None));
     }
 }

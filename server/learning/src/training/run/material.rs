@@ -20,6 +20,7 @@ use crate::scans::stack::source::StackSource;
 use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 use parfocal_base::notices::tell;
+use parfocal_imaging::PixelFormat;
 
 /// Least number of scans that are checked for detail to focus on.
 const LEAST_CHECKED: usize = 60;
@@ -31,6 +32,8 @@ pub struct Sources {
     pub footage: Vec<PathBuf>,
     /// Folders of a bench's recorded scans and focal stacks, used besides the pictures.
     pub scans: Vec<String>,
+    /// The format of raw mosaics in them; if it is `None`, the one of their length.
+    pub raw: Option<PixelFormat>,
 }
 
 /// The pictures and recordings of a training, opened.
@@ -40,6 +43,8 @@ pub(super) struct Material {
     footage: Option<Origin>,
     /// The bench's recordings, with their paths and hash; `None` without recordings.
     bench: Option<(BenchScenes, Origin)>,
+    /// The format of raw mosaics that was given.
+    raw: Option<PixelFormat>,
 }
 
 /// The absolute paths of pictures, and a hash of their content.
@@ -58,13 +63,15 @@ struct Kind {
 
 const FOOTAGE: Kind = Kind { name: "footage", option: "--footage" };
 const SCANS: Kind = Kind { name: "scans", option: "--scans" };
+/// The note in a checkpoint that holds the format of raw mosaics.
+const RAW: &str = "raw";
 
 impl Material {
     /// Opens the footage and recordings of `sources`. Without footage, draws `pictures` pictures instead.
     pub fn open(sources: &Sources, pictures: u64) -> Result<Self, TrainError> {
         let (clips, footage) = clips(&sources.footage, pictures)?;
-        let bench = bench(&sources.scans)?;
-        Ok(Self { clips, footage, bench })
+        let bench = bench(&sources.scans, sources.raw)?;
+        Ok(Self { clips, footage, bench, raw: sources.raw })
     }
 
     /// Opens what the training of `checkpoint` was begun on. `asked` holds its new paths, if any were given.
@@ -77,9 +84,11 @@ impl Material {
         let (clips, origin) = clips(&from, pictures).map_err(|error| footage.unusable(error))?;
         footage.check(origin.as_ref())?;
 
-        let bench = bench(scans.paths()).map_err(|error| scans.unusable(error))?;
+        let noted = checkpoint.notes.get(RAW).and_then(|name| name.parse().ok());
+        let raw = asked.raw.or(noted);
+        let bench = bench(scans.paths(), raw).map_err(|error| scans.unusable(error))?;
         scans.check(bench.as_ref().map(|(_, origin)| origin))?;
-        Ok(Self { clips, footage: origin, bench })
+        Ok(Self { clips, footage: origin, bench, raw })
     }
 
     /// Adds the paths and hashes to the checkpoint's notes.
@@ -90,6 +99,9 @@ impl Material {
                 checkpoint.notes.insert(kind.name.to_owned(), origin.paths.join("\n"));
                 checkpoint.notes.insert(kind.checksum(), origin.sha256.clone());
             }
+        }
+        if let Some(raw) = self.raw {
+            checkpoint.notes.insert(RAW.to_owned(), raw.name().to_owned());
         }
     }
 
@@ -167,7 +179,7 @@ impl KnownSources {
 
     /// Replaces `error` by one with advice if the cause is that a path of the first run no longer exists.
     fn unusable(&self, error: TrainError) -> TrainError {
-        let is_there = |path: &String| Path::new(path).exists() || StackSource::parse(path).folder.exists();
+        let is_there = |path: &String| Path::new(path).exists() || StackSource::parse(path, None).folder.exists();
         if !self.asked.is_empty() || self.paths().iter().all(is_there) {
             return error;
         }
@@ -226,12 +238,12 @@ fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Ori
 }
 
 /// Reads the recordings in `folders`, with their origin; `None` without folders.
-fn bench(folders: &[String]) -> Result<Option<(BenchScenes, Origin)>, TrainError> {
+fn bench(folders: &[String], raw: Option<PixelFormat>) -> Result<Option<(BenchScenes, Origin)>, TrainError> {
     if folders.is_empty() {
         return Ok(None);
     }
 
-    let scenes = BenchScenes::read(folders)?;
+    let scenes = BenchScenes::read(folders, raw)?;
     for doubt in &scenes.doubts {
         tell(format_args!("note: {doubt}"));
     }

@@ -15,7 +15,7 @@ use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, ZipWriter};
 
 use super::ExportError;
-use parfocal_base::files::{files_below, sync_folder_of};
+use parfocal_base::files::{files_below, is_new_or_empty, put_folder, sync_folder_of};
 
 /// Pieces of a ZIP file that may wait to be downloaded.
 const PIECES: usize = 4;
@@ -85,10 +85,7 @@ impl Destination {
 /// Checks that `out` is new or empty.
 pub fn check_new(out: &Path) -> Result<(), ExportError> {
     let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
-    if out.is_dir() && std::fs::read_dir(out).map_err(unwritable)?.next().is_some() || out.is_file() {
-        return Err(ExportError::Exists(out.to_owned()));
-    }
-    Ok(())
+    if is_new_or_empty(out).map_err(unwritable)? { Ok(()) } else { Err(ExportError::Exists(out.to_owned())) }
 }
 
 /// A folder being written, beside its place and under another name until it is complete.
@@ -130,7 +127,7 @@ impl NewFolder {
     fn finish(self) -> Result<(), ExportError> {
         sync_folder_of(&self.temporary.path().join("any"));
         let whole = self.temporary.keep();
-        std::fs::rename(&whole, &self.out).map_err(|error| {
+        put_folder(&whole, &self.out).map_err(|error| {
             // Nothing else can be done for it. If this fails too, the folder stays.
             let _ = std::fs::remove_dir_all(&whole);
             ExportError::Unwritable { path: self.out.clone(), error }
