@@ -75,10 +75,17 @@ async fn package_of(arguments: &Arguments) -> Result<Option<&Path>, Failure> {
     }
 
     if !package::is_package(folder) {
-        if is_path || folder.is_dir() && !is_study(arguments).await {
+        if is_path || folder.exists() && !is_study(arguments).await {
             return Err(format!(
                 "{name} is not a package of a study; give a folder that `parfocal export --study` or `parfocal study \
                  merge` wrote (unpack a ZIP file first), or the name of a study"
+            )
+            .into());
+        }
+        if arguments.data_dir.is_none() && !folder_of(arguments).exists() {
+            return Err(format!(
+                "there is no package '{name}' here, and no server's data folder: give the folder of a package, or name \
+                 the server's data folder with --data-dir"
             )
             .into());
         }

@@ -40,7 +40,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     let mut pixels = vec![0; pitch * height];
     let image = Image { pixels: pixels.as_mut_slice(), width, pitch, height, format };
     decompressor.decompress(bytes, image).map_err(damaged)?;
-    if has_spare_data(&mut decompressor, bytes, (width, height)) {
+    // Arithmetic coding has no bits that pixels need or not: its data may end early.
+    if !header.is_arithmetic && has_spare_data(&mut decompressor, bytes, (width, height)) {
         return Err(DecodeError::Damaged("it holds more data than its pixels need".to_owned()));
     }
 
@@ -131,4 +132,35 @@ fn damaged(error: turbojpeg::Error) -> DecodeError {
         error => error.to_string(),
     };
     DecodeError::Damaged(reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use turbojpeg::Compressor;
+
+    use super::*;
+
+    /// A picture without damage, in the coding that `choose` sets.
+    fn coded(choose: impl FnOnce(&mut Compressor) -> turbojpeg::Result<()>) -> Vec<u8> {
+        let (width, height) = (64, 48);
+        let pixels: Vec<u8> = (0..width * height).map(|index| (index * index / 7 % 251) as u8).collect();
+        let mut compressor = Compressor::new().unwrap();
+        compressor.set_subsamp(turbojpeg::Subsamp::Gray).unwrap();
+        choose(&mut compressor).unwrap();
+        let image = Image { pixels: pixels.as_slice(), width, pitch: width, height, format: PixelFormat::GRAY };
+        compressor.compress_to_vec(image).unwrap()
+    }
+
+    #[test]
+    fn a_picture_without_damage_is_read_in_each_coding() {
+        let expected = read(&coded(|_| Ok(()))).unwrap();
+        for (name, bytes) in [
+            ("optimised", coded(|compressor| compressor.set_optimize(true))),
+            ("progressive", coded(|compressor| compressor.set_progressive(true))),
+            ("arithmetic", coded(|compressor| compressor.set_arithmetic(true))),
+        ] {
+            let found = read(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(found == expected, "{name}");
+        }
+    }
 }

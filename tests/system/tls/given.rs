@@ -214,6 +214,7 @@ fn a_chain_is_taken_in_its_order_only() {
     };
     let [root_key, middle_key, key] = std::array::from_fn(|_| KeyPair::generate().unwrap());
     let root = authority("root").self_signed(&root_key).unwrap().pem();
+    let middle_pem = middle_key.serialize_pem();
     let root_issuer = Issuer::new(authority("root"), root_key);
     let middle = authority("middle").signed_by(&middle_key, &root_issuer).unwrap().pem();
     let leaf = CertificateParams::new(["localhost".to_owned()]).unwrap();
@@ -236,6 +237,13 @@ fn a_chain_is_taken_in_its_order_only() {
     let said = given(&[&leaf, &root, &middle]).unwrap_err();
     assert!(said.contains("in the wrong order: number 2 did not sign number 1"), "{said}");
     assert!(site.refusal().contains("in the wrong order"));
+
+    // A chain that is in order, with the key of the authority that signed it, or of nobody.
+    for other in [middle_pem, KeyPair::generate().unwrap().serialize_pem()] {
+        std::fs::write(site.key(), other).unwrap();
+        let said = given(&[&leaf, &middle]).unwrap_err();
+        assert!(said.contains("server.key does not belong to the certificate in"), "{said}");
+    }
 }
 
 #[test]

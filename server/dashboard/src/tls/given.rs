@@ -89,14 +89,13 @@ impl Files {
         };
         let wrong = |problem: String| TlsError::WrongOrder { path: self.certificate.clone(), problem };
 
-        // If the key belongs to none, or cannot be used, a later check reports it.
-        if let Some(own) = chain.iter().position(belongs).filter(|&own| own > 0) {
-            return Err(wrong(format!("the server's own, to which the key belongs, is number {}", own + 1)));
-        }
-        match fitness::out_of_order(chain) {
-            Some(place) => Err(wrong(format!("number {place} did not sign number {}", place - 1))),
-            None => Ok(()),
-        }
+        // If the key belongs to none, or cannot be used, a later check reports it. That check also reports the key of
+        // an authority beside a chain that is in order.
+        let Some(place) = fitness::out_of_order(chain) else { return Ok(()) };
+        Err(wrong(match chain.iter().position(belongs) {
+            Some(own) if own > 0 => format!("the server's own, to which the key belongs, is number {}", own + 1),
+            _ => format!("number {place} did not sign number {}", place - 1),
+        }))
     }
 
     fn private_key(&self, pem: &[u8]) -> Result<PrivateKeyDer<'static>, TlsError> {

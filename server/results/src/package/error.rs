@@ -6,7 +6,8 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum PackageError {
     /// A folder is neither an export of a session nor a package of a study.
-    #[error("{} is neither the export of a session nor the package of a study", .0.display())]
+    #[error("{} is neither the export of a session nor the package of a study; give a folder that `parfocal export` or \
+             `parfocal study merge` wrote (unpack a ZIP file first)", .0.display())]
     NotAnExport(PathBuf),
     /// An export does not verify.
     #[error("{} is not as it was exported: {check}: {problem}; export it again", .folder.display())]
