@@ -233,13 +233,13 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
 /// Writes and prints a shard, for `--merge`.
 fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
     let text = serde_json::to_string(shard)? + "\n";
-    let mut told = String::new();
+    let mut message = String::new();
 
     if let Some(folder) = &arguments.out {
         let file = folder.join(shard.part.file_name());
         replace(&file, text.as_bytes()).map_err(|error| unwritable(folder, &error))?;
         let folder = folder.display();
-        told = format!(
+        message = format!(
             "shard {} is in {}; when all shards are there: \
              parfocal evaluate --merge {folder}/shard-*.json --out {folder}\n",
             shard.part,
@@ -247,7 +247,7 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
         );
     }
 
-    print(if arguments.json { &text } else { &told })
+    print(if arguments.json { &text } else { &message })
 }
 
 fn read_shard(file: &Path) -> Result<(String, Shard), Failure> {
@@ -270,14 +270,14 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let sources: Vec<StackSource> = named.map(|text| StackSource::parse(text, arguments.raw)).collect();
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
-    let told = match arguments.blur {
+    let knowledge = match arguments.blur {
         None => BlurKnowledge::Nothing,
         Some(Blur::Rate(rate)) => BlurKnowledge::Rate(rate),
         Some(Blur::Measured) => BlurKnowledge::Measured,
     };
 
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
-    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, told, &|name| {
+    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, knowledge, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;

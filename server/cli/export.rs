@@ -70,7 +70,7 @@ async fn write_session(recorder: &Recorder, session: SessionId, arguments: &Argu
 /// Exports all of `study`, and shows the progress.
 async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) -> Result<(), Failure> {
     let steps = Arc::new(Steps::new());
-    let told = {
+    let report = {
         let steps = Arc::clone(&steps);
         move |progress: Progress| match progress.steps {
             0 => steps.tell("sessions exported", progress.exported, progress.sessions),
@@ -78,7 +78,7 @@ async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) ->
         }
     };
 
-    let exported = export_study(recorder, study, arguments.unblinded, &arguments.out, Arc::new(told)).await;
+    let exported = export_study(recorder, study, arguments.unblinded, &arguments.out, Arc::new(report)).await;
     steps.end();
     tell(&exported?, arguments.json)
 }

@@ -166,15 +166,15 @@ fn save_video(video: &Video, recording: &Recording, frames: &[usize], studio: &m
 
     let Some(mut encoder) = encoder else { return Ok(()) };
     drop(encoder.0.stdin.take());
-    let mut said = String::new();
+    let mut complaint = String::new();
     if let Some(mut errors) = encoder.0.stderr.take() {
-        errors.read_to_string(&mut said)?;
+        errors.read_to_string(&mut complaint)?;
     }
 
     if encoder.0.wait()?.success() {
         return Ok(());
     }
-    Err(format!("ffmpeg: {}", said.lines().last().unwrap_or("no reason given")).into())
+    Err(format!("ffmpeg: {}", complaint.lines().last().unwrap_or("no reason given")).into())
 }
 
 /// A running `ffmpeg`, ended if the frames cannot be read to the last.

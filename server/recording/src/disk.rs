@@ -30,10 +30,10 @@ impl Room {
 /// If the system does not report it.
 pub fn room(path: &Path) -> std::io::Result<Room> {
     let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
-    let told = rustix::fs::statvfs(there)?;
+    let volume = rustix::fs::statvfs(there)?;
 
-    let total = told.f_blocks.saturating_mul(told.f_frsize);
-    Ok(Room { available: told.f_bavail.saturating_mul(told.f_frsize), reserve: RESERVE.min(total / PART) })
+    let total = volume.f_blocks.saturating_mul(volume.f_frsize);
+    Ok(Room { available: volume.f_bavail.saturating_mul(volume.f_frsize), reserve: RESERVE.min(total / PART) })
 }
 
 #[cfg(test)]

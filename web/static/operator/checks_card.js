@@ -16,7 +16,7 @@ const button = byId("check-again", HTMLButtonElement);
 let soon;
 
 /** Called after each check with whether something must be put right before a trial. @type {(wrong: boolean) => void} */
-let told = () => {};
+let report = () => {};
 
 /** @param {Finding} finding */
 function line(finding) {
@@ -44,7 +44,7 @@ function draw(findings) {
   redraw(byId("checks-well"), well.map(line));
   setText(byId("checks-passed"), passed(well.length));
   byId("checks-details").hidden = well.length === 0;
-  told(open.some(({ verdict }) => verdict === "wrong"));
+  report(open.some(({ verdict }) => verdict === "wrong"));
 }
 
 async function check() {
@@ -73,7 +73,7 @@ function checkSoon() {
  * @param {(wrong: boolean) => void} found called with whether something must be put right before a trial
  */
 export function followChecks(found) {
-  told = found;
+  report = found;
   button.addEventListener("click", check);
   check();
   return checkSoon;

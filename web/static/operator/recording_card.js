@@ -11,13 +11,13 @@ const EVERY_MS = 2000;
 const button = byId("record", HTMLButtonElement);
 let recording = false;
 let busy = false;
-/** The notice about a recording before the session under way. */
-let told = "";
+/** The notice that was on the page when the session under way began; it is not shown again. */
+let dismissed = "";
 let notice = "";
 
 /** Another session begins: the notice about an earlier one's recording is no longer shown. */
 export function forgetNotice() {
-  told = notice;
+  dismissed = notice;
   byId("recording-notice").hidden = true;
 }
 
@@ -41,11 +41,11 @@ function draw(status) {
 function drawNotice({ notice: now, notice_warns: warns }) {
   notice = now ?? "";
   // After another recording the same notice is news again.
-  if (recording) told = "";
+  if (recording) dismissed = "";
   const line = byId("recording-notice");
   line.className = warns ? "notice-line warn" : "notice-line";
   line.setAttribute("role", warns ? "alert" : "status");
-  const isNews = !recording && notice !== "" && notice !== told;
+  const isNews = !recording && notice !== "" && notice !== dismissed;
   setText(line, isNews ? notice : "");
   line.hidden = !isNews;
 }

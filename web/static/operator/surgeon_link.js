@@ -26,7 +26,7 @@ async function askAgain() {
   }
 }
 
-/** @param {Api.Schemas["SurgeonLink"]} told */
+/** @param {Api.Schemas["SurgeonLink"]} answer */
 function draw({ link, qr }) {
   const field = byId("surgeon-link", HTMLInputElement);
   // Somebody may be copying the link that is shown.

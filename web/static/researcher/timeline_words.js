@@ -78,11 +78,11 @@ function answerWords(value) {
 export function outstandingWords(outstanding, timeOf) {
   if (!outstanding) return null;
   const { counts_until: until, devices } = outstanding;
-  const said = [];
-  if (until) said.push(`Comments and answers still on a tablet count until ${timeOf(until)}.`);
+  const sentences = [];
+  if (until) sentences.push(`Comments and answers still on a tablet count until ${timeOf(until)}.`);
   if (devices > 0) {
     const tablets = devices === 1 ? "One tablet has" : `${devices} tablets have`;
-    said.push(`${tablets} not confirmed since the end that everything was sent.`);
+    sentences.push(`${tablets} not confirmed since the end that everything was sent.`);
   }
-  return said.join(" ");
+  return sentences.join(" ");
 }

@@ -97,9 +97,9 @@ function ask(path, asked) {
  */
 function refusal(text, status) {
   try {
-    const said = JSON.parse(text);
-    if (said.sign_in === true) signInNeeded();
-    if (typeof said.error === "string") return new Refused(status, said.error, true);
+    const answer = JSON.parse(text);
+    if (answer.sign_in === true) signInNeeded();
+    if (typeof answer.error === "string") return new Refused(status, answer.error, true);
   } catch {
     // Not JSON: a proxy's page, or a bare status.
   }

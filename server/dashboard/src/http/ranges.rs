@@ -28,12 +28,12 @@ pub(super) fn answer(headers: &HeaderMap, whole: Vec<u8>) -> Response {
     match wanted(asked, length) {
         RequestedRange::Whole => ([accepts], whole).into_response(),
         RequestedRange::Part(part) => {
-            let told = format!("bytes {}-{}/{length}", part.start, part.end - 1);
-            (StatusCode::PARTIAL_CONTENT, [accepts, (CONTENT_RANGE, told)], whole.slice(part)).into_response()
+            let content_range = format!("bytes {}-{}/{length}", part.start, part.end - 1);
+            (StatusCode::PARTIAL_CONTENT, [accepts, (CONTENT_RANGE, content_range)], whole.slice(part)).into_response()
         }
         RequestedRange::Beyond => {
-            let told = format!("bytes */{length}");
-            (StatusCode::RANGE_NOT_SATISFIABLE, [accepts, (CONTENT_RANGE, told)]).into_response()
+            let content_range = format!("bytes */{length}");
+            (StatusCode::RANGE_NOT_SATISFIABLE, [accepts, (CONTENT_RANGE, content_range)]).into_response()
         }
     }
 }

@@ -51,13 +51,13 @@ pub enum BlurKnowledge {
 }
 
 /// Makes [`SEEDS`] courses over `source` at each scale.
-fn items(source: &StackSource, first_seed: u64, told: BlurKnowledge) -> Result<Vec<Item>, UnfitStack> {
+fn items(source: &StackSource, first_seed: u64, knowledge: BlurKnowledge) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
-        let blur = match told {
+        let blur = match knowledge {
             BlurKnowledge::Nothing => None,
             BlurKnowledge::Rate(rate) => Some(rate),
             BlurKnowledge::Measured => scaled.blur_rate(),
@@ -136,7 +136,7 @@ pub fn evaluate_stacks(
     policies: &[PolicyName],
     sources: &[StackSource],
     seed: u64,
-    told: BlurKnowledge,
+    knowledge: BlurKnowledge,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
@@ -146,7 +146,8 @@ pub fn evaluate_stacks(
         }
     }
 
-    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, told)).collect::<Result<_, _>>()?;
+    let items: Vec<Vec<Item>> =
+        sources.par_iter().map(|source| items(source, seed, knowledge)).collect::<Result<_, _>>()?;
     let mut stacks = Vec::new();
     let mut all = Vec::new();
 

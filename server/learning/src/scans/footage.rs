@@ -82,10 +82,10 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         .output()
         .map_err(footage::FootageError::NoDecoder)?;
 
-    let told = String::from_utf8_lossy(&output.stderr);
-    let told = told.lines().last();
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    let complaint = complaint.lines().last();
     if !output.status.success() {
-        return Err(unreadable(path, &format!("ffmpeg: {}", told.unwrap_or("failed"))));
+        return Err(unreadable(path, &format!("ffmpeg: {}", complaint.unwrap_or("failed"))));
     }
 
     let mut frames: Vec<Arc<GrayImage>> = pictures(&output.stdout).map(Arc::new).collect();
@@ -95,8 +95,8 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
 
     let cut = if frames.len() > FRAMES { None } else { cut_off(path) };
     let cut = cut.map_or_else(String::new, |cut| format!("; {cut}"));
-    if told.is_some() || !cut.is_empty() {
-        let why = told.map_or_else(|| "cut off".to_owned(), |told| format!("damaged (ffmpeg: {told})"));
+    if complaint.is_some() || !cut.is_empty() {
+        let why = complaint.map_or_else(|| "cut off".to_owned(), |complaint| format!("damaged (ffmpeg: {complaint})"));
         let count = frames.len();
         tell(format_args!("note: {} is {why}; {count} frames of it could be read{cut}", path.display()));
     }

@@ -45,7 +45,7 @@ struct Actor {
 const NARROW: f64 = 0.1;
 
 /// Share of scans in which the tracker gets the blur rate of the optics as an input.
-const TOLD: f64 = 0.4;
+const KNOWN: f64 = 0.4;
 /// Error of that blur rate: standard deviation of its logarithm around the true one's.
 const MEASURED: f64 = 0.15;
 
@@ -193,11 +193,11 @@ impl Trainer for BeliefTrainer {
 impl Actor {
     fn draw(recipe: &BeliefRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
         let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
-        let told = rng.random_bool(TOLD);
+        let is_known = rng.random_bool(KNOWN);
         let wider = if rng.random_bool(NARROW) { rng.random_range(0..WIDER.len()) } else { WIDER.len() };
 
         let measured = |blur: BlurRate| BlurRate::new(blur.get() * (MEASURED * standard_normal(rng)).exp());
-        let blur = environment.blur().and_then(measured).filter(|_| told);
+        let blur = environment.blur().and_then(measured).filter(|_| is_known);
         Self { environment, trace: Trace::knowing(blur), windows_left: recipe.windows_a_scan, wider }
     }
 

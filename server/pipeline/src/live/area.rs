@@ -17,7 +17,7 @@ const MISSES: u32 = 10;
 /// The area last reported to the loop, and what has been seen since.
 #[derive(Debug, Default)]
 pub struct AreaWatch {
-    told: Option<ContentArea>,
+    published: Option<ContentArea>,
     /// A circle far from the reported one, which the next detection may confirm.
     doubted: Option<ContentArea>,
     misses: u32,
@@ -30,11 +30,13 @@ impl AreaWatch {
         self.misses = if found.is_some() { 0 } else { self.misses + 1 };
         let doubted = self.doubted.take();
 
-        let news = match (self.told, found) {
+        let news = match (self.published, found) {
             (None, None) => false,
             (None, Some(_)) => true,
             (Some(_), None) => self.misses >= MISSES,
-            (Some(told), Some(found)) if distance(&told, &found) <= JUMP => distance(&told, &found) > MOVED,
+            (Some(published), Some(found)) if distance(&published, &found) <= JUMP => {
+                distance(&published, &found) > MOVED
+            }
             (Some(_), Some(found)) => {
                 let confirmed = doubted.is_some_and(|doubted| distance(&doubted, &found) <= JUMP);
                 self.doubted = (!confirmed).then_some(found);
@@ -43,7 +45,7 @@ impl AreaWatch {
         };
 
         news.then(|| {
-            self.told = found;
+            self.published = found;
             found
         })
     }

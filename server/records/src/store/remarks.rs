@@ -206,12 +206,12 @@ impl Reader {
 
         let report = |row: &SqliteRow| {
             let holding: Option<u32> = row.try_get("holding")?;
-            let told = match holding {
+            let report = match holding {
                 Some(holding) => Some((holding, row.try_get("run")?, moment(row.try_get("monotonic_ns")?))),
                 None => None,
             };
 
-            Ok(DeviceReport { device: parsed(row, "device")?, told })
+            Ok(DeviceReport { device: parsed(row, "device")?, report })
         };
 
         rows.iter().map(report).collect()

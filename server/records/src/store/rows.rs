@@ -77,7 +77,7 @@ impl Answer {
         GivenAnswer {
             device: self.origin.device,
             sequence: self.origin.sequence,
-            at: clocks.said(run, self.stamp.at, &self.origin),
+            at: clocks.entered_at(run, self.stamp.at, &self.origin),
             late: self.late,
             value: self.value.clone(),
         }
@@ -98,14 +98,14 @@ pub struct DeviceReport {
     /// The device.
     pub device: DeviceId,
     /// How many it held, the run in which it reported this, and when; `None` if it never reported.
-    pub told: Option<(u32, i64, Moment)>,
+    pub report: Option<(u32, i64, Moment)>,
 }
 
 impl DeviceReport {
     /// How many the device held, and when it reported this, by `clocks`; `None` if it never reported.
     #[must_use]
     pub fn told_on(&self, clocks: &RunClocks) -> Option<(u32, Timestamp)> {
-        let (holding, run, at) = self.told?;
+        let (holding, run, at) = self.report?;
         Some((holding, clocks.wall(run, at)))
     }
 }
@@ -209,7 +209,7 @@ impl RunClocks {
     /// When a comment or answer was entered that arrived at `at` in run `run`: the arrival minus its wait on the
     /// surgeon's device.
     #[must_use]
-    pub fn said(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
+    pub fn entered_at(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
         let arrived = self.wall(run, at);
         let waited = Duration::from_millis(origin.waited_millis.map_or(0, i64::unsigned_abs));
         arrived.saturating_sub(waited).unwrap_or(arrived)

@@ -102,10 +102,10 @@ async fn chain(snapshot: &Reader, expected: Option<Head>) -> Result<String, Wron
     }
 
     let waiting = unchained(&mut connection, &walk).await?;
-    let said = walk.end()?;
+    let summary = walk.end()?;
     Ok(match waiting {
-        0 => said,
-        _ => format!("{said}; the latest {waiting} steps of telemetry are not chained yet"),
+        0 => summary,
+        _ => format!("{summary}; the latest {waiting} steps of telemetry are not chained yet"),
     })
 }
 

@@ -71,8 +71,8 @@ impl Reader {
             Thoroughness::Quick => "PRAGMA quick_check(1)",
             Thoroughness::Full => "PRAGMA integrity_check(1)",
         };
-        let said: Option<String> = sqlx::query_scalar(pragma).fetch_optional(self.pool()).await?;
-        match said.as_deref() {
+        let answer: Option<String> = sqlx::query_scalar(pragma).fetch_optional(self.pool()).await?;
+        match answer.as_deref() {
             Some("ok") => Ok(()),
             // The problem is in the last line, below a heading that names the database.
             Some(wrong) => Err(StoreError::Damaged(wrong.lines().last().unwrap_or_default().to_owned())),

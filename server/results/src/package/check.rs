@@ -75,8 +75,8 @@ fn checksums(folder: &Path) -> Result<Verdict, String> {
 /// Joins the exports again, and compares every file.
 fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
     let package = ExportFiles::of(folder).json("datapackage.json")?;
-    let told = &package["parfocal"];
-    let version = told["version"].as_str().unwrap_or_default();
+    let described = &package["parfocal"];
+    let version = described["version"].as_str().unwrap_or_default();
     if version != env!("CARGO_PKG_VERSION") {
         return Ok(Verdict::NotChecked(format!("parfocal {version} joined them; verify with that version")));
     }

@@ -74,7 +74,7 @@ impl Source {
         }
 
         let package = export.json("datapackage.json").map_err(unreadable)?;
-        let told = &package["parfocal"];
+        let described = &package["parfocal"];
         let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let cell = |file: &str, column: &str| {
@@ -85,13 +85,13 @@ impl Source {
         Ok(Self {
             folder: folder.to_owned(),
             session: cell("sessions.csv", "session")?,
-            study: text(&told["study"]).ok_or_else(outside)?,
+            study: text(&described["study"]).ok_or_else(outside)?,
             site: cell("study_sessions.csv", "site")?,
-            definition_sha256: text(&told["study_definition_sha256"]).ok_or_else(outside)?,
-            blinded: told["blinded"].as_bool().unwrap_or(true),
+            definition_sha256: text(&described["study_definition_sha256"]).ok_or_else(outside)?,
+            blinded: described["blinded"].as_bool().unwrap_or(true),
             head: (
-                told["chain"]["number"].as_u64().unwrap_or_default(),
-                text(&told["chain"]["hash"]).unwrap_or_default(),
+                described["chain"]["number"].as_u64().unwrap_or_default(),
+                text(&described["chain"]["hash"]).unwrap_or_default(),
             ),
         })
     }

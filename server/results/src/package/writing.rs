@@ -46,7 +46,7 @@ pub enum Sessions {
 }
 
 /// Writes the package of `sources` to the folder `out`, which must be new or empty and appears complete or not at all.
-/// Calls `told` with the number of steps done and the number of all steps.
+/// Calls `progress` with the number of steps done and the number of all steps.
 ///
 /// # Errors
 /// If there is no source, two of them do not belong together, or a file cannot be read or written.
@@ -55,7 +55,7 @@ pub fn write(
     sessions: Sessions,
     left_out: &[LeftOut],
     out: &Path,
-    told: &mut (dyn FnMut(usize, usize) + Send),
+    progress: &mut (dyn FnMut(usize, usize) + Send),
 ) -> Result<Summary, PackageError> {
     // In the order in which `check` finds them again: by the names of their folders.
     let mut sources = sources.to_vec();
@@ -71,7 +71,7 @@ pub fn write(
     let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
     let temporary = temporary.map_err(PackageError::unwritable(parent))?;
 
-    fill(sources, sessions, left_out, temporary.path(), told)?;
+    fill(sources, sessions, left_out, temporary.path(), progress)?;
 
     put_folder(&temporary.keep(), out).map_err(PackageError::unwritable(out))?;
     sync_folder_of(out);
@@ -97,10 +97,10 @@ fn fill(
     sessions: Sessions,
     left_out: &[LeftOut],
     folder: &Path,
-    told: StepsCallback,
+    progress: StepsCallback,
 ) -> Result<(), PackageError> {
     let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
-    let steps = Steps::new(sources, sessions, &tables, told);
+    let steps = Steps::new(sources, sessions, &tables, progress);
 
     let mut taken = Vec::new();
     for source in sources {
@@ -131,19 +131,19 @@ struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], told: StepsCallback<'a>) -> Self {
+    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], progress: StepsCallback<'a>) -> Self {
         let copied = if sessions == Sessions::Copied { sources.len() } else { 0 };
         let joined = tables.iter().map(|table| if table.long { sources.len() } else { 1 });
         let all = copied + joined.sum::<usize>() + 1;
-        told(0, all);
-        Self { all, done: Mutex::new((0, told)) }
+        progress(0, all);
+        Self { all, done: Mutex::new((0, progress)) }
     }
 
     fn done(&self) {
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
         done.0 += 1;
-        let (count, told) = &mut *done;
-        told(*count, self.all);
+        let (count, progress) = &mut *done;
+        progress(*count, self.all);
     }
 }
 

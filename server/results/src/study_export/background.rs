@@ -226,12 +226,12 @@ impl Job {
 
         let exports = self.exports.clone();
         let study = self.study.clone();
-        let told = move |progress| {
+        let report = move |progress| {
             if let Some(latest) = exports.lock().get_mut(&study) {
                 latest.stage = Stage::Running(progress);
             }
         };
-        let summary = export_study(recorder, &self.study, self.unblinded, &package, Arc::new(told)).await?;
+        let summary = export_study(recorder, &self.study, self.unblinded, &package, Arc::new(report)).await?;
 
         let room = Arc::new(room);
         let sessions = summary.sessions;

@@ -55,10 +55,10 @@ pub async fn export_study(
     study: &str,
     unblinded: bool,
     out: &Path,
-    told: ProgressCallback,
+    progress: ProgressCallback,
 ) -> Result<Summary, StudyExportError> {
     let (sessions, left_out) = sessions_of(recorder.reader(), study, unblinded).await?;
-    let making = Making { recorder: recorder.clone(), sessions, left_out, unblinded, out: out.to_owned(), told };
+    let making = Making { recorder: recorder.clone(), sessions, left_out, unblinded, out: out.to_owned(), progress };
 
     let runtime = Handle::current();
     let (done, made) = oneshot::channel();
@@ -120,7 +120,7 @@ struct Making {
     left_out: Vec<LeftOut>,
     unblinded: bool,
     out: PathBuf,
-    told: ProgressCallback,
+    progress: ProgressCallback,
 }
 
 impl Making {
@@ -137,7 +137,7 @@ impl Making {
 
         let all = self.sessions.len();
         let summary = package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
-            (self.told)(Progress { sessions: all, exported: all, steps, joined });
+            (self.progress)(Progress { sessions: all, exported: all, steps, joined });
         })?;
         Ok(summary)
     }
@@ -168,7 +168,7 @@ impl Making {
     }
 
     fn tell(&self, exported: usize) {
-        (self.told)(Progress { sessions: self.sessions.len(), exported, steps: 0, joined: 0 });
+        (self.progress)(Progress { sessions: self.sessions.len(), exported, steps: 0, joined: 0 });
     }
 }
 

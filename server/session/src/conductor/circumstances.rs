@@ -67,9 +67,9 @@ impl Shared {
     ) -> Result<Option<Outstanding>, ConductError> {
         let devices = self.store.reader().surgeon_devices(session).await?;
         let clocks = &self.run_clock.clocks;
-        let told = devices.iter().map(|device| device.told_on(clocks));
+        let reports = devices.iter().map(|device| device.told_on(clocks));
 
         let now = self.run_clock.time(self.clock.now());
-        Ok(grace.outstanding(now, told))
+        Ok(grace.outstanding(now, reports))
     }
 }

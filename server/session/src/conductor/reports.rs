@@ -279,7 +279,7 @@ impl Conductor {
                 devices_disagree: standing.disagrees,
             };
 
-            lines.push((clocks.said(run, answer.stamp.at, &answer.origin), line));
+            lines.push((clocks.entered_at(run, answer.stamp.at, &answer.origin), line));
         }
 
         lines.sort_by_key(|(given, _)| *given);
@@ -289,8 +289,9 @@ impl Conductor {
 
 /// The scores of an answer without missing items. The weights of a workload index are left out.
 fn scores(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
-    let told = |measure: &Measure| measure.score && measure.value.is_some() && !measure.name.starts_with("weight-of-");
-    measures(kind, value).into_iter().filter(told).collect()
+    let is_shown =
+        |measure: &Measure| measure.score && measure.value.is_some() && !measure.name.starts_with("weight-of-");
+    measures(kind, value).into_iter().filter(is_shown).collect()
 }
 
 fn settings(course: &Course) -> Vec<SettingDetail> {

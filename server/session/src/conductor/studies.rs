@@ -227,8 +227,8 @@ impl Studies {
         for enrolled in &study.sessions {
             let Some(stored) = reader.session(enrolled.session).await? else { continue };
             let devices = reader.surgeon_devices(enrolled.session).await?;
-            let told = devices.iter().map(|device| device.told_on(&clocks));
-            outstanding += usize::from(stored.grace(&clocks).outstanding(now, told).is_some());
+            let reports = devices.iter().map(|device| device.told_on(&clocks));
+            outstanding += usize::from(stored.grace(&clocks).outstanding(now, reports).is_some());
         }
         Ok(outstanding)
     }

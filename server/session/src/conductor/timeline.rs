@@ -198,8 +198,8 @@ impl Conductor {
         let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
         let withdrawn = withdrawn(&comments);
-        let said = comments.into_iter().filter(|(_, comment)| comment.said.says_something());
-        let comments = said.map(|(run, comment)| TimelineComment {
+        let spoken = comments.into_iter().filter(|(_, comment)| comment.said.says_something());
+        let comments = spoken.map(|(run, comment)| TimelineComment {
             key: comment.key,
             withdrawn: withdrawn.contains_key(&comment.key),
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
@@ -207,7 +207,7 @@ impl Conductor {
             voice: (comment.said == CommentContent::Voice)
                 .then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
             at: comment.stamp.wall,
-            seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
+            seconds: seconds(start, runs.entered_at(run, comment.stamp.at, &comment.origin)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),
             frame: comment.frame,
             picture_width: comment.sight.picture_width,
@@ -303,11 +303,11 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
     let standings = standings(answers, runs);
     let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
     let aside = answers.iter().zip(&standings).filter(|((_, answer), standing)| is_aside(answer, standing));
-    let told = aside.map(|((run, answer), _)| {
+    let points = aside.map(|((run, answer), _)| {
         let question = course.protocol.question(&answer.question, answer.segment.is_some());
         SetAside {
             at: answer.stamp.wall,
-            seconds: seconds(start, runs.said(*run, answer.stamp.at, &answer.origin)).max(0.0),
+            seconds: seconds(start, runs.entered_at(*run, answer.stamp.at, &answer.origin)).max(0.0),
             setting: answer.segment.map(|segment| course.setting(segment)),
             question: answer.question.clone(),
             text: question.map(|question| question.text.clone()).unwrap_or_default(),
@@ -317,7 +317,7 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
         }
     });
 
-    told.collect()
+    points.collect()
 }
 
 fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {

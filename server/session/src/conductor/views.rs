@@ -62,21 +62,21 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         questions: state.questions().to_vec(),
         answers: answers(course),
         comments: course.standing_comments().len(),
-        said: if state.phase() == Phase::Closing { said(course) } else { Vec::new() },
+        said: if state.phase() == Phase::Closing { comments_by_setting(course) } else { Vec::new() },
     }
 }
 
 /// What the surgeon said in words of each setting, so that the closing questions can recall it.
-fn said(course: &Course) -> Vec<Vec<String>> {
-    let mut said = vec![Vec::new(); course.state.plan().segments.len()];
+fn comments_by_setting(course: &Course) -> Vec<Vec<String>> {
+    let mut settings = vec![Vec::new(); course.state.plan().segments.len()];
     for comment in course.standing_comments() {
         let (CommentContent::Text(text) | CommentContent::Quick(text)) = &comment.said else { continue };
-        let place = comment.setting.and_then(|setting| said.get_mut(setting.checked_sub(1)?));
+        let place = comment.setting.and_then(|setting| settings.get_mut(setting.checked_sub(1)?));
         if let Some(words) = place.filter(|_| !text.is_empty()) {
             words.push(text.clone());
         }
     }
-    said
+    settings
 }
 
 /// Whether the surgeon can pause the session now.

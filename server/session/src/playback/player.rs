@@ -70,7 +70,9 @@ impl Player {
     pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, PlaybackError> {
         let played = self.0.conductor.to_play(by, session).await?;
         let folder = self.0.folder.clone();
-        let found = spawn_blocking(move || of_session(&folder, &session.to_string()).map(|found| told(found, &played)));
+        let found = spawn_blocking(move || {
+            of_session(&folder, &session.to_string()).map(|found| session_recordings(found, &played))
+        });
 
         let found = found.await.map_err(|_| PlaybackError::Ending)?;
         Ok(found.unwrap_or_else(|error| SessionRecordings {
@@ -121,10 +123,10 @@ impl Player {
 }
 
 /// Describes the recordings that were found, and their problems.
-fn told(found: Vec<FoundRecording>, played: &Played) -> SessionRecordings {
-    let mut told = SessionRecordings { recordings: Vec::new(), problems: Vec::new() };
+fn session_recordings(found: Vec<FoundRecording>, played: &Played) -> SessionRecordings {
+    let mut listed = SessionRecordings { recordings: Vec::new(), problems: Vec::new() };
     if found.is_empty() && played.asked != Record::None {
-        told.problems.push(format!(
+        listed.problems.push(format!(
             "The protocol asked for a recording, but there is none of this session in the folder {FOLDER} of the data \
              folder. It was moved or removed, or never begun."
         ));
@@ -132,22 +134,22 @@ fn told(found: Vec<FoundRecording>, played: &Played) -> SessionRecordings {
 
     for (name, opened) in found {
         match opened {
-            Ok(recording) => tell(&name, &recording, played, &mut told),
-            Err(error) => told.problems.push(format!("The recording {name} cannot be played. {}", sentence(&error))),
+            Ok(recording) => add_recording(&name, &recording, played, &mut listed),
+            Err(error) => listed.problems.push(format!("The recording {name} cannot be played. {}", sentence(&error))),
         }
     }
-    told.recordings.sort_by(|a, b| a.from.total_cmp(&b.from));
-    told
+    listed.recordings.sort_by(|a, b| a.from.total_cmp(&b.from));
+    listed
 }
 
-fn tell(name: &str, recording: &AnyRecording, played: &Played, told: &mut SessionRecordings) {
+fn add_recording(name: &str, recording: &AnyRecording, played: &Played, listed: &mut SessionRecordings) {
     if recording.ended().is_none() && played.ended {
-        told.problems.push(format!("The recording {name} was cut short. What was stored before can be played."));
+        listed.problems.push(format!("The recording {name} was cut short. What was stored before can be played."));
     }
 
     let times = recording.times();
     let Some(&first) = times.first() else {
-        told.problems.push(format!("The recording {name} holds no frame."));
+        listed.problems.push(format!("The recording {name} holds no frame."));
         return;
     };
 
@@ -156,7 +158,7 @@ fn tell(name: &str, recording: &AnyRecording, played: &Played, told: &mut Sessio
         Some((run, monotonic_ns)) => played.seconds_at(run, monotonic_ns.saturating_add(first)),
         None => played.seconds_of(recording.started()) + nanoseconds(first),
     };
-    told.recordings.push(RecordingCourse {
+    listed.recordings.push(RecordingCourse {
         name: name.to_owned(),
         kind: recording.kind(),
         from,

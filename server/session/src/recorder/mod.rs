@@ -123,7 +123,7 @@ impl Recordings {
         let room = room(&parts.folder).ok();
         let state = self.0.state();
 
-        let mut told = RecordingStatus {
+        let mut report = RecordingStatus {
             unavailable: parts.size.is_none().then(|| StartError::NoMosaics.to_string()),
             notice: state.notice.as_ref().map(|notice| notice.text.clone()),
             notice_warns: state.notice.as_ref().is_some_and(|notice| notice.warns),
@@ -133,25 +133,25 @@ impl Recordings {
         };
 
         let idle = state.frame_bytes.map(|bytes| bytes as f64 * status.camera.fps);
-        told.bytes_per_second = idle.filter(|_| parts.size.is_some());
+        report.bytes_per_second = idle.filter(|_| parts.size.is_some());
 
         if let Some(active) = &state.active {
             let progress = active.what.progress();
             let seconds = parts.clock.now().since(active.began).as_secs_f64();
             let measured = (progress.frames > 0).then(|| progress.bytes as f64 / progress.frames as f64);
-            told.bytes_per_second = measured.map(|bytes| bytes * status.camera.fps).or(told.bytes_per_second);
-            told.recording = Some(active.what.kind());
-            told.folder = active.what.folder().file_name().map(|name| name.to_string_lossy().into_owned());
-            told.by_protocol = active.by_protocol;
-            told.seconds = Some(seconds);
-            told.frames = progress.frames;
-            told.lost = progress.lost;
-            told.bytes = progress.bytes;
+            report.bytes_per_second = measured.map(|bytes| bytes * status.camera.fps).or(report.bytes_per_second);
+            report.recording = Some(active.what.kind());
+            report.folder = active.what.folder().file_name().map(|name| name.to_string_lossy().into_owned());
+            report.by_protocol = active.by_protocol;
+            report.seconds = Some(seconds);
+            report.frames = progress.frames;
+            report.lost = progress.lost;
+            report.bytes = progress.bytes;
         }
 
-        let rate = told.bytes_per_second.filter(|rate| *rate > 0.0);
-        told.seconds_left = room.zip(rate).map(|(room, rate)| room.spare() as f64 / rate);
-        told
+        let rate = report.bytes_per_second.filter(|rate| *rate > 0.0);
+        report.seconds_left = room.zip(rate).map(|(room, rate)| room.spare() as f64 / rate);
+        report
     }
 
     /// Starts the recording that the session under way asks for, and ends it with the session.

@@ -45,9 +45,9 @@ pub(super) fn close(code: u16, reason: &'static str) -> Message {
     Message::Close(Some(CloseFrame { code, reason: reason.into() }))
 }
 
-/// `told` as a text message; `None` if it cannot be serialised.
-pub(super) fn tell(told: &impl Serialize) -> Option<Message> {
-    let text = serde_json::to_string(told)
+/// `value` as a text message; `None` if it cannot be serialised.
+pub(super) fn tell(value: &impl Serialize) -> Option<Message> {
+    let text = serde_json::to_string(value)
         .inspect_err(|error| tracing::error!(%error, "state could not be serialised"))
         .ok()?;
     Some(Message::Text(text.into()))

@@ -170,7 +170,7 @@ struct Desk<A: Audience> {
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
     /// The last status sent, so that only changes are sent.
-    told: Option<A::Status>,
+    sent_status: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
     ping: tokio::time::Interval,
     /// Resolves when a surgeon's page is no longer admitted.
@@ -212,7 +212,7 @@ impl<A: Audience> Desk<A> {
             due: Instant::now() + link::PATIENCE,
             sessions,
             statuses,
-            told: None,
+            sent_status: None,
             shutdown: app.shutdown.clone(),
             ping,
             over: is_over(&app, pass),
@@ -383,12 +383,12 @@ impl<A: Audience> Desk<A> {
 
     fn status(&mut self) -> Option<Message> {
         let status = A::status(&self.statuses.borrow_and_update(), &self.app);
-        if self.told.as_ref() == Some(&status) {
+        if self.sent_status.as_ref() == Some(&status) {
             return None;
         }
 
         let message = tell(&ServerMessage::<&A::Session, _>::Status(&status));
-        self.told = Some(status);
+        self.sent_status = Some(status);
         message
     }
 

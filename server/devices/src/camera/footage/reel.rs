@@ -12,6 +12,8 @@ use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{DecodeError, Picture, PictureFile, PixelFormat, RgbImage, decode_raw, is_mosaic};
 
+/// Why a mosaic is no footage: its colours would have to be marked as estimated, which footage's are not.
+const MOSAIC: &str = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import it as part of a scan";
 /// Time for which a still is shown.
 const STILL: Duration = Duration::from_secs(5);
 
@@ -29,6 +31,9 @@ impl Reel {
         let metadata = std::fs::metadata(path).map_err(|error| FootageError::unreadable(path, error))?;
         if metadata.is_dir() {
             return Stills::open(pictures_in(path)?).map(Self::Stills);
+        }
+        if is_raw(path) {
+            return Err(FootageError::unreadable(path, MOSAIC));
         }
         if is_picture(path) {
             return Stills::open(vec![path.to_owned()]).map(Self::Stills);
@@ -128,9 +133,7 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let picture = picture.map_err(|error| FootageError::unreadable(file, error))?;
 
     if is_mosaic(&picture) {
-        // A mosaic's colours would have to be marked as estimated, which footage's are not.
-        let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import it as part of a scan";
-        return Err(FootageError::unreadable(file, reason));
+        return Err(FootageError::unreadable(file, MOSAIC));
     }
 
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
@@ -175,6 +178,15 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_raw_mosaic_is_no_footage() {
+        let folder = tempfile::tempdir().unwrap();
+        let raw = folder.path().join("frame.RAW");
+        std::fs::write(&raw, [0; 100]).unwrap();
+        let error = Reel::open(&raw).err().unwrap().to_string();
+        assert!(error.contains("frame.RAW: it is a sensor's mosaic: look at it with `parfocal inspect`"), "{error}");
+    }
 
     #[test]
     fn a_computers_own_files_are_no_pictures() {

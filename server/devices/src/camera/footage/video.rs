@@ -130,8 +130,8 @@ fn check(path: &Path) -> Result<(), FootageError> {
         return Ok(());
     }
 
-    let told = String::from_utf8_lossy(&tried.stderr);
-    let last = told.lines().last().unwrap_or("no reason given");
+    let complaint = String::from_utf8_lossy(&tried.stderr);
+    let last = complaint.lines().last().unwrap_or("no reason given");
     Err(FootageError::unreadable(path, format!("ffmpeg finds no video in it ({last})")))
 }
 

@@ -56,7 +56,7 @@ impl GigeCamera {
             return Err(CameraError::BadSource(listing()));
         }
 
-        let (tell, told) = mpsc::channel();
+        let (sender, receiver) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("gige".into())
             .spawn(move || {
@@ -67,7 +67,7 @@ impl GigeCamera {
                     Ok(device) => (Some(device), String::new()),
                     Err(error @ DeviceError::Away(_)) if patient => (None, named(error)),
                     Err(error) => {
-                        let _ = tell.send(Err(named(error)));
+                        let _ = sender.send(Err(named(error)));
                         return;
                     }
                 };
@@ -80,12 +80,12 @@ impl GigeCamera {
                 } else {
                     tracing::warn!("{trouble}; looking for it");
                 }
-                let _ = tell.send(Ok((size, Arc::clone(&shared))));
+                let _ = sender.send(Ok((size, Arc::clone(&shared))));
                 worker::run(&shared, &setup, device, size);
             })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
 
-        let opened = told.recv().unwrap_or_else(|_| Err("the camera's thread ended at once".to_owned()));
+        let opened = receiver.recv().unwrap_or_else(|_| Err("the camera's thread ended at once".to_owned()));
         let (size, shared) = opened.map_err(CameraError::BadSource)?;
         Ok(Self { size, shared, thread: Some(thread) })
     }

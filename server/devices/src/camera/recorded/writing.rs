@@ -108,8 +108,8 @@ impl Recording {
             let png = png(picture)?;
 
             // The file is named by three decimals of the power, or by all digits if three do not tell the powers apart.
-            let told = if unlike.len() == shot.images.len() { rounded(power.get()) } else { power.get().to_string() };
-            let file = format!("{name}_f{told}.png");
+            let digits = if unlike.len() == shot.images.len() { rounded(power.get()) } else { power.get().to_string() };
+            let file = format!("{name}_f{digits}.png");
 
             write_through(&partial.join(&file), &png)?;
             Ok(Image { focal_power: *power, file: format!("{name}/{file}"), sha256: hex::encode(Sha256::digest(&png)) })

@@ -55,13 +55,13 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
     let worst = stack.planes().iter().max_by(|a, b| saturated(a).total_cmp(&saturated(b)));
     let Some((name, share)) = worst.map(|plane| (&plane.name, saturated(plane))) else { return Ok(()) };
 
-    let told = format!("{:.0} % of {name} is overexposed", 100.0 * share);
+    let note = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
-        return Err(unfit(format!("{told}, where focus cannot be judged; shorten the exposure and take it again")));
+        return Err(unfit(format!("{note}, where focus cannot be judged; shorten the exposure and take it again")));
     }
 
     if share > 0.05 {
-        notes.push(told);
+        notes.push(note);
     }
     Ok(())
 }
@@ -423,13 +423,13 @@ mod tests {
     fn pictures_out_of_order_are_noted() {
         let mut planes = stack(21, |_, picture| picture).planes().to_vec();
         planes[12].position = 2.5;
-        let told = check(&FocalStack::new(planes).unwrap()).unwrap();
-        assert!(told.len() == 1 && told[0].starts_with("12.png is not in order of focus"), "{told:?}");
+        let notes = check(&FocalStack::new(planes).unwrap()).unwrap();
+        assert!(notes.len() == 1 && notes[0].starts_with("12.png is not in order of focus"), "{notes:?}");
 
         // Pictures with blur from 3.8 to 1.8 pixels are missing.
         let sigmas = [4.4, 4.2, 4.0].into_iter().chain((0..17_i32).map(|step| 0.2 * f64::from((8 - step).abs())));
-        let told = check(&blurred_by(sigmas, |_, picture| picture)).unwrap();
-        assert!(told.len() == 1 && told[0].starts_with("focus jumps between 02.png and 03.png"), "{told:?}");
+        let notes = check(&blurred_by(sigmas, |_, picture| picture)).unwrap();
+        assert!(notes.len() == 1 && notes[0].starts_with("focus jumps between 02.png and 03.png"), "{notes:?}");
     }
 
     #[test]
@@ -450,7 +450,7 @@ mod tests {
             }
             picture
         };
-        let told = check(&stack(11, passing)).unwrap();
-        assert!(told.iter().any(|note| note.contains("moves at 80,40 between 03.png and 04.png")), "{told:?}");
+        let notes = check(&stack(11, passing)).unwrap();
+        assert!(notes.iter().any(|note| note.contains("moves at 80,40 between 03.png and 04.png")), "{notes:?}");
     }
 }

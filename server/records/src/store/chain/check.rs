@@ -222,14 +222,14 @@ impl Walk {
             ));
         }
 
-        let mut said = vec![format!("{} rows, {} of them whole; head {}", self.last.number, self.whole, self.last)];
+        let mut parts = vec![format!("{} rows, {} of them whole; head {}", self.last.number, self.whole, self.last)];
         if self.erased_rows > 0 {
-            said.push(format!("{} have erased words", self.erased_rows));
+            parts.push(format!("{} have erased words", self.erased_rows));
         }
         if self.withheld > 0 {
-            said.push(format!("{} are withheld in part", self.withheld));
+            parts.push(format!("{} are withheld in part", self.withheld));
         }
-        Ok(said.join("; "))
+        Ok(parts.join("; "))
     }
 }
 

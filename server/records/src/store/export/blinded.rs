@@ -327,7 +327,7 @@ impl Blinded {
                 wall: answer.stamp.wall,
                 run: *run,
                 monotonic_ns: nanoseconds(answer.stamp.at),
-                given: self.clocks.said(*run, answer.stamp.at, &answer.origin),
+                given: self.clocks.entered_at(*run, answer.stamp.at, &answer.origin),
                 client_millis: answer.origin.client_millis,
                 waited_ms: answer.origin.waited_millis,
                 waited_by: answer.origin.waited_by.map(WaitClock::name),

@@ -13,15 +13,15 @@ use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, of_session};
 /// so. A broken recording must not prevent the export of comments.
 pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     let folder = data.join(FOLDER);
-    let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(told).collect());
+    let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(contents).collect());
     let looked = spawn_blocking(look).await;
 
-    let told: Vec<RecordingContents> = match looked {
-        Ok(Ok(told)) => told,
+    let found: Vec<RecordingContents> = match looked {
+        Ok(Ok(found)) => found,
         Ok(Err(error)) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
         Err(error) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
     };
-    told.into_iter().map(|told| row(session, told)).collect()
+    found.into_iter().map(|contents| row(session, contents)).collect()
 }
 
 /// What was read from a recording's folder.
@@ -35,7 +35,7 @@ struct Read {
     sha256: String,
 }
 
-fn told((name, opened): FoundRecording) -> RecordingContents {
+fn contents((name, opened): FoundRecording) -> RecordingContents {
     let read = opened.and_then(|recording| {
         let sha256 = recording.description_sha256()?;
         Ok(Read { recording, sha256 })

@@ -22,14 +22,14 @@ impl ExportedStudy {
         let missing = || StoreError::Damaged(format!("study {} is not there", enrolment.study));
         let study = reader.study(&enrolment.study).await?.ok_or_else(missing)?;
 
-        let told = reader.export_study(&enrolment.study).await?;
+        let exported = reader.export_study(&enrolment.study).await?;
         let state = study.state();
         let row = StudyRow {
             study: enrolment.study.clone(),
             title: study.definition.title.clone(),
-            definition_sha256: told.definition_sha256,
-            sites: told.sites,
-            wall: told.wall,
+            definition_sha256: exported.definition_sha256,
+            sites: exported.sites,
+            wall: exported.wall,
             stage: state.stage.name(),
             commitment: state.commitment,
         };

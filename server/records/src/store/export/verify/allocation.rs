@@ -27,8 +27,8 @@ fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, Strin
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
     }
 
-    let told = AllocationFile::deserialize(&*export.json("allocation.json")?);
-    let told = told.map_err(|error| format!("allocation.json: {error}"))?;
+    let file = AllocationFile::deserialize(&*export.json("allocation.json")?);
+    let file = file.map_err(|error| format!("allocation.json: {error}"))?;
 
     for column in ["session", "setting", "segment"] {
         if export.cells("allocation.csv", column)? != export.cells("segments.csv", column)? {
@@ -37,18 +37,18 @@ fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, Strin
     }
 
     let listed = export.cells("allocation.csv", "policy")?;
-    if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
+    if !listed.iter().map(String::as_str).eq(file.schedule.iter().map(PolicyName::as_str)) {
         return Err("allocation.csv and allocation.json have different orders".to_owned());
     }
 
-    for (column, told) in [("session", told.session.to_string()), ("algorithm", told.algorithm.to_string())] {
-        if export.session_cell(column)? != told {
+    for (column, expected) in [("session", file.session.to_string()), ("algorithm", file.algorithm.to_string())] {
+        if export.session_cell(column)? != expected {
             return Err(format!("allocation.json and sessions.csv have different {column}s"));
         }
     }
 
-    let Some(seed) = told.seed else {
-        if told.algorithm.order() != Order::Balanced {
+    let Some(seed) = file.seed else {
+        if file.algorithm.order() != Order::Balanced {
             return Err("allocation.json withholds the seed, which is right only within a balanced set".to_owned());
         }
         let why = "the seed is withheld while other sessions of its balanced set are blinded";
@@ -58,12 +58,12 @@ fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, Strin
     let seed = Seed::from_hex(&seed).ok_or("allocation.json: the seed is not 64 hexadecimal digits")?;
 
     Ok(Ok(Allocation {
-        session: told.session,
-        algorithm: told.algorithm,
+        session: file.session,
+        algorithm: file.algorithm,
         seed,
-        index: told.index,
+        index: file.index,
         protocol_sha256: Sha256::digest(export.text("protocol.toml")?).into(),
-        schedule: told.schedule,
+        schedule: file.schedule,
     }))
 }
 

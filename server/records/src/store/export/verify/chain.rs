@@ -49,8 +49,9 @@ pub(super) fn chain(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
 /// Checks that the chain ends where the export says, with the record of the export itself.
 fn ends_with_itself(export: &ExportFiles, last: Option<FoundEntry>, head: &Head) -> Result<(), String> {
     let package = export.json("datapackage.json")?;
-    let told = &package["parfocal"]["chain"];
-    let same = told["number"].as_i64() == Some(head.number) && told["hash"].as_str() == Some(head.hash.as_str());
+    let described = &package["parfocal"]["chain"];
+    let same =
+        described["number"].as_i64() == Some(head.number) && described["hash"].as_str() == Some(head.hash.as_str());
     if !same {
         return Err(format!("chain: it ends at {head}, which is not the head in datapackage.json"));
     }
@@ -103,8 +104,8 @@ impl ChainColumns {
             ));
         }
 
-        let told = Some(sealed_salt).filter(|salt| !salt.is_empty()).map(str::to_owned);
-        let sealed_salt = told.or_else(|| salts.get(number).cloned());
+        let in_export = Some(sealed_salt).filter(|salt| !salt.is_empty()).map(str::to_owned);
+        let sealed_salt = in_export.or_else(|| salts.get(number).cloned());
         let entry = FoundEntry::Whole(entry, sealed_salt);
         Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() })
     }
@@ -151,8 +152,8 @@ fn records(export: &ExportFiles) -> Result<BTreeMap<(&'static str, String), Reco
 
     let mut found = BTreeMap::new();
     // Some kinds have no table in exports: of participants, an export has only the session's code.
-    let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table);
-    for kind in kinds().iter().filter(told) {
+    let is_exported = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table);
+    for kind in kinds().iter().filter(is_exported) {
         for mut row in rows(export, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
             let key: Vec<String> = kind.key.iter().map(|column| cell(&row, column)).collect();

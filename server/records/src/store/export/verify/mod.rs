@@ -180,9 +180,9 @@ fn events(export: &ExportFiles) -> Outcome {
 fn said(export: &ExportFiles) -> Outcome {
     let comments = numbered(export, "comments.csv")?;
     let answers = numbered(export, "answers.csv")?;
-    let told = export.session_cell("comments")?;
-    if told != comments.to_string() {
-        return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {told}"));
+    let counted = export.session_cell("comments")?;
+    if counted != comments.to_string() {
+        return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {counted}"));
     }
     counting(export)?;
     Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))

@@ -53,9 +53,9 @@ pub(super) fn study(export: &ExportFiles) -> Outcome {
     let committed = committed.ok_or("study_events.csv: the study was never opened")?;
 
     let Some(statement) = statement(export)? else {
-        let said =
+        let summary =
             "definition and protocol are those of the study; its orders stay secret until all of it is unblinded";
-        return Ok(Verdict::Passed(said.to_owned()));
+        return Ok(Verdict::Passed(summary.to_owned()));
     };
     if commitment(&statement) != committed {
         return Err("allocation.json: the orders of the study are not those committed to when it was opened".to_owned());
