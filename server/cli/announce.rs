@@ -2,6 +2,7 @@
 //! warning about simulated devices.
 
 use std::fmt::Write;
+use std::net::SocketAddr;
 
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
@@ -13,12 +14,13 @@ use parfocal_imaging::Calibration;
 use parfocal_pipeline::control::ControlStatus;
 use parfocal_trial::role::Role;
 
-/// The announcement of a server that is reachable at `reach`. On a `terminal` the QR code has colours.
+/// The announcement of a server that is reachable at `reach`, and by OpenIGTLink at `linked`. On a `terminal` the QR code has colours.
 pub fn announcement(
     reach: &Reach,
     keys: &Keys,
     status: &ControlStatus,
     calibration: &Calibration,
+    linked: Option<SocketAddr>,
     terminal: bool,
 ) -> String {
     let host = reach.host();
@@ -54,6 +56,10 @@ pub fn announcement(
     text.push_str(
         "Each page opens only with its link. Anyone with a link has its role, so give each link only to its person.\n",
     );
+
+    if let Some(address) = linked {
+        let _ = writeln!(text, "OpenIGTLink: {address}. Whoever reaches that address sees the picture.");
+    }
 
     let _ = writeln!(text, "{}\nCtrl-C stops the server.", advice(reach));
     text

@@ -10,8 +10,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::named::without_systems_own;
 use super::output::{Failure, bar, print};
+use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_autofocus::{FieldOfView, Registry, scripted, shipped};
+use parfocal_autofocus::{FieldOfView, Registry, exec, scripted, shipped};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
 use parfocal_base::{BlurRate, PolicyName};
@@ -63,8 +64,9 @@ pub struct Arguments {
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
     /// Names of policies, separated by commas; `all` for all that can run; `file:PATH` for a
-    /// TorchScript file, whose path ends with the argument and may hold commas. May be repeated.
-    #[arg(long, value_name = "NAMES", default_value = "all")]
+    /// TorchScript file and `exec:COMMAND` for a policy in another process, each of which ends with the argument and
+    /// may hold commas. May be repeated.
+    #[arg(long, alias = "policy", value_name = "NAMES", default_value = "all")]
     policies: Vec<String>,
     /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
     #[arg(long, value_name = "DIR")]
@@ -172,7 +174,10 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     }
 
     let policies = policies(&arguments.policies, &registry);
-    let registry = policies.iter().fold(registry, scripted::with_file);
+    let settings = policy_process::for_evaluation();
+    let registry = policies
+        .iter()
+        .fold(registry, |registry, name| exec::with_command(scripted::with_file(registry, name), name, &settings));
 
     // Report a policy that cannot run before doing anything that takes time.
     policies.iter().try_for_each(|name| registry.build(name).map(drop))?;
@@ -301,11 +306,11 @@ fn policies(asked: &[String], registry: &Registry) -> Vec<PolicyName> {
     policies
 }
 
-/// The names in one argument. A file's path extends to the end of the argument, commas included.
+/// The names in one argument. A file's path or a command extends to the end of the argument, commas included.
 fn names(argument: &str) -> Vec<&str> {
     let argument = argument.trim_start();
     match argument.split_once(',') {
-        Some((name, rest)) if !argument.starts_with(scripted::PREFIX) => {
+        Some((name, rest)) if ![scripted::PREFIX, exec::PREFIX].iter().any(|prefix| argument.starts_with(prefix)) => {
             std::iter::once(name.trim_end()).chain(names(rest)).collect()
         }
         _ => vec![argument.trim_end()],

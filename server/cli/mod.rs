@@ -16,6 +16,7 @@ mod library;
 mod named;
 mod output;
 mod policies;
+mod policy_process;
 mod recording;
 mod restore;
 mod scan;
@@ -31,6 +32,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use output::Failure;
+use parfocal_autofocus::exec;
 use parfocal_base::notices::tell;
 
 /// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
@@ -63,6 +65,9 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
+    /// Turn into a policy's process; the program starts itself so.
+    #[command(name = exec::LAUNCH, hide = true)]
+    PolicyProcess(policy_process::Arguments),
     /// Replace the database by a backup, and keep the old one.
     Restore(restore::Arguments),
     /// Record hyperspectral video, and get cubes, video and pictures out of it.
@@ -108,6 +113,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Lens(arguments) => lens::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
+        Command::PolicyProcess(arguments) => policy_process::run(&arguments),
         Command::Restore(arguments) => restore::run(&arguments),
         Command::Recording(arguments) => recording::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),

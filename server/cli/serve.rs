@@ -2,14 +2,17 @@
 
 mod arguments;
 mod given;
+mod navigation;
 
 use std::io::{IsTerminal, Write};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use getrandom::SysRng;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
+use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
@@ -26,9 +29,10 @@ use parfocal_base::priority;
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
 use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
+use parfocal_dashboard::openigtlink;
 use parfocal_dashboard::tls::{Certificates, keep_current};
-use parfocal_imaging::{Calibration, Size};
-use parfocal_pipeline::control::{self, Command, ControlLoop, Drive, Settings};
+use parfocal_imaging::{Calibration, Developer, Size};
+use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Settings};
 use parfocal_pipeline::live;
 use parfocal_recording as recording;
 use parfocal_records::accounts::{Accounts, Cost};
@@ -97,9 +101,11 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut seeded = seeded(arguments)?;
-    let given = given::look(arguments, &clock, seeded.random()).await?;
-    let Given { folder, keys, certificates, calibration, developer, library, rig, lens_info, dynamics, listener } =
-        given;
+    let mut given = given::look(arguments, &clock, seeded.random()).await?;
+    let navigation = given.navigation.take();
+    let Given {
+        folder, keys, certificates, calibration, developer, library, rig, lens_info, dynamics, listener, ..
+    } = given;
     let address = listener.local_addr()?;
 
     let registry = rig.registry.clone();
@@ -182,10 +188,11 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         control: control.observer(),
     });
 
+    let linked = link(arguments, navigation, &app, control.status.clone(), developer)?;
     let server = tokio::spawn(http::run(listener, app, settings));
 
     let announcement =
-        announcement(&reach, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
+        announcement(&reach, &keys, &control.status.borrow(), &calibration, linked, std::io::stdout().is_terminal());
 
     // The server serves whether or not anyone reads the announcement.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
@@ -205,6 +212,25 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
 
     Ok(())
+}
+
+/// Gives the picture to OpenIGTLink's clients, if that is on. Returns its address.
+fn link(
+    arguments: &Arguments,
+    listener: Option<TcpListener>,
+    app: &Arc<App>,
+    status: watch::Receiver<Arc<ControlStatus>>,
+    developer: Developer,
+) -> std::io::Result<Option<SocketAddr>> {
+    let Some(listener) = listener else { return Ok(None) };
+    let address = listener.local_addr()?;
+
+    let (live, clock, shutdown) = (app.live.clone(), Arc::clone(&app.clock), app.shutdown.clone());
+    let app = Arc::clone(app);
+    let blinded = Box::new(move || app.blinded());
+    let source = openigtlink::Source { live, status, developer, blinded, clock, shutdown };
+    tokio::spawn(openigtlink::run(listener, source, arguments.navigation.settings()));
+    Ok(Some(address))
 }
 
 /// Ends the recording, then stops camera and lens.

@@ -34,7 +34,8 @@ class Server:
     """Starts ``parfocal serve`` on a free port with a folder of its own, and waits until it is ready.
 
     ``camera`` and ``lens`` are named as for ``parfocal serve``: simulated by default, ``"emulated"``,
-    ``"recording:DIR"``, an `EmulatedLens`. Use it in a ``with`` block, or call `close`.
+    ``"recording:DIR"``, an `EmulatedLens`. ``policy`` adds policies of your own: ``"exec:COMMAND"`` or
+    ``"file:PATH"``, one or several. Use it in a ``with`` block, or call `close`.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Server:
         seed: int | None = None,
         data: str | os.PathLike[str] | None = None,
         protocols: str | os.PathLike[str] | None = None,
+        policy: str | Sequence[str] = (),
         arguments: Sequence[str] = (),
         program: str | os.PathLike[str] | None = None,
         timeout: float = 60.0,
@@ -60,6 +62,8 @@ class Server:
         for option, value in (("--fps", fps), ("--seed", seed), ("--protocols", protocols)):
             if value is not None:
                 command += [option, str(value)]
+        for added in [policy] if isinstance(policy, str) else policy:
+            command += ["--policy", added]
         command += arguments
 
         # Its messages go into a file, so that no full pipe can ever hold the server up.

@@ -2,6 +2,7 @@
 
 pub mod belief;
 mod bisection;
+pub mod exec;
 mod fixed;
 mod hill_climber;
 pub mod learned;
@@ -39,6 +40,25 @@ pub trait Policy: Send {
 
     /// Gives the policy, before its first step, the blur rate of the optics. Most policies ignore it.
     fn learn_of(&mut self, _blur: BlurRate) {}
+
+    /// Why the last step gave no focal power, if the policy knows: one that runs in another process does.
+    fn fault(&self) -> Option<Fault> {
+        None
+    }
+}
+
+/// Why a policy in another process gave no focal power.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Fault {
+    /// It took too long.
+    #[error("it did not answer in time")]
+    Late,
+    /// It has ended, or cannot be reached.
+    #[error("{0}")]
+    Ended(String),
+    /// It sent something that is not an answer.
+    #[error("it sent {0}")]
+    Nonsense(String),
 }
 
 /// How much of a frame a policy uses.

@@ -17,7 +17,7 @@ pub struct PolicyEntry {
     pub name: PolicyName,
     /// What it does, in one sentence.
     pub summary: &'static str,
-    /// SHA-256 of its weights, in hexadecimal, if it was learned.
+    /// SHA-256 of its weights, in hexadecimal, if it was learned; of its program's files, if it runs in another process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
     /// Whether the policy can run now. A learned policy cannot run without its weights.
@@ -45,6 +45,14 @@ pub enum PolicyError {
         /// Why, and what to do.
         reason: String,
     },
+    /// The policy runs in another process, which is being started.
+    #[error("policy '{name}' is starting{}", failed.as_ref().map_or(String::new(), |failed| format!(": {failed}")))]
+    Starting {
+        /// The policy.
+        name: PolicyName,
+        /// Why the last start failed; `None` if it did not.
+        failed: Option<String>,
+    },
 }
 
 /// All policies. Cheap to clone: the clones share the learned weights.
@@ -64,7 +72,7 @@ struct Registered {
 
 #[derive(Clone)]
 enum Source {
-    Constructor(Arc<dyn Fn() -> Box<dyn Policy> + Send + Sync>),
+    Constructor(Arc<dyn Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync>),
     Missing(Arc<str>),
 }
 
@@ -76,6 +84,17 @@ impl Registry {
         name: &str,
         summary: &'static str,
         build: impl Fn() -> Box<dyn Policy> + Send + Sync + 'static,
+    ) -> Self {
+        self.trying(name, summary, move || Ok(build()))
+    }
+
+    /// Adds policy `name`, made by `build`, which may fail now and succeed later.
+    #[must_use]
+    pub fn trying(
+        self,
+        name: &str,
+        summary: &'static str,
+        build: impl Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync + 'static,
     ) -> Self {
         self.put(name, summary, Source::Constructor(Arc::new(build)))
     }
@@ -97,11 +116,23 @@ impl Registry {
 
     /// Records the hash of `bytes` as that of the weights of policy `name`.
     #[must_use]
-    pub fn weighing(mut self, name: &str, bytes: &[u8]) -> Self {
+    pub fn weighing(self, name: &str, bytes: &[u8]) -> Self {
+        self.identified(name, Some(hex::encode(Sha256::digest(bytes))))
+    }
+
+    /// Records `hash`, a SHA-256 in hexadecimal, as what identifies policy `name`.
+    #[must_use]
+    pub fn identified(mut self, name: &str, hash: Option<String>) -> Self {
         if let Some(policy) = self.policies.iter_mut().find(|policy| policy.name.as_str() == name) {
-            policy.weights = Some(hex::encode(Sha256::digest(bytes)));
+            policy.weights = hash;
         }
         self
+    }
+
+    /// Whether there is a policy `name`, whether it can run or not.
+    #[must_use]
+    pub fn has(&self, name: &PolicyName) -> bool {
+        self.policies.iter().any(|policy| policy.name == *name)
     }
 
     /// Gives the blur rate of the optics, if known, to every policy that is built.
@@ -111,7 +142,7 @@ impl Registry {
         self
     }
 
-    /// The SHA-256 of each learned policy's weights.
+    /// The SHA-256 of each learned policy's weights, and of the files of each that runs in another process.
     #[must_use]
     pub fn weights(&self) -> BTreeMap<PolicyName, String> {
         self.policies.iter().filter_map(|policy| Some((policy.name.clone(), policy.weights.clone()?))).collect()
@@ -147,7 +178,7 @@ impl Registry {
 
         match policy.map(|policy| &policy.source) {
             Some(Source::Constructor(build)) => {
-                let mut policy = build();
+                let mut policy = build()?;
                 if let Some(blur) = self.blur {
                     policy.learn_of(blur);
                 }

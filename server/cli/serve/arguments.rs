@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::navigation::Navigation;
 use crate::cli::encryption::Encryption;
 use parfocal_base::BlurRate;
 
@@ -36,8 +37,9 @@ pub struct Arguments {
     /// Folder with more trial protocols; `trial-protocols` by default, if it exists.
     #[arg(long, value_name = "DIR")]
     pub(super) protocols: Option<PathBuf>,
-    /// Add a policy from a TorchScript file, under the name `file:PATH`, also for protocols. May be repeated.
-    #[arg(long = "policy", value_name = "file:PATH")]
+    /// Add a policy from a TorchScript file, or one in another process, which the server starts. Protocols name it as
+    /// you do here. May be repeated.
+    #[arg(long = "policy", value_name = "file:PATH|exec:COMMAND")]
     pub(super) policies: Vec<String>,
     /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
     #[arg(long, value_name = "DIR")]
@@ -52,4 +54,6 @@ pub struct Arguments {
     /// How the lens moves: the dynamics.toml of `parfocal lens measure`; typical values by default.
     #[arg(long, value_name = "FILE")]
     pub(super) lens_dynamics: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) navigation: Navigation,
 }

@@ -10,7 +10,8 @@ use tokio::net::TcpListener;
 use super::arguments::Arguments;
 use crate::cli::library::protocols;
 use crate::cli::output::Failure;
-use parfocal_autofocus::{Registry, scripted, shipped};
+use crate::cli::policy_process;
+use parfocal_autofocus::{Registry, exec, scripted, shipped};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Clock;
 use parfocal_base::files::is_new_or_empty;
@@ -45,6 +46,8 @@ pub(super) struct Given {
     pub dynamics: Option<LensDynamics>,
     /// The port. Early visitors wait in its queue.
     pub listener: TcpListener,
+    /// The port of OpenIGTLink, if it is on.
+    pub navigation: Option<TcpListener>,
 }
 
 /// What is wrong with that which was given.
@@ -76,7 +79,7 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     arguments.encryption.check(arguments.bind)?;
 
     let mut problems = Problems::default();
-    let registry = registry(arguments, &mut problems);
+    let registry = registry(arguments, clock, &mut problems);
     let library = problems.keep(protocols(arguments.protocols.as_deref(), &registry));
 
     let measured = arguments.lens_dynamics.as_deref().and_then(|path| problems.keep(measured(path)));
@@ -103,6 +106,7 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     // After everything that only reads: a server that cannot start leaves the port alone.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error));
     let listener = problems.keep(listener);
+    let navigation = problems.keep(arguments.navigation.listen().await);
 
     // A start that fails makes no new folder, and nothing in an empty one.
     let is_due = problems.0.is_empty() || is_used(&arguments.data_dir);
@@ -110,7 +114,7 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     let keys = folder.as_ref().and_then(|_| problems.keep(Keys::load_or_create(&arguments.data_dir)));
     let certificates = problems.keep(certificates(arguments, folder.is_some(), clock));
 
-    match (folder, keys, certificates, calibration, library, camera, lens, listener) {
+    match (folder, keys, certificates, calibration, library, camera, lens, listener, navigation) {
         (
             Some(folder),
             Some(keys),
@@ -120,6 +124,7 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
             Some(camera),
             Some(lens),
             Some(listener),
+            Some(navigation),
         ) if problems.0.is_empty() => {
             let developer = Developer::new(&calibration);
             let reconstructor = developer.reconstructor().clone();
@@ -136,15 +141,16 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
                 lens_info,
                 dynamics,
                 listener,
+                navigation,
             })
         }
         _ => Err(problems.into_failure()),
     }
 }
 
-/// The policies that ship and those from files. Each policy from a file is built once, to check it. A policy that
-/// cannot be used stays in the list, so that protocols are not reported for naming it.
-fn registry(arguments: &Arguments, problems: &mut Problems) -> Registry {
+/// The policies that ship, those from files and those in other processes. Each of the latter two is built once, to check
+/// it. A policy that cannot be used stays in the list, so that protocols are not reported for naming it.
+fn registry(arguments: &Arguments, clock: &Arc<dyn Clock>, problems: &mut Problems) -> Registry {
     let mut registry = Registry::standard().knowing(arguments.blur);
     if let Some(folder) = &arguments.weights {
         registry = problems.keep(shipped::with_folder(registry.clone(), folder)).unwrap_or(registry);
@@ -152,6 +158,7 @@ fn registry(arguments: &Arguments, problems: &mut Problems) -> Registry {
 
     for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
         registry = scripted::with_file(registry, &name);
+        registry = exec::with_command(registry, &name, &policy_process::for_serving(clock));
         problems.keep(registry.build(&name));
     }
     registry

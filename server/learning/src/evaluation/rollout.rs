@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::scans::FocalTimeScan;
 use parfocal_autofocus::belief::best;
 use parfocal_autofocus::networks::BINS;
-use parfocal_autofocus::{Observation, Policy, STEP, mgm};
+use parfocal_autofocus::{Fault, Observation, Policy, STEP, mgm};
 use parfocal_base::FocalPower;
 use parfocal_base::IN_FOCUS;
 
@@ -148,13 +148,24 @@ impl Path {
 }
 
 /// A policy's answer that is not a finite number.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("at frame {frame} it returned {target}, which is not a focal power")]
-pub struct NoTarget {
-    /// The frame, from 1.
-    pub frame: usize,
-    /// The answer.
-    pub target: f64,
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoTarget {
+    /// A number that is not finite.
+    #[error("at frame {frame} it returned {target}, which is not a focal power")]
+    Number {
+        /// The frame, from 1.
+        frame: usize,
+        /// The answer.
+        target: f64,
+    },
+    /// The policy knows why it gave none.
+    #[error("at frame {frame}, {fault}")]
+    Fault {
+        /// The frame, from 1.
+        frame: usize,
+        /// Why.
+        fault: Fault,
+    },
 }
 
 /// The mean gradient magnitude of the patch at the optimum, for each of `frames` frames of `scan`.
@@ -193,7 +204,8 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest:
         course.claims.extend(decision.belief.as_deref().and_then(Claim::of));
         let target = decision.target;
         if !target.is_finite() {
-            return Err(NoTarget { frame, target });
+            let fault = policy.fault();
+            return Err(fault.map_or(NoTarget::Number { frame, target }, |fault| NoTarget::Fault { frame, fault }));
         }
 
         focal_power = FocalPower::nearest(target);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal_autofocus::{Decision, PolicyError};
+use parfocal_autofocus::{Decision, Fault, PolicyError};
 use parfocal_base::FocalPower;
 
 /// Largest number of values of a belief that is shown.
@@ -29,6 +29,8 @@ pub enum Failure {
     Panicked(String),
     /// It could not be built. Its thread has ended.
     Unavailable(PolicyError),
+    /// It runs in another process, which did not answer, or not as it should.
+    Outside(Fault),
     /// It asked for this number, which is not a focal power.
     InvalidTarget(f64),
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::advice::{Advice, Failure};
 use super::runner::Runner;
-use parfocal_autofocus::{FieldOfView, Observation, Registry};
+use parfocal_autofocus::{Fault, FieldOfView, Observation, PolicyError, Registry};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::step::Hold;
@@ -168,7 +168,24 @@ fn hold_reason(failure: Failure) -> HoldReason {
     match failure {
         Failure::Panicked(message) => {
             tracing::debug!(message, "the policy panicked");
-            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
+            failed()
+        }
+        Failure::Outside(Fault::Late) => {
+            tracing::debug!("the policy's process did not answer and was ended");
+            slow()
+        }
+        Failure::Outside(Fault::Ended(message)) => {
+            tracing::debug!(message, "the policy's process ended");
+            failed()
+        }
+        Failure::Outside(Fault::Nonsense(message)) => {
+            tracing::debug!(message, "the policy's process sent something that is not an answer");
+            nonsense()
+        }
+        Failure::Unavailable(PolicyError::Starting { failed: None, .. }) => starting(),
+        Failure::Unavailable(PolicyError::Starting { failed: Some(message), .. }) => {
+            tracing::debug!(message, "the policy's process did not start");
+            failed()
         }
         Failure::Unavailable(error) => {
             tracing::debug!(%error, "the policy cannot be started");
@@ -179,12 +196,20 @@ fn hold_reason(failure: Failure) -> HoldReason {
         }
         Failure::InvalidTarget(target) => {
             tracing::debug!(target, "the policy returned an invalid focal power");
-            HoldReason::new(
-                Hold::PolicyNonsense,
-                "the policy returned an invalid focal power and is being restarted; the lens is held",
-            )
+            nonsense()
         }
     }
+}
+
+fn failed() -> HoldReason {
+    HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
+}
+
+fn nonsense() -> HoldReason {
+    HoldReason::new(
+        Hold::PolicyNonsense,
+        "the policy returned an invalid focal power and is being restarted; the lens is held",
+    )
 }
 
 fn slow() -> HoldReason {

@@ -183,7 +183,8 @@ fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answ
     let began = clock.now();
     let seen = Observation { view: &question.view, focal_power: question.focal_power };
     let decision = guarded(|| policy.step(&seen)).map_err(Failure::Panicked)?;
-    Advice::new(decision, clock.now().since(began))
+    let took = clock.now().since(began);
+    Advice::new(decision, took).map_err(|failure| policy.fault().map_or(failure, Failure::Outside))
 }
 
 /// From now on, keeps the message and place of a policy's panic off standard error, which the operator of a blinded

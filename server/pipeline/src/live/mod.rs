@@ -22,6 +22,7 @@ use std::sync::atomic::Ordering;
 
 use tokio::sync::watch;
 
+use crate::control::ControlledFrame;
 use lead::{Lead, Leaders};
 use parfocal_imaging::Size;
 
@@ -35,6 +36,8 @@ pub struct LiveHandle {
     frames: Arc<[Latest]>,
     counts: Arc<Counts>,
     leaders: watch::Sender<Leaders>,
+    /// The loop's frames, for those who make pictures of their own.
+    taken: watch::Sender<Option<Arc<ControlledFrame>>>,
 }
 
 impl LiveHandle {
@@ -60,6 +63,12 @@ impl LiveHandle {
 
         let lead = leads.then(|| Lead::new(size, self.leaders.clone()));
         Watcher { size, frames, counts: Arc::clone(&self.counts), _lead: lead }
+    }
+
+    /// The loop's latest frame, as far as the imaging thread takes it.
+    #[must_use]
+    pub fn frames(&self) -> watch::Receiver<Option<Arc<ControlledFrame>>> {
+        self.taken.subscribe()
     }
 
     /// The largest size of the camera's pictures.

@@ -49,7 +49,13 @@ pub fn start(
     }
 
     let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
-    let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts), leaders: watch::Sender::default() };
+    let taken = watch::Sender::default();
+    let handle = LiveHandle {
+        frames: frames.into(),
+        counts: Arc::clone(&counts),
+        leaders: watch::Sender::default(),
+        taken: taken.clone(),
+    };
     let worker = Worker {
         control,
         outlet: cells,
@@ -57,6 +63,7 @@ pub fn start(
         clock: Arc::clone(clock),
         studio,
         larger,
+        taken,
         areas: AreaWatch::default(),
         looked: None,
     };
@@ -72,6 +79,8 @@ struct Worker {
     clock: Arc<dyn Clock>,
     studio: Studio,
     larger: Vec<Larger>,
+    /// Frames for those who make pictures of their own.
+    taken: watch::Sender<Option<Arc<ControlledFrame>>>,
     areas: AreaWatch,
     /// Number of the frame in which the content area was last looked for.
     looked: Option<u64>,
@@ -115,6 +124,12 @@ impl Worker {
         }
         for larger in &self.larger {
             larger.offer(frame);
+        }
+        if self.taken.receiver_count() > 0 {
+            self.taken.send_replace(Some(Arc::new(frame.clone())));
+        } else if self.taken.borrow().is_some() {
+            // The camera may need the memory.
+            self.taken.send_replace(None);
         }
 
         if detect {

@@ -1,0 +1,138 @@
+//! Policies in another process: `exec:COMMAND` instead of a policy's name. The process looks at each frame in shared
+//! memory and answers over a socket; `docs/policies.md` describes what travels.
+
+mod command;
+mod framing;
+mod pool;
+mod process;
+mod settings;
+
+pub use process::LAUNCH;
+pub use settings::{Settings, Times};
+
+use std::sync::Arc;
+
+use self::command::Command;
+use self::pool::{Missing, Pool, Running, Shared};
+use super::{Decision, Fault, FieldOfView, Observation, Policy, PolicyError, Registry};
+use parfocal_base::{BlurRate, PolicyName};
+
+/// Prefix of the name of a policy that is a command.
+pub const PREFIX: &str = "exec:";
+const SUMMARY: &str = "a policy in another process";
+
+/// Adds the policy of a command to `registry`, if `name` begins with [`PREFIX`]. Starts the process. If it cannot be used, it is listed as unavailable, with the reason.
+#[must_use]
+pub fn with_command(registry: Registry, name: &PolicyName, settings: &Settings) -> Registry {
+    let Some(text) = name.as_str().strip_prefix(PREFIX) else { return registry };
+    if registry.has(name) {
+        return registry;
+    }
+
+    match prepare(text, settings) {
+        Ok((pool, hash)) => {
+            let own = name.clone();
+            let build = move || instance(&pool, &own).map(|policy| Box::new(policy) as Box<dyn Policy>);
+            registry.trying(name.as_str(), SUMMARY, build).identified(name.as_str(), hash)
+        }
+        Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
+    }
+}
+
+/// The pool of a command that answers, and what identifies the command.
+fn prepare(text: &str, settings: &Settings) -> Result<(Pool, Option<String>), String> {
+    let command = Command::parse(text)?;
+    let hash = command.hash();
+    let pool = Pool::new(command, settings.clone()).map_err(|error| format!("no thread is left for it: {error}"))?;
+
+    // It comes back at once: what counts is that there is one.
+    let tried = pool.take(settings.start, true).map_err(|missing| match missing {
+        Missing::Starting => format!("it was not ready within {} s", settings.start.as_secs()),
+        Missing::Failed(reason) => reason,
+    });
+    tried.map(|(running, shared)| shared.give_back(running, false))?;
+    Ok((pool, hash))
+}
+
+fn instance(pool: &Pool, name: &PolicyName) -> Result<External, PolicyError> {
+    let built = pool.take_for_instance();
+    built.map(|(running, shared)| External::new(running, shared)).map_err(|missing| {
+        let failed = match missing {
+            Missing::Starting => None,
+            Missing::Failed(reason) => Some(reason),
+        };
+        PolicyError::Starting { name: name.clone(), failed }
+    })
+}
+
+/// An instance: it borrows a process.
+struct External {
+    running: Option<Running>,
+    shared: Arc<Shared>,
+    wide: bool,
+    blur: Option<BlurRate>,
+    frames: u32,
+    fault: Option<Fault>,
+}
+
+impl External {
+    fn new(running: Running, shared: Arc<Shared>) -> Self {
+        let wide = running.process.is_wide();
+        Self { running: Some(running), shared, wide, blur: None, frames: 0, fault: None }
+    }
+
+    fn time(&self) -> u64 {
+        match self.shared.settings.times {
+            Times::Clock => self.shared.settings.clock.now().as_nanos(),
+            Times::Every(period) => (period * self.frames).as_nanos() as u64,
+        }
+    }
+
+    fn ask(&mut self, seen: &Observation<'_>) -> Result<Decision, Fault> {
+        let (time, blur, patience) = (self.time(), self.blur, self.shared.settings.answer);
+        let Some(Running { process, .. }) = &mut self.running else {
+            return Err(self.fault.clone().unwrap_or(Fault::Late));
+        };
+
+        if self.frames == 0 {
+            process.reset(time, blur)?;
+        }
+        self.frames += 1;
+        process.ask(seen, time, blur, patience)
+    }
+}
+
+impl Policy for External {
+    fn field_of_view(&self) -> FieldOfView {
+        if self.wide { FieldOfView::Wide } else { FieldOfView::Patch }
+    }
+
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        match self.ask(seen) {
+            Ok(decision) => decision,
+            Err(fault) => {
+                self.fault = Some(fault);
+                if let Some(running) = self.running.take() {
+                    self.shared.give_back(running, true);
+                }
+                Decision { target: f64::NAN, ..Decision::default() }
+            }
+        }
+    }
+
+    fn learn_of(&mut self, blur: BlurRate) {
+        self.blur = Some(blur);
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.fault.clone()
+    }
+}
+
+impl Drop for External {
+    fn drop(&mut self) {
+        if let Some(running) = self.running.take() {
+            self.shared.give_back(running, false);
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The processes of one command. They outlive the instances of the policy, because a process may take seconds to start:
+//! an instance borrows one. A thread starts them, so that nobody who drives a lens waits for a start.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
+use std::time::Duration;
+
+use super::command::Command;
+use super::process::Process;
+use super::settings::Settings;
+use parfocal_base::clock::Moment;
+
+/// Time that the process of an instance that has just ended may take to come back.
+const HANDOVER: Duration = Duration::from_millis(100);
+/// Wait before a second start in a row; twice as long before each further one.
+const BACKOFF: Duration = Duration::from_millis(200);
+/// Longest wait before a start.
+const LONGEST_BACKOFF: Duration = Duration::from_secs(10);
+/// A process that ran so long did not fail at its start.
+const SETTLED: Duration = Duration::from_secs(10);
+
+/// Why there is no process now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Missing {
+    /// It is being started.
+    Starting,
+    /// The last start failed; another one follows.
+    Failed(String),
+}
+
+/// A process, and since when it runs.
+pub struct Running {
+    /// The process.
+    pub process: Process,
+    since: Moment,
+}
+
+/// The processes. Dropping the pool ends those that nobody uses; the others end when they come back.
+pub struct Pool(Arc<Shared>);
+
+/// A borrower's way back to the pool.
+#[derive(Clone)]
+pub struct Shared {
+    command: Command,
+    /// How they run.
+    pub settings: Settings,
+    inner: Arc<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    idle: VecDeque<Running>,
+    /// Processes that instances use.
+    used: usize,
+    /// Instances that wait for a process.
+    waiting: usize,
+    /// Processes that the thread is to start, the one in the making included.
+    ordered: usize,
+    /// Failures in a row.
+    failures: u32,
+    /// Why the last start failed.
+    refused: Option<String>,
+    closed: bool,
+}
+
+impl Inner {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Pool {
+    /// A pool without processes.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub fn new(command: Command, settings: Settings) -> io::Result<Self> {
+        let shared = Arc::new(Shared { command, settings, inner: Arc::default() });
+        let keeper = Shared::clone(&shared);
+        // The kernel ends a process with the thread that started it, so this one lasts as long as the pool.
+        Builder::new().name("policy-keeper".into()).spawn(move || keeper.keep())?;
+        Ok(Self(shared))
+    }
+
+    /// A process that nobody uses. Waits for it for at most `longest`, and if `once` only for one start.
+    ///
+    /// # Errors
+    /// If there is none by then.
+    pub fn take(&self, longest: Duration, once: bool) -> Result<(Running, Arc<Shared>), Missing> {
+        self.0.take(longest, once).map(|running| (running, Arc::clone(&self.0)))
+    }
+
+    /// A process for a new instance.
+    ///
+    /// # Errors
+    /// If there is none in the time that the settings leave.
+    pub fn take_for_instance(&self) -> Result<(Running, Arc<Shared>), Missing> {
+        // Where many work, nobody drives a lens, and a failure ends the work.
+        self.take(self.0.settings.build, self.0.settings.many)
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        let ended = {
+            let mut state = self.0.inner.lock();
+            state.closed = true;
+            std::mem::take(&mut state.idle)
+        };
+        self.0.inner.changed.notify_all();
+        // Outside the lock, because it takes a moment.
+        drop(ended);
+    }
+}
+
+impl Shared {
+    fn take(&self, longest: Duration, once: bool) -> Result<Running, Missing> {
+        let clock = &self.settings.clock;
+        let begun = clock.now();
+        let mut state = self.inner.lock();
+        state.waiting += 1;
+
+        let outcome = loop {
+            if let Some(mut running) = state.idle.pop_front() {
+                if running.process.is_alive() {
+                    state.used += 1;
+                    break Ok(running);
+                }
+                state.failures = self.failures_after(&state, running.since);
+                continue;
+            }
+
+            let waited = clock.now().since(begun);
+            if waited >= longest {
+                break Err(state.refused.clone().map_or(Missing::Starting, Missing::Failed));
+            }
+
+            // The process of the instance before may be on its way back.
+            let handover = HANDOVER.min(longest / 2);
+            let coming = !self.settings.many && state.used > 0 && waited < handover;
+            if !coming && state.ordered < state.waiting {
+                state.ordered += 1;
+                self.inner.changed.notify_all();
+            }
+            let rest = if coming { handover } else { longest }.saturating_sub(waited);
+            state = self.inner.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
+
+            if let Some(reason) = state.refused.as_ref().filter(|_| once) {
+                break Err(Missing::Failed(reason.clone()));
+            }
+        };
+        state.waiting -= 1;
+        outcome
+    }
+
+    /// Gives a process back. One that failed is ended.
+    pub fn give_back(&self, running: Running, failed: bool) {
+        let ended = {
+            let mut state = self.inner.lock();
+            state.used = state.used.saturating_sub(1);
+            if failed {
+                state.failures = self.failures_after(&state, running.since);
+            }
+
+            // One process is enough where one lens is driven.
+            if failed || state.closed || (!self.settings.many && !state.idle.is_empty()) {
+                Some(running)
+            } else {
+                state.idle.push_back(running);
+                None
+            }
+        };
+        self.inner.changed.notify_all();
+        drop(ended);
+    }
+
+    fn failures_after(&self, state: &State, since: Moment) -> u32 {
+        let settled = self.settings.clock.now().since(since) >= SETTLED;
+        if settled { 1 } else { state.failures.saturating_add(1) }
+    }
+
+    /// Starts processes as they are ordered, until the pool is closed.
+    fn keep(&self) {
+        let mut state = self.inner.lock();
+        loop {
+            while state.ordered == 0 && !state.closed {
+                state = self.inner.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            }
+            if state.closed {
+                return;
+            }
+
+            let pause = backoff(state.failures);
+            if !pause.is_zero() {
+                state = self
+                    .inner
+                    .changed
+                    .wait_timeout_while(state, pause, |state| !state.closed)
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .0;
+                if state.closed {
+                    return;
+                }
+            }
+
+            drop(state);
+            let started =
+                Process::start(&self.command, &self.settings).and_then(|process| process.tried(&self.settings));
+            state = self.inner.lock();
+            state.ordered = state.ordered.saturating_sub(1);
+            match started {
+                Ok(process) => {
+                    state.refused = None;
+                    // An earlier process may have come back meanwhile.
+                    if !state.closed && (self.settings.many || state.idle.is_empty()) {
+                        state.idle.push_back(Running { process, since: self.settings.clock.now() });
+                    }
+                }
+                Err(reason) => {
+                    state.failures = state.failures.saturating_add(1);
+                    state.refused = Some(reason);
+                }
+            }
+            self.inner.changed.notify_all();
+        }
+    }
+}
+
+/// Wait before a start after so many failures in a row. The first restart is at once.
+fn backoff(failures: u32) -> Duration {
+    match failures {
+        0 | 1 => Duration::ZERO,
+        more => BACKOFF.saturating_mul(1 << (more - 2).min(8)).min(LONGEST_BACKOFF),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_fails_again_and_again_is_started_less_and_less_often() {
+        let waits: Vec<u128> = (0..10).map(|failures| backoff(failures).as_millis()).collect();
+        assert_eq!(waits, [0, 0, 200, 400, 800, 1600, 3200, 6400, 10_000, 10_000]);
+        assert_eq!(backoff(u32::MAX), LONGEST_BACKOFF);
+    }
+}

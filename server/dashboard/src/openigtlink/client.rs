@@ -1,0 +1,158 @@
+//! One client: it gets the latest frame whenever it has taken the one before. What it sends is only looked at for its
+//! version and for requests.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::{Notify, watch};
+use tokio::time::timeout;
+
+use super::message::{HEADER_BYTES, Header, Version};
+use super::shot::{self, Shot};
+use super::{Source, condition};
+
+/// A client that takes nothing for so long is disconnected.
+const STUCK: Duration = Duration::from_secs(10);
+
+/// What the two halves of a connection share.
+#[derive(Default)]
+struct Shared {
+    /// Whether the client speaks version 3. Until it has spoken, it gets version 2, which all understand.
+    three: AtomicBool,
+    /// It asked for the status.
+    asked: Notify,
+}
+
+impl Shared {
+    fn version(&self) -> Version {
+        if self.three.load(Ordering::Relaxed) { Version::Three } else { Version::Two }
+    }
+}
+
+/// Why a connection ended.
+enum End {
+    /// It was closed.
+    Closed,
+    /// It sent something that is not a message.
+    Stranger(&'static str),
+    /// It did not take what it was sent.
+    Stuck,
+}
+
+/// Serves `stream` until the client leaves.
+pub async fn serve(stream: TcpStream, peer: SocketAddr, shots: watch::Receiver<Option<Arc<Shot>>>, source: &Source) {
+    // A picture must not wait for the acknowledgement of the one before.
+    let _ = stream.set_nodelay(true);
+    let (from, to) = stream.into_split();
+    let shared = Shared::default();
+
+    let end = tokio::select! {
+        end = listen(from, &shared) => end,
+        end = tell(to, shots, source, &shared) => end,
+    };
+    match end {
+        End::Closed => tracing::debug!(%peer, "an OpenIGTLink client left"),
+        End::Stranger(why) => {
+            tracing::warn!("OpenIGTLink: {peer} was disconnected, because it does not speak OpenIGTLink: {why}");
+        }
+        End::Stuck => tracing::warn!("OpenIGTLink: {peer} was disconnected, because it took nothing for 10 s"),
+    }
+}
+
+async fn listen(mut from: OwnedReadHalf, shared: &Shared) -> End {
+    loop {
+        let mut header = [0; HEADER_BYTES];
+        match from.read(&mut header[..1]).await {
+            Ok(1) => {}
+            // Closed between two messages.
+            _ => return End::Closed,
+        }
+        if from.read_exact(&mut header[1..]).await.is_err() {
+            return End::Stranger("it left in the middle of a header");
+        }
+        let header = match Header::parse(&header) {
+            Ok(header) => header,
+            Err(why) => return End::Stranger(why),
+        };
+
+        let mut body = vec![0; header.body];
+        if from.read_exact(&mut body).await.is_err() {
+            return End::Stranger("it left in the middle of a message");
+        }
+        if !header.fits(&body) {
+            return End::Stranger("a message's checksum is wrong");
+        }
+
+        shared.three.store(header.version == Version::Three, Ordering::Relaxed);
+        if header.kind == "GET_STATUS" {
+            shared.asked.notify_one();
+        }
+    }
+}
+
+async fn tell(
+    mut to: OwnedWriteHalf,
+    mut shots: watch::Receiver<Option<Arc<Shot>>>,
+    source: &Source,
+    shared: &Shared,
+) -> End {
+    let mut states = source.status.clone();
+    let mut told = None;
+    loop {
+        let condition = condition(&states.borrow_and_update());
+        if told != Some(condition) {
+            told = Some(condition);
+            let message = shot::status(shared.version(), source.clock.wall(), condition);
+            if let Err(end) = send(&mut to, message).await {
+                return end;
+            }
+        }
+
+        tokio::select! {
+            changed = shots.changed() => {
+                if changed.is_err() {
+                    return End::Closed;
+                }
+                let latest = shots.borrow_and_update().clone();
+                if let Some(shot) = latest && let Err(end) = show(&mut to, &shot, source, shared).await {
+                    return end;
+                }
+            }
+            changed = states.changed() => {
+                if changed.is_err() {
+                    return End::Closed;
+                }
+            }
+            () = shared.asked.notified() => told = None,
+        }
+    }
+}
+
+/// Sends a frame.
+async fn show(to: &mut OwnedWriteHalf, shot: &Shot, source: &Source, shared: &Shared) -> Result<(), End> {
+    // A session may have begun since it was made.
+    if shot.tells_focal_power() && (source.blinded)() {
+        return Ok(());
+    }
+
+    let version = shared.version();
+    send(to, shot.picture(version)).await?;
+    match shot.focal_power(version) {
+        Some(message) => send(to, message).await,
+        None => Ok(()),
+    }
+}
+
+async fn send(to: &mut OwnedWriteHalf, message: Bytes) -> Result<(), End> {
+    match timeout(STUCK, to.write_all(&message)).await {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(_)) => Err(End::Closed),
+        Err(_) => Err(End::Stuck),
+    }
+}

@@ -1,0 +1,205 @@
+//! OpenIGTLink, by which surgical navigation (3D Slicer) sees the live picture.
+//!
+//! The messages are our own, because the crate `openigtlink-rust` (0.4) brings sockets, TLS and a logger along with
+//! them, and may panic. A thread of low priority makes each picture once for all clients. Every client gets the latest
+//! one when it can take it, so a slow one delays nobody.
+
+mod client;
+mod message;
+mod shot;
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use jiff::SignedDuration;
+use tokio::net::TcpListener;
+use tokio::runtime::Handle;
+use tokio::sync::{Notify, watch};
+use tokio::time::{MissedTickBehavior, interval, sleep};
+
+use self::shot::Shot;
+use parfocal_base::clock::Clock;
+use parfocal_base::priority;
+use parfocal_base::step::Hold;
+use parfocal_devices::camera::FrameImage;
+use parfocal_imaging::{Developer, GrayImage, RgbImage, Size};
+use parfocal_pipeline::control::{ControlStatus, ControlledFrame};
+use parfocal_pipeline::live::LiveHandle;
+
+/// Clients at a time.
+const MOST_CLIENTS: usize = 16;
+/// Pause after the system refused a connection, such as when it has no file left.
+const REFUSED: Duration = Duration::from_millis(200);
+
+/// Where pictures and states come from.
+pub struct Source {
+    /// The loop's frames.
+    pub live: LiveHandle,
+    /// The loop's state.
+    pub status: watch::Receiver<Arc<ControlStatus>>,
+    /// Makes pictures of mosaics.
+    pub developer: Developer,
+    /// Whether a session hides the focal power now.
+    pub blinded: Box<dyn Fn() -> bool + Send + Sync>,
+    /// The clock.
+    pub clock: Arc<dyn Clock>,
+    /// Turns true when the server ends.
+    pub shutdown: watch::Receiver<bool>,
+}
+
+/// What clients get.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// Size of the pictures.
+    pub size: Size,
+    /// Most pictures a second.
+    pub rate: u32,
+}
+
+/// Serves clients on `listener` until the server ends.
+///
+/// # Errors
+/// If the system has no thread left.
+pub async fn run(listener: TcpListener, source: Source, settings: Settings) -> io::Result<()> {
+    let source = Arc::new(source);
+    let (shots, _) = watch::channel(None);
+    let arrived = Arc::new(Notify::new());
+
+    let studio = Studio {
+        source: Arc::clone(&source),
+        settings,
+        developer: source.developer.clone(),
+        shots: shots.clone(),
+        arrived: Arc::clone(&arrived),
+    };
+    let runtime = Handle::current();
+    std::thread::Builder::new().name("openigtlink".into()).spawn(move || {
+        priority::lower_further();
+        runtime.block_on(studio.run());
+    })?;
+
+    let mut shutdown = source.shutdown.clone();
+    tokio::select! {
+        () = accept(&listener, &source, &shots, &arrived) => {}
+        _ = shutdown.wait_for(|ended| *ended) => {}
+    }
+    Ok(())
+}
+
+async fn accept(
+    listener: &TcpListener,
+    source: &Arc<Source>,
+    shots: &watch::Sender<Option<Arc<Shot>>>,
+    arrived: &Notify,
+) {
+    let clients = Arc::new(AtomicUsize::new(0));
+    loop {
+        let Ok((stream, peer)) = listener.accept().await else {
+            sleep(REFUSED).await;
+            continue;
+        };
+        if clients.load(Ordering::Relaxed) >= MOST_CLIENTS {
+            tracing::warn!("OpenIGTLink: {peer} was disconnected, because {MOST_CLIENTS} clients are connected");
+            continue;
+        }
+
+        clients.fetch_add(1, Ordering::Relaxed);
+        let mut latest = shots.subscribe();
+        // A picture made earlier is stale.
+        latest.mark_unchanged();
+        arrived.notify_one();
+
+        let (source, clients) = (Arc::clone(source), Arc::clone(&clients));
+        tokio::spawn(async move {
+            let mut shutdown = source.shutdown.clone();
+            tokio::select! {
+                () = client::serve(stream, peer, latest, &source) => {}
+                _ = shutdown.wait_for(|ended| *ended) => {}
+            }
+            clients.fetch_sub(1, Ordering::Relaxed);
+        });
+    }
+}
+
+/// How the devices are: the protocol's code and name, and words. The words are those that a surgeon may read: nothing
+/// that tells one policy from another.
+fn condition(status: &ControlStatus) -> (u16, &'static str, &'static str) {
+    const OK: u16 = 1;
+    const HARDWARE_FAILURE: u16 = 18;
+
+    if !status.camera.working {
+        (HARDWARE_FAILURE, "Camera", "The camera is not delivering pictures.")
+    } else if status.held == Some(Hold::LensFailed) {
+        (HARDWARE_FAILURE, "Lens", "The lens does not answer; the focus is being held.")
+    } else {
+        (OK, "OK", "The camera delivers pictures.")
+    }
+}
+
+/// Makes the pictures while there are clients.
+struct Studio {
+    source: Arc<Source>,
+    settings: Settings,
+    developer: Developer,
+    shots: watch::Sender<Option<Arc<Shot>>>,
+    arrived: Arc<Notify>,
+}
+
+impl Studio {
+    async fn run(mut self) {
+        let mut shutdown = self.source.shutdown.clone();
+        let source = Arc::clone(&self.source);
+        tokio::select! {
+            () = self.work(&source) => {}
+            _ = shutdown.wait_for(|ended| *ended) => {}
+        }
+    }
+
+    async fn work(&mut self, source: &Source) {
+        /// Time after which a client that left is noticed while no frames come.
+        const LOOK: Duration = Duration::from_secs(1);
+
+        let mut rgb = RgbImage::default();
+        let mut gray = GrayImage::default();
+        let mut due = interval(Duration::from_secs(1) / self.settings.rate.max(1));
+        due.set_missed_tick_behavior(MissedTickBehavior::Delay);
+
+        loop {
+            self.arrived.notified().await;
+            let mut frames = source.live.frames();
+            while self.shots.receiver_count() > 0 {
+                due.tick().await;
+                tokio::select! {
+                    changed = frames.changed() => if changed.is_err() { return },
+                    () = sleep(LOOK) => continue,
+                }
+
+                let frame = frames.borrow_and_update().clone();
+                if let Some(frame) = frame {
+                    let shot = self.shoot(&frame, source, &mut rgb, &mut gray);
+                    self.shots.send_replace(Some(Arc::new(shot)));
+                }
+            }
+            self.shots.send_replace(None);
+        }
+    }
+
+    fn shoot(&mut self, frame: &ControlledFrame, source: &Source, rgb: &mut RgbImage, gray: &mut GrayImage) -> Shot {
+        let now = source.clock.now();
+        let age = SignedDuration::try_from(now.since(frame.frame.exposed_at)).unwrap_or_default();
+        let at = source.clock.wall().checked_sub(age).unwrap_or_default();
+        let number = frame.frame.number as u32;
+        let focal_power = frame.record.measured.filter(|_| !(source.blinded)()).map(f64::from);
+
+        match &frame.frame.image {
+            FrameImage::Rgb(picture) => Shot::new(picture, 1.0, at, number, focal_power),
+            FrameImage::Mosaic(mosaic) => {
+                self.developer.develop(mosaic, self.settings.size, rgb, gray);
+                // Both sizes cover the same area.
+                Shot::new(rgb, 1.0 / self.settings.size.per_cell() as f32, at, number, focal_power)
+            }
+        }
+    }
+}
