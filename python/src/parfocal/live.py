@@ -97,17 +97,17 @@ class Viewer:
                 length = int.from_bytes(message[:2], "little")
                 header = json.loads(message[2 : 2 + length])
                 return Frame(header["frame"], message[2 + length :], header, self._status, self._session)
-            told = json.loads(message)
-            kind = told.pop("type", None)
+            state = json.loads(message)
+            kind = state.pop("type", None)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise IncompatibleServer(
                 f"The server at {self.address.url} sent something that is no frame and no state ({error}). "
                 "Is the package of another version than the server?"
             ) from error
         if kind == "status":
-            self._status = told
+            self._status = state
         elif kind == "session":
-            self._session = told.get("view")
+            self._session = state.get("view")
         return None
 
     def ended(self, error: ConnectionClosed) -> ParfocalError:
