@@ -503,6 +503,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}/spectrum": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The spectrum at a place of a recorded mosaic of an unblinded session. Frames count from 0. */
+        get: operations["researcher_spectrum"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions/{session}/timeline": {
         parameters: {
             query?: never;
@@ -1488,6 +1505,39 @@ export interface components {
             /** @enum {string} */
             state: "failed";
         };
+        /** @description What a band shows at a place. */
+        BandLevel: {
+            /**
+             * Format: double
+             * @description Mean of the raw counts.
+             */
+            counts: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the raw counts.
+             */
+            counts_spread: number;
+            /**
+             * Format: double
+             * @description Full width of the band at half of its maximum, nm.
+             */
+            fwhm_nm: number;
+            /**
+             * Format: double
+             * @description Mean reflectance: 0 as dark as the dark reference, 1 as bright as the white one. Null without a white reference.
+             */
+            reflectance?: number | null;
+            /**
+             * Format: double
+             * @description Standard deviation of the reflectance. Null without a white reference.
+             */
+            reflectance_spread?: number | null;
+            /**
+             * Format: double
+             * @description Wavelength at which the band is most sensitive, nm.
+             */
+            wavelength_nm: number;
+        };
         /** @description What can be changed, and whether the last change failed. */
         CameraOffer: {
             /** @description Every setting that the camera offers now. */
@@ -2114,6 +2164,15 @@ export interface components {
             repeated: components["schemas"]["Repetition"];
             /** @description What happens to the place of a session whose surgeon withdrew. */
             withdrawn: components["schemas"]["Replacement"];
+        };
+        /** @description The spectrum at a place. */
+        PlaceSpectrum: {
+            /** @description The bands in order of wavelength. */
+            bands: components["schemas"]["BandLevel"][];
+            /** @description Number of mosaic cells within the circle. */
+            cells: number;
+            /** @description Samples at full scale, whose true values are higher. */
+            saturated: number;
         };
         /** @description A study to plan. */
         PlanStudy: {
@@ -6638,6 +6697,134 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description The frame is damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_spectrum: {
+        parameters: {
+            query: {
+                /** @description Centre: samples of the mosaic from its left edge. */
+                x: number;
+                /** @description Centre: samples of the mosaic from its upper edge. */
+                y: number;
+                /** @description All cells whose middle is this near to the centre are taken, in samples. With 0, the cell there. */
+                radius?: number;
+            };
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+                /** @description The recording's name */
+                recording: string;
+                /** @description The frame's place in the recording, from 0 */
+                frame: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlaceSpectrum"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session, recording or frame, or it has no bands */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The request took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The session is not unblinded, or its participant withdrew */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server listens on a loopback address, and the request names another host */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such place in the picture */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The frame is damaged */

@@ -206,6 +206,28 @@ AnswerValue = int | builtins.list[int] | str
 BackupState = dict[str, Any]
 """The state of the latest backup."""
 
+class BandLevel(TypedDict):
+    """What a band shows at a place."""
+
+    counts: float
+    """Mean of the raw counts."""
+
+    counts_spread: float
+    """Standard deviation of the raw counts."""
+
+    fwhm_nm: float
+    """Full width of the band at half of its maximum, nm."""
+
+    reflectance: NotRequired[float | None]
+    """Mean reflectance: 0 as dark as the dark reference, 1 as bright as the white one. Null without a
+    white reference."""
+
+    reflectance_spread: NotRequired[float | None]
+    """Standard deviation of the reflectance. Null without a white reference."""
+
+    wavelength_nm: float
+    """Wavelength at which the band is most sensitive, nm."""
+
 class CameraOffer(TypedDict):
     """What can be changed, and whether the last change failed."""
 
@@ -886,6 +908,18 @@ class PlaceRules(TypedDict):
 
     withdrawn: Replacement
     """What happens to the place of a session whose surgeon withdrew."""
+
+class PlaceSpectrum(TypedDict):
+    """The spectrum at a place."""
+
+    bands: builtins.list[BandLevel]
+    """The bands in order of wavelength."""
+
+    cells: int
+    """Number of mosaic cells within the circle."""
+
+    saturated: int
+    """Samples at full scale, whose true values are higher."""
 
 class PlanStudy(TypedDict):
     """A study to plan."""
@@ -2071,6 +2105,10 @@ class ResearcherRequests:
         """A frame of a recording of an unblinded session. Frames count from 0."""
         return self._call("GET", f"/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}", answer="bytes", query={"size": size})
 
+    def spectrum(self, session: str | int, recording: str | int, frame: str | int, *, x: float, y: float, radius: float | None = None) -> PlaceSpectrum:
+        """The spectrum at a place of a recorded mosaic of an unblinded session. Frames count from 0."""
+        return self._call("GET", f"/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}/spectrum", query={"x": x, "y": y, "radius": radius})
+
     def timeline(self, session: str | int) -> Timeline:
         """One session over time with its focal path. The path may tell policies apart, so each access
         is recorded."""
@@ -2372,6 +2410,10 @@ class AsyncResearcherRequests:
     def frame(self, session: str | int, recording: str | int, frame: str | int, *, size: Literal["cell", "half"] | None = None) -> Awaitable[bytes]:
         """A frame of a recording of an unblinded session. Frames count from 0."""
         return self._call("GET", f"/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}", answer="bytes", query={"size": size})
+
+    def spectrum(self, session: str | int, recording: str | int, frame: str | int, *, x: float, y: float, radius: float | None = None) -> Awaitable[PlaceSpectrum]:
+        """The spectrum at a place of a recorded mosaic of an unblinded session. Frames count from 0."""
+        return self._call("GET", f"/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}/spectrum", query={"x": x, "y": y, "radius": radius})
 
     def timeline(self, session: str | int) -> Awaitable[Timeline]:
         """One session over time with its focal path. The path may tell policies apart, so each access

@@ -3,13 +3,12 @@
 use std::io;
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use crate::cli::output::{Failure, print};
 use parfocal_base::files::replace;
 use parfocal_devices::camera::calibration;
-use parfocal_imaging::{Calibration, Circle, Spectrum, SpectrumSum};
-use parfocal_recording::{Recording, by_wavelength};
+use parfocal_imaging::{Circle, Spectrum, SpectrumSum};
+use parfocal_recording::Recording;
+use parfocal_session::playback::PlaceSpectrum;
 
 /// Arguments of `parfocal recording spectrum`.
 #[derive(Debug, clap::Args)]
@@ -30,17 +29,6 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// A row of the table. A cell is empty where no white reference makes reflectances of counts.
-#[derive(Debug, Serialize)]
-struct Row {
-    wavelength_nm: f64,
-    fwhm_nm: f64,
-    counts: f64,
-    counts_spread: f64,
-    reflectance: Option<f64>,
-    reflectance_spread: Option<f64>,
-}
-
 /// Prints or writes the table, the bands in order of wavelength.
 ///
 /// # Errors
@@ -58,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let spectrum = sum.spectrum();
 
-    let table = table(&calibration, &spectrum).map_err(|error| error.to_string())?;
+    let table = table(&PlaceSpectrum::new(&calibration, &spectrum)).map_err(|error| error.to_string())?;
     let Some(out) = &arguments.out else {
         print(&String::from_utf8_lossy(&table))?;
         eprintln!("{}", summary(&spectrum));
@@ -68,18 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!("{} in {}\n", summary(&spectrum), out.display()))
 }
 
-fn table(calibration: &Calibration, spectrum: &Spectrum) -> io::Result<Vec<u8>> {
+fn table(spectrum: &PlaceSpectrum) -> io::Result<Vec<u8>> {
     let mut table = csv::Writer::from_writer(Vec::new());
-    for band in by_wavelength(calibration) {
-        let reflectance = spectrum.reflectance.map(|levels| levels[band]);
-        table.serialize(Row {
-            wavelength_nm: calibration.bands[band].centre_nm,
-            fwhm_nm: calibration.bands[band].fwhm_nm,
-            counts: spectrum.counts[band].mean,
-            counts_spread: spectrum.counts[band].spread,
-            reflectance: reflectance.map(|level| level.mean),
-            reflectance_spread: reflectance.map(|level| level.spread),
-        })?;
+    for band in &spectrum.bands {
+        table.serialize(band)?;
     }
     table.into_inner().map_err(|error| io::Error::other(error.to_string()))
 }

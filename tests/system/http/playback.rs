@@ -62,6 +62,28 @@ fn frame(name: &str, number: usize, size: &str) -> String {
     format!("recordings/{name}/frames/{number}?size={size}")
 }
 
+fn spectrum(name: &str, number: usize, place: &str) -> String {
+    format!("recordings/{name}/frames/{number}/spectrum?{place}")
+}
+
+/// Compares with `parfocal recording spectrum`, which is compared with Spectral Python.
+async fn the_spectrum_is_that_of_the_command(server: &Server, session: &str) {
+    let found = get_json(server, session, &spectrum(session, 7, "x=1000.5&y=500&radius=40")).await;
+    let folder = recordings(server).join(session);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.args(["recording", "spectrum", "--at", "1000.5,500", "--radius", "40", "--frames", "7"]).arg(folder);
+    let table = command.output().unwrap().stdout;
+    let rows = csv::Reader::from_reader(table.as_slice()).into_deserialize::<BTreeMap<String, Option<f64>>>();
+    let rows: Vec<_> = rows.map(Result::unwrap).collect();
+    assert_eq!(found["bands"], json!(rows));
+    assert_eq!(found["bands"].as_array().unwrap().len(), 16);
+    assert!(found["cells"].as_u64().unwrap() > 300, "{found}");
+
+    let (status, said) = refusal(server, session, &spectrum(session, 7, "x=2048&y=0")).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(said.contains("the place 2048,0 is outside the picture of 2048x1088 samples"), "{said}");
+}
+
 /// Mean absolute difference between a JPEG picture and the developed frame `number` of `recording`.
 fn difference(jpeg: &[u8], recording: &Recording, number: usize, size: Size) -> f64 {
     let calibration = calibration::read(&recording.calibration()).unwrap();
@@ -79,7 +101,7 @@ fn difference(jpeg: &[u8], recording: &Recording, number: usize, size: Size) -> 
 async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding() {
     let server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = recorded(&server, "recorded").await;
-    for rest in ["recordings".to_owned(), frame(&session, 0, "cell")] {
+    for rest in ["recordings".to_owned(), frame(&session, 0, "cell"), spectrum(&session, 0, "x=9&y=9")] {
         for role in ["surgeon", "operator"] {
             assert_eq!(get(&server, role, &session, &rest).await.0, StatusCode::FORBIDDEN, "{role} {rest}");
         }
@@ -114,6 +136,7 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
         let apart = difference(&jpeg, &recording, 7, size);
         assert!(apart < 5.0, "{name}: {apart} apart");
     }
+    the_spectrum_is_that_of_the_command(&server, &session).await;
     let viewed = "SELECT count(*) FROM accesses WHERE kind = 'recording-viewed' AND role = 'researcher'";
     assert_eq!(number(&server, viewed).await, 1, "the look at it is recorded");
 
@@ -121,7 +144,8 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
     let withdraw = format!("/api/researcher/sessions/{session}/withdraw");
     let withdraw = server.post_as("researcher", &withdraw).json(&json!({"reason": "wants no part in it"}));
     assert_eq!(withdraw.send().await.unwrap().status(), StatusCode::NO_CONTENT);
-    for rest in ["recordings".to_owned(), frame(&session, 7, "cell"), "timeline".to_owned(), "course".to_owned()] {
+    let places = [frame(&session, 7, "cell"), spectrum(&session, 7, "x=9&y=9")];
+    for rest in ["recordings", "timeline", "course"].map(str::to_owned).into_iter().chain(places) {
         let (status, said) = refusal(&server, &session, &rest).await;
         assert!(status == StatusCode::CONFLICT && said.contains("the participant withdrew"), "{rest}: {said}");
     }
@@ -139,6 +163,9 @@ async fn the_view_is_played_as_it_was_recorded() {
     assert_eq!(found["recordings"][0]["times_ms"].as_array().unwrap().len(), view.rows().len());
     let (_, jpeg) = get(&server, "researcher", &session, &frame(&session, 12, "half")).await;
     assert!(jpeg == view.picture(12).unwrap());
+
+    let (status, said) = refusal(&server, &session, &spectrum(&session, 12, "x=9&y=9")).await;
+    assert!(status == StatusCode::NOT_FOUND && said.contains("has no spectra, only colours"), "{said}");
 }
 
 #[tokio::test]

@@ -13,10 +13,10 @@ use super::error::{Error, ErrorBody};
 use super::people::Acting;
 use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
-use parfocal_imaging::Size;
+use parfocal_imaging::{Circle, Size};
 use parfocal_records::store::Access;
 use parfocal_session::conductor::ConductError;
-use parfocal_session::playback::{PlaybackError, SessionRecordings};
+use parfocal_session::playback::{PlaceSpectrum, PlaybackError, SessionRecordings};
 use parfocal_trial::role::Role;
 
 impl From<PlaybackError> for Error {
@@ -24,6 +24,7 @@ impl From<PlaybackError> for Error {
         match error {
             PlaybackError::Session(error) => error.into(),
             PlaybackError::NotFound(text) => Self::NotFound(text),
+            PlaybackError::Place(bad) => Self::Invalid(bad.to_string()),
             PlaybackError::Unreadable(text) => Self::Unreadable(text),
             PlaybackError::Ending => Self::Unreadable(error.to_string()),
         }
@@ -106,7 +107,46 @@ async fn frame(
     Ok(([(CONTENT_TYPE, "image/jpeg")], jpeg))
 }
 
+/// A circle in a mosaic.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct PlaceQuery {
+    /// Centre: samples of the mosaic from its left edge.
+    x: f64,
+    /// Centre: samples of the mosaic from its upper edge.
+    y: f64,
+    /// All cells whose middle is this near to the centre are taken, in samples. With 0, the cell there.
+    #[serde(default)]
+    radius: f64,
+}
+
+/// The spectrum at a place of a recorded mosaic of an unblinded session. Frames count from 0.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}/spectrum",
+    tag = "researcher",
+    params(
+        ("session" = SessionId, Path),
+        ("recording" = String, Path, description = "The recording's name"),
+        ("frame" = usize, Path, description = "The frame's place in the recording, from 0"),
+        PlaceQuery,
+    ),
+    responses(
+    (status = 200, body = PlaceSpectrum),
+    (status = 422, description = "No such place in the picture", body = ErrorBody),
+    (status = 404, description = "No such session, recording or frame, or it has no bands", body = ErrorBody),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody),
+    (status = 500, description = "The frame is damaged", body = ErrorBody)))]
+async fn spectrum(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path((session, recording, frame)): Path<(SessionId, String, usize)>,
+    Query(PlaceQuery { x, y, radius }): Query<PlaceQuery>,
+) -> Result<Json<PlaceSpectrum>, Error> {
+    by.for_session(&app, session).await?;
+    let circle = Circle { x, y, radius };
+    Ok(Json(app.player.spectrum(Role::Researcher, session, &recording, frame, circle).await?))
+}
+
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(recordings)).routes(routes!(frame))
+    OpenApiRouter::new().routes(routes!(recordings)).routes(routes!(frame)).routes(routes!(spectrum))
 }

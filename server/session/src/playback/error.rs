@@ -1,6 +1,7 @@
 //! Why a recording cannot be played.
 
 use crate::conductor::ConductError;
+use parfocal_imaging::BadCircle;
 
 /// Why a recording cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -11,6 +12,9 @@ pub enum PlaybackError {
     /// There is no such recording or frame.
     #[error("{0}")]
     NotFound(String),
+    /// There is no such place in a picture.
+    #[error(transparent)]
+    Place(#[from] BadCircle),
     /// The recording exists, but cannot be read.
     #[error("{0}")]
     Unreadable(String),

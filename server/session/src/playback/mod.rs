@@ -1,10 +1,12 @@
-//! Playback: plays a session's recordings as times and pictures for the researcher's page, and runs a policy over any
+//! Playback: plays a session's recordings as times, pictures and spectra for the researcher's page, and runs a policy over any
 //! recording. The page gets nothing else from a recording. The focal power comes with the timeline, under its rules.
 
 mod error;
 mod player;
 mod projector;
+mod spectrum;
 pub mod stepping;
 
 pub use error::PlaybackError;
 pub use player::{Player, RecordingCourse, SessionRecordings};
+pub use spectrum::{BandLevel, PlaceSpectrum};

@@ -10,10 +10,11 @@ use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
 use super::error::PlaybackError;
-use super::projector::{Projector, Slide};
+use super::projector::Projector;
+use super::spectrum::PlaceSpectrum;
 use crate::conductor::{Conductor, Played};
 use parfocal_base::ids::SessionId;
-use parfocal_imaging::Size;
+use parfocal_imaging::{Circle, Size};
 use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, Kind, RecordingError, belonging, of_session};
 use parfocal_trial::protocol::Record;
 use parfocal_trial::role::Role;
@@ -94,15 +95,36 @@ impl Player {
         number: usize,
         size: Size,
     ) -> Result<Bytes, PlaybackError> {
+        let folder = self.folder(by, session, name).await?;
+        self.0.projector.ask(folder, move |open| open.picture(number, size)).await
+    }
+
+    /// The spectrum within `circle` of frame `number` of recording `name` of `session`.
+    ///
+    /// # Errors
+    /// If `by` may not play it (yet), there is no such recording, frame or place, it has no bands, or it is damaged.
+    pub async fn spectrum(
+        &self,
+        by: Role,
+        session: SessionId,
+        name: &str,
+        number: usize,
+        circle: Circle,
+    ) -> Result<PlaceSpectrum, PlaybackError> {
+        let folder = self.folder(by, session, name).await?;
+        self.0.projector.ask(folder, move |open| open.spectrum(number, circle)).await
+    }
+
+    /// The folder of recording `name` of `session`, if `by` may play it.
+    async fn folder(&self, by: Role, session: SessionId, name: &str) -> Result<PathBuf, PlaybackError> {
         self.check(by, session).await?;
 
         let recordings = self.0.folder.clone();
         let named = name.to_owned();
         let folder = spawn_blocking(move || belonging(&recordings, &named, &session.to_string())).await;
-        let folder = folder.map_err(|_| PlaybackError::Ending)?.ok_or_else(|| {
+        folder.map_err(|_| PlaybackError::Ending)?.ok_or_else(|| {
             PlaybackError::NotFound(format!("the session has no recording {name} in the folder {FOLDER} any more"))
-        })?;
-        self.0.projector.picture(Slide { folder, number, size }).await
+        })
     }
 
     async fn check(&self, by: Role, session: SessionId) -> Result<(), PlaybackError> {

@@ -1,4 +1,4 @@
-//! Makes the pictures of recordings, one after another, on a thread of low priority. A session under way has
+//! Makes the pictures and spectra of recordings, one after another, on a thread of low priority. A session under way has
 //! precedence: only the people who play an earlier session have to wait.
 
 use std::path::{Path, PathBuf};
@@ -7,32 +7,23 @@ use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot};
 
 use super::error::PlaybackError;
+use super::spectrum::PlaceSpectrum;
 use parfocal_base::priority;
 use parfocal_devices::camera::calibration;
-use parfocal_imaging::{Developer, GrayImage, JpegEncoder, RgbImage, Size};
+use parfocal_imaging::{Calibration, Circle, Developer, GrayImage, JpegEncoder, RgbImage, Size, SpectrumSum};
 use parfocal_recording::{AnyRecording, Recording, RecordingError};
 
-/// Maximum number of pictures that wait to be made: enough for the requests that a few pages make ahead.
+/// Maximum number of pictures and spectra that wait to be made: enough for the requests that a few pages make ahead.
 const WAITING: usize = 64;
 /// Maximum number of recordings that are kept open.
 const OPEN: usize = 4;
 
-/// A frame of a recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Slide {
-    /// Folder of the recording.
-    pub folder: PathBuf,
-    /// Index of the frame, from 0.
-    pub number: usize,
-    /// Size at which a mosaic is developed.
-    pub size: Size,
-}
+/// What the thread has to do next.
+type Job = Box<dyn FnOnce(&mut Vec<Open>) + Send>;
 
-type PictureResult = Result<Bytes, PlaybackError>;
-
-/// A handle of the thread that makes pictures. The thread ends when the handle is dropped.
+/// A handle of the thread that looks into recordings. The thread ends when the handle is dropped.
 pub(super) struct Projector {
-    slides: mpsc::Sender<(Slide, oneshot::Sender<PictureResult>)>,
+    jobs: mpsc::Sender<Job>,
 }
 
 impl Projector {
@@ -41,57 +32,66 @@ impl Projector {
     /// # Errors
     /// If the system cannot start another thread.
     pub fn start() -> std::io::Result<Self> {
-        let (slides, waiting) = mpsc::channel(WAITING);
+        let (jobs, waiting) = mpsc::channel(WAITING);
         std::thread::Builder::new().name("playback".into()).spawn(move || run(waiting))?;
-        Ok(Self { slides })
+        Ok(Self { jobs })
     }
 
-    /// The picture of `slide` as a JPEG. If the future is dropped before the picture's turn, it is not made.
-    pub async fn picture(&self, slide: Slide) -> PictureResult {
-        let (reply, made) = oneshot::channel();
-        self.slides.send((slide, reply)).await.map_err(|_| PlaybackError::Ending)?;
-        made.await.map_err(|_| PlaybackError::Ending)?
+    /// What `look` finds in the recording in `folder`. If the future is dropped before its turn comes, as when the page
+    /// has jumped elsewhere, nothing is done.
+    pub async fn ask<T: Send + 'static>(
+        &self,
+        folder: PathBuf,
+        look: impl Fn(&mut Open) -> Result<T, PlaybackError> + Send + 'static,
+    ) -> Result<T, PlaybackError> {
+        let (reply, found) = oneshot::channel();
+        let job: Job = Box::new(move |open| {
+            if !reply.is_closed() {
+                let _ = reply.send(look_into(open, &folder, look));
+            }
+        });
+        self.jobs.send(job).await.map_err(|_| PlaybackError::Ending)?;
+        found.await.map_err(|_| PlaybackError::Ending)?
     }
 }
 
-fn run(mut waiting: mpsc::Receiver<(Slide, oneshot::Sender<PictureResult>)>) {
+fn run(mut waiting: mpsc::Receiver<Job>) {
     priority::lower_further();
     let mut open: Vec<Open> = Vec::new();
-
-    while let Some((slide, reply)) = waiting.blocking_recv() {
-        // Nobody waits for this picture any more: the page has jumped elsewhere in the recording.
-        if reply.is_closed() {
-            continue;
-        }
-        let _ = reply.send(make(&mut open, &slide));
+    while let Some(job) = waiting.blocking_recv() {
+        job(&mut open);
     }
 }
 
 /// An open recording, and the tools that make its pictures.
-struct Open {
+pub(super) struct Open {
     recording: AnyRecording,
     /// None for a recording of the view.
     studio: Option<Studio>,
 }
 
-fn make(open: &mut Vec<Open>, slide: &Slide) -> PictureResult {
-    let place = open.iter().position(|open| open.folder() == slide.folder);
+fn look_into<T>(
+    open: &mut Vec<Open>,
+    folder: &Path,
+    look: impl Fn(&mut Open) -> Result<T, PlaybackError>,
+) -> Result<T, PlaybackError> {
+    let place = open.iter().position(|open| open.recording.folder() == folder);
     let mut found = match place {
         Some(place) => open.remove(place),
-        None => Open::new(&slide.folder)?,
+        None => Open::new(folder)?,
     };
 
-    let mut made = found.picture(slide);
-    if matches!(made, Err(PlaybackError::NotFound(_))) {
+    let mut seen = look(&mut found);
+    if matches!(seen, Err(PlaybackError::NotFound(_))) {
         // The recording may have grown since it was opened.
-        found = Open::new(&slide.folder)?;
-        made = found.picture(slide);
+        found = Open::new(folder)?;
+        seen = look(&mut found);
     }
 
     // The most recently used recording comes first. The least recently used one is closed.
     open.insert(0, found);
     open.truncate(OPEN);
-    made
+    seen
 }
 
 impl Open {
@@ -104,21 +104,29 @@ impl Open {
         Ok(Self { recording, studio })
     }
 
-    fn folder(&self) -> &Path {
-        self.recording.folder()
-    }
-
-    fn picture(&mut self, slide: &Slide) -> PictureResult {
+    /// Frame `number`, from 0, as a JPEG; a mosaic developed at `size`.
+    pub fn picture(&mut self, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
         match (&self.recording, &mut self.studio) {
-            (AnyRecording::View(recording), _) => recording.picture(slide.number).map(Bytes::from).map_err(unreadable),
-            (AnyRecording::Mosaic(recording), Some(studio)) => studio.picture(recording, slide),
+            (AnyRecording::View(recording), _) => recording.picture(number).map(Bytes::from).map_err(unreadable),
+            (AnyRecording::Mosaic(recording), Some(studio)) => studio.picture(recording, number, size),
             (AnyRecording::Mosaic(_), None) => Err(PlaybackError::Ending),
         }
+    }
+
+    /// The spectrum of frame `number`, from 0, within `circle`.
+    pub fn spectrum(&self, number: usize, circle: Circle) -> Result<PlaceSpectrum, PlaybackError> {
+        let (AnyRecording::Mosaic(recording), Some(studio)) = (&self.recording, &self.studio) else {
+            return Err(PlaybackError::NotFound("a recording of the view has no spectra, only colours".to_owned()));
+        };
+        let mut sum = SpectrumSum::new(&studio.calibration, circle, recording.size())?;
+        sum.add(&recording.frame(number).map_err(unreadable)?);
+        Ok(PlaceSpectrum::new(&studio.calibration, &sum.spectrum()))
     }
 }
 
 /// Develops mosaics with the calibration that was stored in their recording.
 struct Studio {
+    calibration: Calibration,
     developer: Developer,
     encoder: JpegEncoder,
     rgb: RgbImage,
@@ -133,12 +141,12 @@ impl Studio {
             .map_err(|error| PlaybackError::Unreadable(error.to_string()))?;
 
         let developer = Developer::new(&calibration);
-        Ok(Self { developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
+        Ok(Self { calibration, developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
     }
 
-    fn picture(&mut self, recording: &Recording, slide: &Slide) -> PictureResult {
-        let mosaic = recording.frame(slide.number).map_err(unreadable)?;
-        self.developer.develop(&mosaic, slide.size, &mut self.rgb, &mut self.gray);
+    fn picture(&mut self, recording: &Recording, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
+        let mosaic = recording.frame(number).map_err(unreadable)?;
+        self.developer.develop(&mosaic, size, &mut self.rgb, &mut self.gray);
         self.encoder.encode(&self.rgb).map_err(|error| PlaybackError::Unreadable(error.to_string()))
     }
 }
