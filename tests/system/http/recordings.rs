@@ -182,7 +182,14 @@ async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
     // Nobody else changes the recorded size, although the operator's screen is larger.
     let mut operator = Page::open(&server, "operator").await;
     operator.say(json!({"type": "screen", "width": 4000})).await;
-    let full = operator.watch_until(|header| header["per_cell"] == 4).await;
+    // Both look on all the while: who reads nothing is taken to be gone.
+    let full = loop {
+        surgeon.watch(1).await;
+        let frame = operator.watch_until(|_| true).await;
+        if frame.header["per_cell"] == 4 {
+            break frame;
+        }
+    };
     until_viewed(&mut surgeon, &folder, |row| row.number >= full.number()).await;
 
     surgeon.say(json!({"type": "screen", "width": 400})).await;
