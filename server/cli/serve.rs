@@ -229,7 +229,12 @@ fn link(
     let app = Arc::clone(app);
     let blinded = Box::new(move || app.blinded());
     let source = openigtlink::Source { live, status, developer, blinded, clock, shutdown };
-    tokio::spawn(openigtlink::run(listener, source, arguments.navigation.settings()));
+    let settings = arguments.navigation.settings();
+    tokio::spawn(async move {
+        if let Err(error) = openigtlink::run(listener, source, settings).await {
+            tracing::error!(%error, "OpenIGTLink is off, because the system has no thread left for it");
+        }
+    });
     Ok(Some(address))
 }
 

@@ -46,7 +46,7 @@ pub enum PolicyError {
         reason: String,
     },
     /// The policy runs in another process, which is being started.
-    #[error("policy '{name}' is starting{}", failed.as_ref().map_or(String::new(), |failed| format!(": {failed}")))]
+    #[error("policy '{name}' {}", failed.as_ref().map_or("is starting".into(), |why| format!("did not start: {why}")))]
     Starting {
         /// The policy.
         name: PolicyName,

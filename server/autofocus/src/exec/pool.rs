@@ -11,6 +11,7 @@ use super::command::Command;
 use super::process::Process;
 use super::settings::Settings;
 use parfocal_base::clock::Moment;
+use parfocal_base::priority;
 
 /// Time that the process of an instance that has just ended may take to come back.
 const HANDOVER: Duration = Duration::from_millis(100);
@@ -189,6 +190,11 @@ impl Shared {
 
     /// Starts processes as they are ordered, until the pool is closed.
     fn keep(&self) {
+        if !self.settings.many {
+            // As the thread of a policy that is built in does. The processes inherit it.
+            priority::prefer();
+        }
+
         let mut state = self.inner.lock();
         loop {
             while state.ordered == 0 && !state.closed {

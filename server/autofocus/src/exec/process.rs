@@ -23,7 +23,7 @@ use super::command::Command;
 use super::framing::{ANSWER_BYTES, Answer, BELIEF_AT, Kind, MEMORY_BYTES, Question, Saying};
 use super::settings::Settings;
 use crate::{Decision, Fault, Observation};
-use parfocal_base::{BlurRate, FocalPower};
+use parfocal_base::{BlurRate, FocalPower, priority};
 use parfocal_imaging::{PATCH_SIDE, Patch, View, WIDER};
 
 /// Hidden command of the program that turns into a policy's process.
@@ -288,6 +288,7 @@ impl Output {
 
         std::thread::Builder::new().name("policy-output".into()).spawn(move || {
             let _printing: std::sync::mpsc::Sender<()> = printing;
+            priority::lower();
             let Some(stdout) = stdout else { return };
             for line in Lines(BufReader::new(stdout)) {
                 say(&line);
