@@ -66,14 +66,16 @@ fn table(spectrum: &PlaceSpectrum) -> io::Result<Vec<u8>> {
 
 fn summary(spectrum: &Spectrum) -> String {
     let of = |number: usize, what: &str| format!("{number} {what}{}", if number == 1 { "" } else { "s" });
-    let mut text = format!("{} in {}", of(spectrum.cells, "cell"), of(spectrum.frames, "frame"));
-    if spectrum.reflectance.is_none() {
-        text.push_str("; counts alone, since the sensor was recorded without a white reference");
-    }
-    if spectrum.saturated > 0 {
-        text.push_str(&format!("; {} at full scale, so the true values are higher", of(spectrum.saturated, "sample")));
-    }
-    text
+    let taken = format!("{} in {}", of(spectrum.cells, "cell"), of(spectrum.frames, "frame"));
+    let uncalibrated = match spectrum.reflectance {
+        Some(_) => "",
+        None => "; counts alone, since the sensor was recorded without a white reference",
+    };
+    let saturated = match spectrum.saturated {
+        0 => String::new(),
+        number => format!("; {} at full scale, so the true values are higher", of(number, "sample")),
+    };
+    format!("{taken}{uncalibrated}{saturated}")
 }
 
 fn place(text: &str) -> Result<(f64, f64), String> {
