@@ -134,7 +134,7 @@ CREATE TABLE policies (
 ) STRICT;
 
 -- Fifty rows a second all day long: numbers only, and one index over the rows of trials alone. picture_width is that of
--- the surgeon's picture at that time.
+-- the surgeon's picture at that time; patch_x and patch_y are the patch's left column and top row, in mosaic cells.
 CREATE TABLE telemetry (
     number INTEGER PRIMARY KEY,
     run INTEGER NOT NULL,
@@ -149,7 +149,9 @@ CREATE TABLE telemetry (
     latency_micros INTEGER NOT NULL,
     held TEXT,
     optimal REAL,
-    picture_width INTEGER
+    picture_width INTEGER,
+    patch_x INTEGER NOT NULL,
+    patch_y INTEGER NOT NULL
 ) STRICT;
 CREATE INDEX telemetry_by_segment ON telemetry (segment, number) WHERE segment IS NOT NULL;
 

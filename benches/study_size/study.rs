@@ -151,6 +151,7 @@ async fn telemetry(trial: &Trial, segment: SegmentId, begun: Moment, steps: usiz
                 latency_micros: 900 + (frame % 101) as u32,
                 held: None,
                 optimal: Some(FocalPower::nearest(optimum)),
+                patch: (240, 120),
             };
             sender.try_send(record).expect("there is room for them");
         }

@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use parfocal_autofocus::{Decision, FieldOfView, Observation, Policy, Registry};
-use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, ManualClock};
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::{Hold, StepRecord};
+use parfocal_base::{PatchPlace, PolicyName};
 use parfocal_devices::lens::{LensDynamics, LensError};
 use parfocal_imaging::{ContentArea, Reconstructor};
-use parfocal_pipeline::control::{Command, Drive, Eye, Stepper};
+use parfocal_pipeline::control::{Aim, Command, Drive, Eye, Stepper};
 use proptest::prelude::*;
 use uuid::Uuid;
 
@@ -247,6 +247,89 @@ fn a_pause_holds_and_asks_no_policy() {
     fixture.script.set(Deed::GoTo(0.1));
     let record = fixture.step();
     assert_eq!((record.asked, record.held, record.policy), (power(0.6), Some(Hold::Paused), None));
+}
+
+/// A policy that stays where it is, and notes each frame that it sees and each time that it must forget.
+struct Diarist(Arc<Mutex<Vec<String>>>);
+
+impl Policy for Diarist {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        self.0.lock().unwrap().push("sees".to_owned());
+        Decision { target: seen.focal_power.get(), ..Decision::default() }
+    }
+
+    fn forget(&mut self) {
+        self.0.lock().unwrap().push("forgets".to_owned());
+    }
+}
+
+/// A loop with the policy "diarist" in charge, and its diary.
+fn diarist() -> (Fixture, Arc<Mutex<Vec<String>>>) {
+    let diary = Arc::new(Mutex::new(Vec::new()));
+    let notes = diary.clone();
+    let build = move || Box::new(Diarist(notes.clone())) as Box<dyn Policy>;
+    let registry = Registry::default().with("diarist", "notes what it is told", build);
+
+    let mut fixture = Fixture::new(PATIENT);
+    let eye = Eye::new(Reconstructor::default());
+    let lens = Box::new(fixture.lens.clone());
+    fixture.stepper = Stepper::new(lens, eye, registry, fixture.clock.clone(), PATIENT);
+    fixture.stepper.obey(drive("diarist", None));
+    fixture.recover();
+    diary.lock().unwrap().clear();
+    (fixture, diary)
+}
+
+#[test]
+fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first() {
+    let (mut fixture, diary) = diarist();
+    let content = ContentArea { x: 32.0, y: 32.0, radius: 20.0, confidence: 1.0 };
+    fixture.stepper.obey(Command::ContentArea(Some(content)));
+    let step = |fixture: &mut Fixture| {
+        fixture.clock.advance(FRAME);
+        fixture.number += 1;
+        fixture.stepper.step(sized_frame(fixture.number, fixture.clock.now(), 64)).unwrap()
+    };
+
+    let before = step(&mut fixture);
+    assert_eq!((before.patch.x, before.patch.y, before.record.patch), (16, 16, (16, 16)));
+
+    let place = PatchPlace::nearest(0.5, -0.25);
+    fixture.stepper.obey(Command::Aim(Aim { place, choices: 1, held: false }));
+    let after = step(&mut fixture);
+    assert_eq!((after.patch.x, after.patch.y, after.record.patch), (26, 11, (26, 11)), "from the very next frame on");
+    assert_eq!(after.record.asked, before.record.asked, "the lens does not move by it");
+    assert_eq!(after.aim.choices, 1);
+    step(&mut fixture);
+    assert_eq!(*diary.lock().unwrap(), ["sees", "forgets", "sees", "sees"]);
+
+    // The place is relative to the circle. A choice of the same place is none that must be forgotten for.
+    fixture.stepper.obey(Command::ContentArea(Some(ContentArea { x: 30.0, radius: 24.0, ..content })));
+    fixture.stepper.obey(Command::Aim(Aim { place, choices: 2, held: false }));
+    let moved = step(&mut fixture);
+    assert_eq!((moved.patch.x, moved.patch.y), (26, 10));
+    assert_eq!(diary.lock().unwrap().last().unwrap(), "sees");
+    assert_eq!(diary.lock().unwrap().len(), 5);
+}
+
+#[test]
+fn a_held_focus_stays_and_the_policy_begins_anew_when_it_is_released() {
+    let (mut fixture, diary) = diarist();
+    let asked = fixture.step().asked;
+    let aim = |held| Command::Aim(Aim { place: PatchPlace::CENTRE, choices: 0, held });
+    fixture.stepper.obey(aim(true));
+    for _ in 0..3 {
+        let record = fixture.step();
+        assert_eq!((record.asked, record.held, record.policy), (asked, Some(Hold::FocusHeld), None));
+    }
+    fixture.stepper.obey(aim(false));
+    let record = fixture.step();
+    assert_eq!((record.held, record.policy.is_some()), (None, true), "the same instance goes on at once");
+    assert_eq!(*diary.lock().unwrap(), ["sees", "forgets", "sees"]);
 }
 
 #[test]

@@ -11,7 +11,8 @@ use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::{CameraHealth, CameraOffer};
 use parfocal_devices::lens::LensHealth;
-use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, Tap};
+use parfocal_imaging::ContentArea;
+use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, Sight as Sighted, Tap};
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
 use parfocal_records::store::{Recorder, Run, Store};
 use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
@@ -266,6 +267,11 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         latency_p50_micros: 0,
         latency_p99_micros: 0,
         priority: parfocal_base::priority::Standing::Ordinary,
+        // A circle of radius 100 in a picture of 512 x 272 cells.
+        sight: Sighted {
+            cells: (512, 272),
+            content_area: Some(ContentArea { x: 256.0, y: 136.0, radius: 100.0, confidence: 1.0 }),
+        },
     };
 
     let (commands, received) = mpsc::unbounded_channel();

@@ -14,6 +14,7 @@ mod instruments;
 mod late;
 mod lens;
 mod motions;
+mod pointing;
 mod remarks;
 mod sessions;
 mod storage;

@@ -36,7 +36,7 @@ OPEN = {
     "event": (
         "events",
         "session number wall run monotonic_ns role kind segment inspected_ms emergency about focal_power left_at "
-        "hidden picture_width picture_height pictures over_ms",
+        "hidden picture_width picture_height pictures over_ms frame touched_x touched_y patch_across patch_down",
     ),
     "comment": (
         "comments",
@@ -121,7 +121,7 @@ def main(folder):
                 segment, first, last = row["key"].split("/")
                 part = slice(int(first) - 1, int(last))
                 of_it = [step for step in telemetry if step["setting"] == setting[segment]][part]
-                names = "run frame exposed_ns asked measured held optimal picture_width".split()
+                names = "run frame exposed_ns asked measured held optimal picture_width patch_x patch_y".split()
                 open_hash = sha256("parfocal-steps-1", *(step[name] for step in of_it for name in names))
                 content = ["segment", segment, "first", first, "last", last, "steps_sha256", open_hash]
                 hidden = None

@@ -41,6 +41,7 @@ pub fn step(frame: u64, segment: Option<SegmentId>) -> StepRecord {
         latency_micros: 640,
         held: None,
         optimal: Some(FocalPower::nearest(0.4)),
+        patch: (240, 120),
     }
 }
 

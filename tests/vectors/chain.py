@@ -203,6 +203,14 @@ for number, kind, payload in [
         "pictures-seen",
         {"segment": SEGMENTS[0], "width": 512, "height": 272, "pictures": 20, "over_ms": 1500},
     ),
+    (
+        10,
+        "patch-placed",
+        {"segment": SEGMENTS[0], "frame": 2**64 - 1, "x": 300.25, "y": 90.0, "place": [0.4425, -0.46]},
+    ),
+    (11, "patch-centred", {"segment": SEGMENTS[0], "frame": 12}),
+    (12, "focus-held", {"segment": SEGMENTS[0]}),
+    (13, "focus-released", {"segment": SEGMENTS[0]}),
 ]:
     columns = dict(session=SESSION, number=number, run=1, wall=wall(7), monotonic_ns=7_000 + number, role="operator")
     # As the program writes it: 1e-7, where Python writes 1e-07.
@@ -227,6 +235,11 @@ for number, kind, payload in [
         picture_height=payload.get("height"),
         pictures=payload.get("pictures"),
         over_ms=payload.get("over_ms"),
+        frame=payload.get("frame"),
+        touched_x=as_json(payload.get("x")),
+        touched_y=as_json(payload.get("y")),
+        patch_across=as_json(payload.get("place", [None])[0]),
+        patch_down=as_json(payload.get("place", [None])[-1]),
     )
     record("event", f"{SESSION}/{number}", SESSION, hashed, dict(reason=payload.get("reason")))
 
@@ -412,9 +425,12 @@ for frame, policy, asked, measured, metric, held, optimal in steps:
         held=held,
         optimal=optimal,
         picture_width=512 if policy else None,
+        patch_x=240,
+        patch_y=120 + frame,
     )
-    is_held = held in ("paused", "lens-failed", "camera-failed")
+    is_held = held in ("paused", "focus-held", "lens-failed", "camera-failed")
     open_fields += [1, frame, frame * 20_000_000, asked, measured, is_held, optimal, 512 if policy else None]
+    open_fields += [240, 120 + frame]
     sealed_fields += ["cnn-learned" if policy else None, metric, 17, 640, held]
 steps_sha256 = sha256("parfocal-steps-1", *(text(value) for value in open_fields))
 parts = ["segment", SEGMENTS[0], "first", "1", "last", "3", "steps_sha256", steps_sha256]

@@ -301,6 +301,9 @@ const TIMELINE = {
     { setting: 2, seconds: 20, frame: 4, asked: 0.7, metric: 0.25 },
   ],
   sights: [],
+  choices: [],
+  holds: [],
+  patch_stays: false,
 };
 
 test("the metric's line reaches the top in every setting", () => {

@@ -10,7 +10,18 @@ import {
 } from "../static/researcher/timeline_words.js";
 
 /** @type {Api.Timeline} */
-const EMPTY = { absences: [], comments: [], pauses: [], points: [], set_aside: [], settings: [], sights: [] };
+const EMPTY = {
+  absences: [],
+  choices: [],
+  comments: [],
+  holds: [],
+  patch_stays: false,
+  pauses: [],
+  points: [],
+  set_aside: [],
+  settings: [],
+  sights: [],
+};
 
 /**
  * A point of setting 1, unless `rest` says otherwise.

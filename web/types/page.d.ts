@@ -111,6 +111,10 @@ declare global {
       estimated: boolean;
       patch: Patch;
       area: Circle | null;
+      /** Whether the focus was pointed somewhere, so that the patch is not at the centre. */
+      pointed: boolean;
+      /** How often somebody has pointed since the server started. */
+      choices: number;
       asked?: number | null;
       measured?: number | null;
       metric?: number | null;

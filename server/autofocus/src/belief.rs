@@ -355,6 +355,11 @@ impl Policy for BeliefTracker {
     fn learn_of(&mut self, blur: BlurRate) {
         self.trace.blur = Some(blur);
     }
+
+    fn forget(&mut self) {
+        self.memory = self.network.blank(1, Device::Cpu);
+        self.trace = Trace::knowing(self.trace.blur);
+    }
 }
 
 #[cfg(test)]

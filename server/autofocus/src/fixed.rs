@@ -3,7 +3,7 @@
 use super::{Decision, FieldOfView, Observation, Policy};
 use parfocal_base::FocalPower;
 
-/// Stays at the focal power of its first frame, whatever it sees.
+/// Stays at the focal power of its first frame, whatever it sees and wherever it looks.
 #[derive(Debug, Clone, Default)]
 pub struct Fixed {
     /// Remembered instead of read from each frame, so that errors of the reading cannot make the lens creep.

@@ -45,6 +45,10 @@ impl Policy for HillClimber {
         let target = seen.focal_power.moved(self.direction * STEP).get();
         Decision { target, metric: Some(metric), belief: None }
     }
+
+    fn forget(&mut self) {
+        *self = Self::new(self.metric);
+    }
 }
 
 #[cfg(test)]

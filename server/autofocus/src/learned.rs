@@ -168,6 +168,11 @@ impl Policy for Learned {
             Decision { target: seen.focal_power.moved(step).get(), metric, belief: None }
         })
     }
+
+    fn forget(&mut self) {
+        self.encodings.clear();
+        self.focal_powers.clear();
+    }
 }
 
 /// The action of highest value. Standing still wins a tie with a move.

@@ -38,6 +38,11 @@ pub trait Policy: Send {
     /// Decides for one frame. The decision is not trusted: the control loop checks it.
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
 
+    /// The patch has jumped to another place: what this policy remembers of the old one is no longer comparable. From
+    /// the next step on it decides as a new instance would that begins at that focal power. What it knows of the optics
+    /// stays. A policy without a memory of frames has nothing to do.
+    fn forget(&mut self) {}
+
     /// Gives the policy, before its first step, the blur rate of the optics. Most policies ignore it.
     fn learn_of(&mut self, _blur: BlurRate) {}
 
@@ -91,4 +96,50 @@ pub struct Decision {
     /// Probability distribution of the optimum over equally spaced focal powers from 0 to 1, if the policy has a
     /// belief.
     pub belief: Option<Arc<[f32]>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parfocal_devices::simulation::blur::gaussian_blur;
+    use parfocal_devices::simulation::texture::texture;
+    use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch};
+
+    /// What is seen of `picture` with the patch's corner at `(x, y)`.
+    fn view(picture: &GrayImage, (x, y): (usize, usize)) -> View {
+        let level = |x: usize, y: usize| picture.data[y * picture.width + x];
+        let patch = Patch(std::array::from_fn(|i| level(x + i % PATCH_SIDE, y + i / PATCH_SIDE)));
+        View::around(patch, (x, y), (picture.width, picture.height), |square| {
+            (0..square.side * square.side)
+                .map(|i| level(square.x + i % square.side, square.y + i / square.side))
+                .collect()
+        })
+    }
+
+    /// The decisions of `policy` on a still scene, from focal power 0.5 on, with the patch at `place`.
+    fn decisions(policy: &mut dyn Policy, seed: u64, place: (usize, usize)) -> Vec<Decision> {
+        let picture = texture(seed, 256);
+        let mut focal_power = FocalPower::MIDDLE;
+        let step = |_| {
+            let blurred = gaussian_blur(&picture, 6.0 * (focal_power.get() - 0.7).abs());
+            let decision = policy.step(&Observation { view: &view(&blurred, place), focal_power });
+            focal_power = FocalPower::nearest(decision.target);
+            decision
+        };
+        (0..12).map(step).collect()
+    }
+
+    #[test]
+    fn no_policy_compares_the_patch_with_that_of_another_place() {
+        let registry = Registry::standard();
+        for entry in registry.entries().into_iter().filter(|entry| entry.available) {
+            let mut jumped = registry.build(&entry.name).unwrap();
+            decisions(&mut *jumped, 3, (40, 60));
+            jumped.forget();
+
+            let mut new = registry.build(&entry.name).unwrap();
+            let expected = decisions(&mut *new, 8, (120, 90));
+            assert_eq!(decisions(&mut *jumped, 8, (120, 90)), expected, "{}", entry.name);
+        }
+    }
 }

@@ -134,6 +134,11 @@ impl Policy for Scripted {
             Err(_) => Decision { target: f64::NAN, metric: None, belief: None },
         }
     }
+
+    fn forget(&mut self) {
+        self.patches.clear();
+        self.focal_powers.clear();
+    }
 }
 
 #[cfg(test)]

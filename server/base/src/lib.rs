@@ -15,6 +15,7 @@ mod focal_power;
 pub mod ids;
 pub mod notices;
 pub mod options;
+mod patch_place;
 pub mod plot;
 mod policy_name;
 pub mod priority;
@@ -23,4 +24,5 @@ pub mod step;
 
 pub use blur_rate::BlurRate;
 pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
+pub use patch_place::PatchPlace;
 pub use policy_name::PolicyName;

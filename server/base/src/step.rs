@@ -32,6 +32,8 @@ pub struct StepRecord {
     pub held: Option<Hold>,
     /// The optimum, if the camera is simulated and knows it.
     pub optimal: Option<FocalPower>,
+    /// Left column and top row of the patch, in mosaic cells.
+    pub patch: (u32, u32),
 }
 
 /// Why the last good focal power is being held.
@@ -52,6 +54,8 @@ pub enum Hold {
     CameraFailed,
     /// Paused on request.
     Paused,
+    /// The focus is held on request while the setting goes on.
+    FocusHeld,
 }
 
 impl Hold {
@@ -73,6 +77,7 @@ impl Hold {
             Self::LensFailed => "lens-failed",
             Self::CameraFailed => "camera-failed",
             Self::Paused => "paused",
+            Self::FocusHeld => "focus-held",
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Places in a picture: the content area, and the patch that policies see.
 
+use parfocal_base::PatchPlace;
 use serde::Serialize;
 
 /// Side of the patch in pixels of one band.
@@ -54,16 +55,48 @@ impl PatchArea {
     /// # Errors
     /// If the picture is smaller than the patch.
     pub fn central(width: usize, height: usize, content: Option<&ContentArea>) -> Result<Self, TooSmall> {
+        Self::at(PatchPlace::CENTRE, width, height, content)
+    }
+
+    /// The patch at `place` in `content`, moved as little as needed to lie inside a `width` x `height` picture. Where
+    /// there is no content area, the largest circle around the picture's centre stands for it.
+    ///
+    /// # Errors
+    /// If the picture is smaller than the patch.
+    pub fn at(place: PatchPlace, width: usize, height: usize, content: Option<&ContentArea>) -> Result<Self, TooSmall> {
         if width < PATCH_SIDE || height < PATCH_SIDE {
             return Err(TooSmall { width, height });
         }
 
-        let (x, y) = match content {
-            Some(area) => (start(area.x, width), start(area.y, height)),
-            None => ((width - PATCH_SIDE) / 2, (height - PATCH_SIDE) / 2),
+        let (x, y) = if content.is_none() && place == PatchPlace::CENTRE {
+            ((width - PATCH_SIDE) / 2, (height - PATCH_SIDE) / 2)
+        } else {
+            let (middle_x, middle_y, radius) = circle(width, height, content);
+            (start(middle_x + place.across() * radius, width), start(middle_y + place.down() * radius, height))
         };
 
         Ok(Self { x, y, width: PATCH_SIDE, height: PATCH_SIDE })
+    }
+}
+
+/// The place in the bright circle `content` of the point `(x, y)`, in pixels of a `width` x `height` picture; `None` if
+/// the point is outside the picture. A point outside the circle counts as the nearest one on it.
+#[must_use]
+pub fn place_of(
+    (x, y): (f64, f64),
+    (width, height): (usize, usize),
+    content: Option<&ContentArea>,
+) -> Option<PatchPlace> {
+    let inside = (0.0..=width as f64).contains(&x) && (0.0..=height as f64).contains(&y);
+    let (middle_x, middle_y, radius) = circle(width, height, content);
+    inside.then(|| PatchPlace::nearest((x - middle_x) / radius, (y - middle_y) / radius))
+}
+
+/// Centre and radius of the circle in which the patch has its place.
+fn circle(width: usize, height: usize, content: Option<&ContentArea>) -> (f64, f64, f64) {
+    match content {
+        Some(area) => (area.x, area.y, area.radius.max(1.0)),
+        None => (width as f64 / 2.0, height as f64 / 2.0, width.min(height).max(2) as f64 / 2.0),
     }
 }
 
@@ -96,6 +129,38 @@ mod tests {
         assert_eq!(corner(512, 272, Some((3.0, 270.0))), (0, 240));
         assert_eq!(corner(512, 272, Some((-40.0, 1e9))), (0, 240));
         assert_eq!(corner(32, 32, Some((f64::NAN, 5.0))), (0, 0));
+    }
+
+    #[test]
+    fn a_place_stays_where_it_was_seen_when_the_circle_moves_and_grows() {
+        let circle = |x, y, radius| ContentArea { x, y, radius, confidence: 1.0 };
+        let before = circle(256.0, 136.0, 100.0);
+        let place = place_of((306.0, 111.0), (512, 272), Some(&before)).unwrap();
+        assert_eq!((place.across(), place.down()), (0.5, -0.25));
+
+        let corner = |content: Option<&ContentArea>| {
+            let area = PatchArea::at(place, 512, 272, content).unwrap();
+            (area.x, area.y)
+        };
+        assert_eq!(corner(Some(&before)), (306 - 16, 111 - 16));
+        assert_eq!(corner(Some(&circle(246.0, 140.0, 120.0))), (246 + 60 - 16, 140 - 30 - 16));
+        // Without a circle, the largest one around the centre counts: radius 136.
+        assert_eq!(corner(None), (256 + 68 - 16, 136 - 34 - 16));
+    }
+
+    #[test]
+    fn a_patch_leaves_the_circle_by_half_of_it_at_most() {
+        let content = ContentArea { x: 256.0, y: 136.0, radius: 100.0, confidence: 1.0 };
+        let place = place_of((500.0, 136.0), (512, 272), Some(&content)).unwrap();
+        let area = PatchArea::at(place, 512, 272, Some(&content)).unwrap();
+        assert_eq!((area.x + PATCH_SIDE / 2, area.y + PATCH_SIDE / 2), (356, 136));
+    }
+
+    #[test]
+    fn a_point_outside_the_picture_has_no_place() {
+        for point in [(-0.1, 5.0), (512.1, 5.0), (5.0, 272.5), (f64::NAN, 5.0), (5.0, f64::INFINITY)] {
+            assert_eq!(place_of(point, (512, 272), None), None, "{point:?}");
+        }
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub use calibration_toml::CalibrationError;
 pub use decode::{decode, decode_raw, is_mosaic, raw_format};
 pub use develop::{Developed, Developer};
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
-pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
+pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall, place_of};
 pub use jpeg::{JpegEncoder, JpegError};
 pub use luma::{rgb_patch, rgb_to_gray, rgb_view};
 pub use picture::{DecodeError, Picture, SENSOR_SIZE};

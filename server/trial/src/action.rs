@@ -41,6 +41,16 @@ pub enum Action {
         #[schema(pattern = r"\S")]
         reason: String,
     },
+    /// Operator or surgeon: hold the focus where it is. The inspection of `segment` goes on.
+    HoldFocus {
+        /// Segment that is inspected.
+        segment: SegmentId,
+    },
+    /// Operator or surgeon: no longer hold the focus.
+    ReleaseFocus {
+        /// Segment that is inspected.
+        segment: SegmentId,
+    },
     /// Operator, or surgeon unless the operator paused: resume a paused session.
     Resume,
     /// Operator: end the session early.
@@ -70,7 +80,7 @@ impl Action {
     /// Whether the action stops the lens. If so, it takes effect before it is written to disk.
     #[must_use]
     pub const fn stops_the_lens(&self) -> bool {
-        matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::Abort { .. })
+        matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::HoldFocus { .. } | Self::Abort { .. })
     }
 }
 

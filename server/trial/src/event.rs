@@ -5,11 +5,12 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::account::AccountName;
+use super::pointing::{Choice, Touch};
 use super::role::Role;
 use super::tablet::PictureSize;
-use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
+use parfocal_base::{FocalPower, PatchPlace};
 
 /// Something that happened to a session.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +96,36 @@ pub enum EventKind {
         /// For how long, milliseconds.
         over_ms: u64,
     },
+    /// Somebody chose what is to be in focus: the patch went to the place that was touched.
+    PatchPlaced {
+        /// Segment that was inspected.
+        segment: SegmentId,
+        /// Number of the frame that was on screen.
+        frame: u64,
+        /// Where it was touched: mosaic cells from the picture's left edge.
+        x: f64,
+        /// Where it was touched: mosaic cells from the picture's top edge.
+        y: f64,
+        /// The patch's place in the bright circle.
+        place: PatchPlace,
+    },
+    /// The patch went back to the centre of the bright circle.
+    PatchCentred {
+        /// Segment that was inspected.
+        segment: SegmentId,
+        /// Number of the frame that was on screen.
+        frame: u64,
+    },
+    /// The focus was held where it was, while the inspection goes on.
+    FocusHeld {
+        /// Segment that was inspected.
+        segment: SegmentId,
+    },
+    /// The focus is no longer held. A pause and the end of the segment release it too.
+    FocusReleased {
+        /// Segment that was inspected.
+        segment: SegmentId,
+    },
     /// The session was resumed.
     Resumed,
     /// The server stopped during the session and was started again. The session is paused where it was.
@@ -154,6 +185,10 @@ impl EventKind {
             Self::TabletAway { .. } => "tablet-away",
             Self::TabletBack => "tablet-back",
             Self::PicturesSeen { .. } => "pictures-seen",
+            Self::PatchPlaced { .. } => "patch-placed",
+            Self::PatchCentred { .. } => "patch-centred",
+            Self::FocusHeld { .. } => "focus-held",
+            Self::FocusReleased { .. } => "focus-released",
             Self::Resumed => "resumed",
             Self::ServerRestarted { .. } => "server-restarted",
             Self::Completed => "completed",
@@ -169,7 +204,11 @@ impl EventKind {
         match self {
             Self::SegmentStarted { segment }
             | Self::SegmentFinished { segment, .. }
-            | Self::PicturesSeen { segment, .. } => Some(*segment),
+            | Self::PicturesSeen { segment, .. }
+            | Self::PatchPlaced { segment, .. }
+            | Self::PatchCentred { segment, .. }
+            | Self::FocusHeld { segment }
+            | Self::FocusReleased { segment } => Some(*segment),
             Self::QuestionsFinished { segment } => *segment,
             _ => None,
         }
@@ -247,6 +286,18 @@ impl EventKind {
         }
     }
 
+    /// The choice of what is to be in focus; none for other events.
+    #[must_use]
+    pub const fn choice(&self) -> Option<Choice> {
+        match self {
+            Self::PatchPlaced { frame, x, y, place, .. } => {
+                Some(Choice { frame: *frame, at: Some(Touch { x: *x, y: *y }), place: *place })
+            }
+            Self::PatchCentred { frame, .. } => Some(Choice { frame: *frame, at: None, place: PatchPlace::CENTRE }),
+            _ => None,
+        }
+    }
+
     /// A copy without the reason.
     #[must_use]
     pub fn without_reason(&self) -> Self {
@@ -296,6 +347,10 @@ impl EventKind {
                 let PictureSize { width, height } = size;
                 format!("Setting {} seen at {width}x{height}, {rate:.1} pictures a second", setting(*segment))
             }
+            Self::PatchPlaced { x, y, .. } => format!("Focus pointed at {x:.0}, {y:.0}"),
+            Self::PatchCentred { .. } => "Focus pointed at the centre".to_owned(),
+            Self::FocusHeld { .. } => "Focus held".to_owned(),
+            Self::FocusReleased { .. } => "Focus released".to_owned(),
             Self::Resumed => "Resumed".to_owned(),
             Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
             Self::Completed => "Session completed".to_owned(),
@@ -347,6 +402,10 @@ mod tests {
                 pictures: 20,
                 over_ms: 1000,
             },
+            EventKind::PatchPlaced { segment, frame: 7, x: 300.25, y: 90.5, place: PatchPlace::nearest(0.25, -0.5) },
+            EventKind::PatchCentred { segment, frame: 9 },
+            EventKind::FocusHeld { segment },
+            EventKind::FocusReleased { segment },
             EventKind::Resumed,
             EventKind::ServerRestarted { inspected_ms: 1 },
             EventKind::Completed,

@@ -17,6 +17,7 @@ pub mod instruments;
 pub mod participant;
 pub mod permission;
 pub mod phase;
+pub mod pointing;
 pub mod protocol;
 pub mod question;
 pub mod reason;

@@ -19,6 +19,8 @@ pub enum Request {
     AddParticipant,
     /// Move the lens, or let a policy control it.
     MoveLens,
+    /// Choose what is to be in focus, outside sessions.
+    PlacePatch,
 }
 
 /// The state of the current session, in as much detail as these rules need.
@@ -53,6 +55,9 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         Request::MakeSession | Request::CloseSession | Request::MoveLens if by != Role::Operator => {
             return Err(Refusal::only("the operator"));
         }
+        Request::PlacePatch if !matches!(by, Role::Surgeon | Role::Operator) => {
+            return Err(Refusal::only("the surgeon or the operator"));
+        }
         Request::AddParticipant if !matches!(by, Role::Operator | Role::Researcher) => {
             return Err(Refusal::only("the operator or a researcher"));
         }
@@ -65,6 +70,9 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         }
         (Request::CloseSession, CurrentSession::UnderWay) => {
             Err(Refusal::conflict("the session is under way; abort it to end it"))
+        }
+        (Request::PlacePatch, CurrentSession::UnderWay | CurrentSession::Ended) => {
+            Err(Refusal::conflict("a session is under way; load the page again"))
         }
         // This also holds after the end: the surgeon still sees the view, and may still be answering questions.
         (Request::MoveLens, CurrentSession::UnderWay | CurrentSession::Ended) => {

@@ -104,6 +104,7 @@ mod tests {
     use crate::balanced_set::Member;
     use crate::event::Event;
     use crate::phase::SessionStatus;
+    use crate::pointing::PatchRule;
     use crate::session::Plan;
     use crate::tablet::WhenAway;
 
@@ -123,6 +124,8 @@ mod tests {
             closing: Vec::new(),
             consent: None,
             when_tablet_away: WhenAway::Pause,
+            patch: PatchRule::default(),
+            hold: false,
         };
 
         let mut state = SessionState::new(plan);

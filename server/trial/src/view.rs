@@ -50,6 +50,12 @@ pub struct SurgeonView {
     pub quick_comments: Vec<String>,
     /// Whether the surgeon may comment aloud.
     pub voice: bool,
+    /// Whether the protocol lets the surgeon choose what is to be in focus.
+    pub pointing: bool,
+    /// Whether the protocol lets the surgeon hold the focus.
+    pub holding: bool,
+    /// Whether the focus is held on request.
+    pub focus_held: bool,
     /// Questions to show in the phases `Questions` and `Closing`.
     pub questions: Vec<Question>,
     /// Saved answers to those questions, by question id.

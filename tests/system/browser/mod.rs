@@ -23,6 +23,7 @@ mod offline;
 mod outbox;
 mod people_page;
 mod playback;
+mod pointing;
 mod proxy;
 mod recording_card;
 pub mod screenshots;

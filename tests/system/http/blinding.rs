@@ -9,37 +9,41 @@ use super::live::{Heard, Page};
 use crate::support::{Server, client};
 
 /// Words that would reveal a policy, or how one works.
-const TELLING: [&str; 10] =
+pub const TELLING: [&str; 10] =
     ["polic", "fixed", "climber", "learned", "mgm", "mlr", "cnn", "metric", "asked", "measured"];
 
 /// A session, driven by its operator and its surgeon.
-struct Session<'a> {
+pub struct Session<'a> {
     server: &'a Server,
     /// Everything that was sent to the surgeon's browser, except pictures.
-    heard: Vec<String>,
+    pub heard: Vec<String>,
     segments: Vec<String>,
     keys: u32,
 }
 
-impl Session<'_> {
-    async fn ask(&self, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
+impl<'a> Session<'a> {
+    pub const fn of(server: &'a Server) -> Self {
+        Self { server, heard: Vec::new(), segments: Vec::new(), keys: 0 }
+    }
+
+    pub async fn ask(&self, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
         let request = client().request(method, self.server.url(path)).bearer_auth(self.server.key(role)).json(body);
         let response = request.send().await.unwrap();
         (response.status(), format!("{:?} ", response.headers()) + &response.text().await.unwrap())
     }
 
-    async fn operator(&self, path: &str, body: Value) {
+    pub async fn operator(&self, path: &str, body: Value) {
         let (status, said) = self.ask("operator", Method::POST, path, &body).await;
         assert!(status.is_success(), "{path}: {status} {said}");
     }
 
-    async fn surgeon(&mut self, path: &str, body: Value) {
+    pub async fn surgeon(&mut self, path: &str, body: Value) {
         let (status, said) = self.ask("surgeon", Method::POST, path, &body).await;
         assert!(status.is_success(), "{path} {body}: {status} {said}");
         self.heard.push(said);
     }
 
-    async fn view(&mut self) -> Value {
+    pub async fn view(&mut self) -> Value {
         let (_, said) = self.ask("surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
         let view = serde_json::from_str(said.split_once("} ").unwrap().1).unwrap();
         self.heard.push(said);
@@ -90,7 +94,7 @@ impl Session<'_> {
 #[tokio::test]
 async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
     let server = Server::start();
-    let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
+    let mut session = Session::of(&server);
     let mut page = Page::open(&server, "surgeon").await;
 
     session.operator("/api/operator/participants", json!({"code": "S01"})).await;
@@ -131,11 +135,8 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
     assert!(session.heard.len() > 60);
 
     for heard in &session.heard {
-        let heard = heard.to_lowercase();
+        let heard = without_header_names(heard);
         for telling in TELLING {
-            // Every response has headers with these names.
-            let heard = heard.replace("content-security-policy", "").replace("referrer-policy", "");
-            let heard = heard.replace("cross-origin-resource-policy", "").replace("permissions-policy", "");
             assert!(!heard.contains(telling), "'{telling}' in {heard}");
         }
     }
@@ -144,7 +145,7 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 #[tokio::test]
 async fn during_a_session_the_operator_sees_nothing_that_distinguishes_policies() {
     let server = Server::start();
-    let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
+    let mut session = Session::of(&server);
     let mut page = Page::open(&server, "operator").await;
 
     // Before a session the operator sees everything.
@@ -220,12 +221,19 @@ async fn during_a_session_the_operator_sees_nothing_that_distinguishes_policies(
     }
 }
 
+/// `heard` in small letters, without the names of headers that every response has.
+pub fn without_header_names(heard: &str) -> String {
+    let heard = heard.to_lowercase();
+    let heard = heard.replace("content-security-policy", "").replace("referrer-policy", "");
+    heard.replace("cross-origin-resource-policy", "").replace("permissions-policy", "")
+}
+
 async fn metrics(session: &Session<'_>) -> String {
     session.ask("operator", Method::GET, "/metrics", &Value::Null).await.1
 }
 
 /// The names of all fields, and whether there is a content area.
-fn form(header: &Value) -> String {
+pub fn form(header: &Value) -> String {
     match header {
         Value::Object(fields) => {
             let fields: Vec<_> = fields.iter().map(|(name, value)| format!("{name}:{}", form(value))).collect();

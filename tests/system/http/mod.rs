@@ -13,6 +13,7 @@ mod health;
 pub mod live;
 mod logs;
 mod playback;
+pub mod pointing;
 mod privacy;
 mod real_time;
 mod recordings;

@@ -1,12 +1,13 @@
 // The operator's page: the devices, and the session from preparing it to its end.
 
-import { get } from "../shared/api.js";
+import { get, post } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, setText } from "../shared/dom.js";
+import { focusButtons } from "../shared/focus_buttons.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import "../shared/sign_in.js";
-import { serverAnswered } from "../shared/trouble.js";
+import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { drawCamera } from "./camera_card.js";
 import { followChecks } from "./checks_card.js";
@@ -39,6 +40,11 @@ let wrong = false;
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator", byId("colour"));
+const pointing = viewer.pointBy(
+  (frame, at) => post("/api/operator/patch", { session: session?.session ?? null, frame, at }),
+  tellPointing,
+);
+const focus = focusButtons(pointing, holdFocus);
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
@@ -56,9 +62,44 @@ function followSession(next) {
   known = true;
   sessionCard.follow(session);
   followLink(session);
+  followFocusButtons();
   redrawFocus();
   drawTheWarnings();
   drawNow();
+}
+
+/** Outside sessions one may always point. */
+function followFocusButtons() {
+  const looking = session?.phase === "inspecting" && !session.paused;
+  focus.follow({
+    points: session ? session.pointing && session.phase === "inspecting" : true,
+    mayPoint: session ? session.pointing && looking : true,
+    holds: (session?.holding ?? false) && session?.phase === "inspecting",
+    mayHold: looking,
+    held: session?.focus_held ?? false,
+  });
+}
+
+/** @param {boolean} hold */
+async function holdFocus(hold) {
+  const segment = session?.segment;
+  if (!session || !segment) return;
+  /** @type {"hold-focus" | "release-focus"} */
+  const action = hold ? "hold-focus" : "release-focus";
+  try {
+    await followAnswer(post("/api/operator/actions", { session: session.session, action, segment }));
+    tellPointing(null);
+  } catch (error) {
+    followFocusButtons();
+    tellPointing(error);
+  }
+}
+
+/** @param {unknown} trouble */
+function tellPointing(trouble) {
+  const element = byId("pointing-trouble");
+  if (typeof trouble === "string" || trouble === null) tell(element, trouble ?? "");
+  else tellTrouble(element, trouble, "The server does not answer, so the focus was not moved.");
 }
 
 function drawNow() {

@@ -18,6 +18,23 @@ export function momentText(seconds) {
 }
 
 /**
+ * Where the focus looks at a moment: what was chosen last, in the same setting unless choices stay.
+ *
+ * @param {Api.Timeline} timeline
+ * @param {number} seconds
+ */
+function focusAt({ choices, holds, settings, patch_stays: stays }, seconds) {
+  const setting = settings.find(({ from, to }) => from <= seconds && (to == null || seconds <= to));
+  if (!setting) return "–";
+  const isHeld = holds.some(({ from, to }) => from <= seconds && (to == null || seconds <= to));
+  const held = isHeld ? ", held" : "";
+  const from = stays ? 0 : setting.from;
+  const last = choices.findLast((choice) => from <= choice.seconds && choice.seconds <= seconds);
+  if (last?.x == null || last.y == null) return `centre${held}`;
+  return `${last.x.toFixed(0)}, ${last.y.toFixed(0)}${held}`;
+}
+
+/**
  * The values known for the moment on screen, as pairs of name and value.
  *
  * @param {Api.Timeline} timeline
@@ -39,6 +56,7 @@ export function valuesAt(timeline, policies, seconds) {
   if (timeline.points.some(({ optimal }) => optimal != null)) {
     values.push(["Optimum", near?.optimal == null ? "–" : near.optimal.toFixed(3)]);
   }
+  if (timeline.choices.length > 0) values.push(["Focus", focusAt(timeline, seconds)]);
   values.push(["Metric", near?.metric == null ? "–" : near.metric.toPrecision(4)]);
   return values;
 }

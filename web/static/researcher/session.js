@@ -275,12 +275,14 @@ function hasMetric({ points }) {
 
 /** @param {Api.Timeline} shown */
 function showKey(shown) {
-  const { points, pauses, absences, sights } = shown;
+  const { points, pauses, absences, sights, choices, holds } = shown;
   byId("key-path").hidden = !withPath;
   byId("key-optimum").hidden = !(withPath && points.some(({ optimal }) => optimal != null));
   byId("key-pause").hidden = pauses.length === 0;
   byId("key-absence").hidden = absences.length === 0;
   byId("key-sight").hidden = sights.length === 0;
+  byId("key-choice").hidden = choices.length === 0;
+  byId("key-hold").hidden = holds.length === 0;
   byId("key-metric").hidden = !hasMetric(shown);
   byId("key-recorded").hidden = player === null;
 }

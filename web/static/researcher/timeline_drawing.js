@@ -5,7 +5,7 @@ import { make } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
 import { movePlayhead, playheadLine, shape } from "./svg.js";
 import { HEIGHT, linePath, powerAt, powerOf, Scale } from "./timeline.js";
-import { commentWords, description, setAsideWords, sightWords } from "./timeline_words.js";
+import { choiceWords, commentWords, description, setAsideWords, sightWords } from "./timeline_words.js";
 
 /** The height of the strip that marks what was recorded, in pixels. */
 const STRIP = 4;
@@ -61,6 +61,8 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
     ...pauseShapes(timeline.pauses, scale),
     ...timeline.sights.map((sight) => sightShape(sight, scale)),
     ...timeline.absences.map((absence) => absenceShape(absence, scale)),
+    ...timeline.holds.map((hold) => holdShape(hold, scale)),
+    ...timeline.choices.map((choice) => choiceShape(choice, scale)),
     ...recorded.map((span) => recordedShape(span, scale)),
     ...axes(scale, withPath),
     shape("path", { class: "optimum", d: linePath(points, ({ optimal }) => optimal, scale) }),
@@ -114,6 +116,31 @@ function absenceShape(absence, scale) {
   const bar = shape("rect", { class: "absence", x, width, y: scale.y(1), height: SIGHT });
   bar.append(shape("title", {}, absence.reason));
   return bar;
+}
+
+/**
+ * A bar at the foot of the plot for a span of time in which somebody held the focus.
+ *
+ * @param {Timeline["holds"][number]} hold
+ * @param {Scale} scale
+ */
+function holdShape(hold, scale) {
+  const { x, width } = scale.box(hold, 2);
+  const bar = shape("rect", { class: "hold", x, width, y: scale.y(0) - 2 * SIGHT, height: SIGHT });
+  bar.append(shape("title", {}, "Focus held"));
+  return bar;
+}
+
+/**
+ * A ring at the foot of the plot where somebody pointed at what was to be in focus.
+ *
+ * @param {Timeline["choices"][number]} choice
+ * @param {Scale} scale
+ */
+function choiceShape(choice, scale) {
+  const ring = shape("circle", { class: "choice", cx: scale.x(choice.seconds), cy: scale.y(0) - 12, r: 5 });
+  ring.append(shape("title", {}, choiceWords(choice)));
+  return ring;
 }
 
 /**

@@ -10,10 +10,13 @@ import { counted, dayIn } from "../shared/text.js";
  * @param {Timeline} timeline
  * @param {boolean} withPath whether the focal path is drawn
  */
-export function description({ settings, pauses, absences, comments, set_aside: setAside }, withPath) {
+export function description(timeline, withPath) {
+  const { settings, pauses, absences, choices, holds, comments, set_aside: setAside } = timeline;
   const parts = [counted(settings.length, "setting")];
   if (pauses.length > 0) parts.push(counted(pauses.length, "pause"));
   if (absences.length > 0) parts.push(`${counted(absences.length, "time")} without the surgeon’s tablet`);
+  if (choices.length > 0) parts.push(counted(choices.length, "place pointed at", "places pointed at"));
+  if (holds.length > 0) parts.push(`focus held ${counted(holds.length, "time")}`);
   if (setAside.length > 0) {
     parts.push(counted(setAside.length, "answer that does not count", "answers that do not count"));
   }
@@ -26,6 +29,12 @@ export function description({ settings, pauses, absences, comments, set_aside: s
 /** @param {Timeline["sights"][number]} sight */
 export function sightWords({ width, height, per_second: rate }) {
   return `The surgeon saw ${width}×${height}, ${rate.toFixed(1)} pictures a second`;
+}
+
+/** @param {Timeline["choices"][number]} choice */
+export function choiceWords({ x, y }) {
+  if (x == null || y == null) return "Focus pointed at the centre";
+  return `Focus pointed at ${x.toFixed(0)}, ${y.toFixed(0)}`;
 }
 
 /**

@@ -19,9 +19,18 @@ const DOUBLE_MS = 400;
  * @property {(point: Point) => void} toggle
  */
 
+/**
+ * What is done with single taps.
+ *
+ * @typedef {object} Tappable
+ * @property {(point: Point) => void} tap a tap, which may become the first of a double tap
+ * @property {() => void} takeBack the last tap has become the first of a double tap, or of a pinch
+ */
+
 /** Turns pointer events into movements of the picture. Points are in CSS pixels, times in milliseconds. */
 export class Gestures {
   #target;
+  #taps;
   /** Where each pointer is, in the order in which they went down. @type {Map<number, Point>} */
   #pointers = new Map();
   /** A touch that may become a tap. @type {(Point & { at: number }) | null} */
@@ -29,9 +38,13 @@ export class Gestures {
   /** The last tap. @type {(Point & { at: number }) | null} */
   #tap = null;
 
-  /** @param {Movable} target */
-  constructor(target) {
+  /**
+   * @param {Movable} target
+   * @param {Tappable | null} [taps]
+   */
+  constructor(target, taps = null) {
     this.#target = target;
+    this.#taps = taps;
   }
 
   /**
@@ -43,7 +56,10 @@ export class Gestures {
     this.#pointers.set(id, point);
     // A second finger makes this a pinch. Neither finger is a tap then.
     this.#press = this.#pointers.size === 1 ? { ...point, at: now } : null;
-    if (this.#pointers.size > 1) this.#tap = null;
+    if (this.#pointers.size > 1) {
+      this.#tap = null;
+      this.#taps?.takeBack();
+    }
   }
 
   /**
@@ -77,7 +93,12 @@ export class Gestures {
 
     const isSecond = this.#tap && now - this.#tap.at <= DOUBLE_MS && distance(this.#tap, point) <= NEAR;
     this.#tap = isSecond ? null : { ...point, at: now };
-    if (isSecond) this.#target.toggle(point);
+    if (isSecond) {
+      this.#taps?.takeBack();
+      this.#target.toggle(point);
+    } else {
+      this.#taps?.tap(point);
+    }
   }
 
   /**

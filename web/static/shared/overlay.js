@@ -63,6 +63,21 @@ export function drawPatch(context, patch, scale, line) {
 }
 
 /**
+ * Draws a ring around the place that somebody has pointed at.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {{ x: number, y: number }} at
+ * @param {Stream.Patch} patch
+ * @param {number} scale
+ * @param {number} line
+ */
+export function drawRing(context, at, patch, scale, line) {
+  stroke(context, PATCH_COLOUR, 2 * line, () => {
+    context.arc(at.x * scale, at.y * scale, 0.8 * patch.width * scale, 0, 2 * Math.PI);
+  });
+}
+
+/**
  * Draws the content area: the circle that holds the picture.
  *
  * @param {CanvasRenderingContext2D} context

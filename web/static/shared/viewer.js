@@ -5,7 +5,8 @@ import { make, setText } from "./dom.js";
 import { Fit } from "./fit.js";
 import { Framing } from "./framing.js";
 import { Live } from "./live.js";
-import { drawContentArea, drawPatch, Peaking } from "./overlay.js";
+import { drawContentArea, drawPatch, drawRing, Peaking } from "./overlay.js";
+import { Pointing } from "./pointing.js";
 import { followZooming } from "./zooming.js";
 
 /** @typedef {"patch" | "content-area" | "peaking"} Overlay */
@@ -13,6 +14,14 @@ import { followZooming } from "./zooming.js";
 /** A picture older than this is no longer live. */
 const STALE_MS = 500;
 const LOOK_MS = 250;
+
+/**
+ * What keys do with the place that is to be in focus.
+ *
+ * @typedef {object} Nudged
+ * @property {(across: number, down: number) => void} nudge
+ * @property {() => void} centre
+ */
 
 /** A live view within an element, which must be positioned and have a size of its own. */
 export class Viewer {
@@ -38,6 +47,8 @@ export class Viewer {
   #last = null;
   #connected = false;
   #ended = false;
+  /** @type {import("./pointing.js").Pointing | null} */
+  #pointing = null;
 
   /**
    * @param {HTMLElement} element
@@ -60,7 +71,12 @@ export class Viewer {
       this.#framing.resize(box, pixelsPerCss(canvas));
       this.#place();
     });
-    followZooming(element, this.#framing, () => this.#place());
+    followZooming(element, this.#framing, () => this.#place(), {
+      tap: (point) => this.#pointing?.tap(this.#cellAt(point)),
+      takeBack: () => this.#pointing?.takeBack(),
+      nudge: (across, down) => this.#pointing?.nudge(across, down),
+      centre: () => this.#pointing?.centre(),
+    });
     this.#unzoom.onclick = () => {
       this.#framing.reset();
       this.#place();
@@ -108,6 +124,42 @@ export class Viewer {
     this.#drawOverlays();
   }
 
+  /**
+   * Lets people point at the picture.
+   *
+   * @param {import("./pointing.js").Parts["send"]} send
+   * @param {import("./pointing.js").Parts["told"]} told
+   */
+  pointBy(send, told) {
+    this.#pointing = new Pointing({
+      send,
+      told,
+      later: (run, ms) => {
+        const timer = setTimeout(run, ms);
+        return () => clearTimeout(timer);
+      },
+      now: () => performance.now(),
+      changed: () => this.#drawOverlays(),
+      whyNot: () => (this.#isStale ? "The picture is not live, so the focus was not moved." : ""),
+    });
+    this.#element.setAttribute(
+      "aria-label",
+      "Live view. Plus and minus zoom, zero shows everything. Where it is allowed, Shift with an arrow points the focus, and C brings it back to the centre.",
+    );
+    return this.#pointing;
+  }
+
+  /** @param {import("./framing.js").Point} point of the view, CSS pixels */
+  #cellAt({ x, y }) {
+    const { left, top, scale } = this.#framing.place;
+    return { x: (x - left) / scale, y: (y - top) / scale };
+  }
+
+  get #isStale() {
+    const { age } = this;
+    return age === null || age > STALE_MS;
+  }
+
   /** Shows no picture any more, and says nothing of one: the page's link is over. */
   end() {
     this.#ended = true;
@@ -124,6 +176,7 @@ export class Viewer {
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.#picture.drawImage(bitmap, 0, 0);
     this.#last = { header, receivedAt };
+    this.#pointing?.see(header);
 
     this.#lookAtScreen();
     const cells = cellsOf(header);
@@ -160,7 +213,9 @@ export class Viewer {
   #drawOverlays() {
     const context = this.#overlay;
     const { width, height } = context.canvas;
-    const drawn = this.#shown.size > 0 ? this.#last : null;
+    const ring = this.#pointing?.ring ?? null;
+    const corners = this.#shown.has("patch") || (this.#pointing?.isPointed ?? false);
+    const drawn = this.#shown.size > 0 || corners || ring ? this.#last : null;
     // Clearing an empty overlay for each picture would make the browser composite the whole view again each time.
     if (!drawn && this.#isOverlayClear) return;
     context.resetTransform();
@@ -180,13 +235,14 @@ export class Viewer {
       this.#peaking.draw(context, cells.width * pixels, cells.height * pixels);
     }
     if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, pixels, line);
-    if (this.#shown.has("patch")) drawPatch(context, header.patch, pixels, line);
+    if (corners) drawPatch(context, header.patch, pixels, line);
+    if (ring) drawRing(context, ring, header.patch, pixels, line);
   }
 
   #tellAge() {
     if (this.#ended) return;
     const { age } = this;
-    const isStale = age === null || age > STALE_MS;
+    const isStale = this.#isStale;
     this.#element.classList.toggle("viewer-is-stale", isStale);
 
     // The text on screen counts the seconds. Screen readers announce only when the picture stops being live, and when

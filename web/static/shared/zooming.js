@@ -24,9 +24,10 @@ const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowD
  * @param {HTMLElement} element
  * @param {import("./framing.js").Framing} framing
  * @param {() => void} changed
+ * @param {import("./gestures.js").Tappable & import("./viewer.js").Nudged} taps
  */
-export function followZooming(element, framing, changed) {
-  const gestures = new Gestures(framing);
+export function followZooming(element, framing, changed, taps) {
+  const gestures = new Gestures(framing, taps);
   const pointOf = (/** @type {MouseEvent} */ event) => {
     const box = element.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
@@ -62,9 +63,12 @@ export function followZooming(element, framing, changed) {
 
   element.addEventListener("keydown", (event) => {
     if (event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
+    const points = event.shiftKey ? ARROWS[event.key] : undefined;
     const arrow = framing.zoom > 1 ? ARROWS[event.key] : undefined;
 
-    if (event.key === "+" || event.key === "=") framing.zoomBy(KEY_ZOOM);
+    if (points) taps.nudge(-points[0], -points[1]);
+    else if (event.key === "c" || event.key === "C") taps.centre();
+    else if (event.key === "+" || event.key === "=") framing.zoomBy(KEY_ZOOM);
     else if (event.key === "-") framing.zoomBy(1 / KEY_ZOOM);
     else if (event.key === "0") framing.reset();
     else if (arrow) {

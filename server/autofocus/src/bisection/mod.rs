@@ -255,6 +255,10 @@ impl Policy for Bisection {
         let target = target(focal_power, &belief);
         Decision { target, metric: Some(super::mgm(&seen.view.patch)), belief: Some(belief.into()) }
     }
+
+    fn forget(&mut self) {
+        *self = Self::default();
+    }
 }
 
 #[cfg(test)]

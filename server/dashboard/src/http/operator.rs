@@ -24,6 +24,7 @@ use parfocal_session::conductor::{OpenStudy, ProtocolSummary, StudySite};
 use parfocal_trial::account::Account;
 use parfocal_trial::action::Focus;
 use parfocal_trial::consent::NewConsent;
+use parfocal_trial::pointing::NewChoice;
 use parfocal_trial::role::Role;
 use parfocal_trial::view::OperatorView;
 
@@ -171,6 +172,26 @@ async fn focus(
     Ok(StatusCode::NO_CONTENT)
 }
 
+/// Points the focus at a place in the picture, or back at the centre. In a session it is recorded, and only while a
+/// setting is inspected whose protocol lets the surgeon point.
+#[utoipa::path(post, path = "/api/operator/patch", tag = "operator", request_body = NewChoice, responses(
+    (status = 204, description = "The next frame is focused there"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "The protocol or the state of the session does not allow it", body = ErrorBody),
+    (status = 422, description = "The place lies outside the picture", body = ErrorBody)))]
+async fn patch(
+    by: Operator,
+    State(app): State<AppState>,
+    JsonBody(new): JsonBody<NewChoice>,
+) -> Result<StatusCode, Error> {
+    let by = match new.session {
+        Some(session) => by.for_session(&app, session).await?,
+        None => by.actor(),
+    };
+    app.conductor.choose(by, new).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
 /// A participant to add.
 #[derive(Debug, Deserialize, ToSchema)]
 struct NewParticipant {
@@ -299,6 +320,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(link))
         .routes(routes!(choices))
         .routes(routes!(focus))
+        .routes(routes!(patch))
         .routes(routes!(add_participant))
         .routes(routes!(session))
         .routes(routes!(create))

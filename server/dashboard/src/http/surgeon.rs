@@ -20,6 +20,7 @@ use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
 use super::{AppState, assets};
 use parfocal_base::ids::SessionId;
 use parfocal_trial::action::Action;
+use parfocal_trial::pointing::NewChoice;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal_trial::role::Role;
 use parfocal_trial::view::SurgeonView;
@@ -100,6 +101,22 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
     Ok(Json(app.surgeon_view.borrow().clone()))
 }
 
+/// Points the focus at a place in the picture, or back at the centre. In a session it is recorded, and only while a
+/// setting is inspected whose protocol lets the surgeon point.
+#[utoipa::path(post, path = "/api/surgeon/patch", tag = "surgeon", request_body = NewChoice, responses(
+    (status = 204, description = "The next frame is focused there"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "The protocol or the state of the session does not allow it", body = ErrorBody),
+    (status = 422, description = "The place lies outside the picture", body = ErrorBody)))]
+async fn patch(
+    _: Surgeon,
+    State(app): State<AppState>,
+    JsonBody(new): JsonBody<NewChoice>,
+) -> Result<StatusCode, Error> {
+    app.conductor.choose(Role::Surgeon, new).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
 /// Stores a comment: once this has answered, it is on disk. A comment sent again with the same key is stored once.
 #[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
     (status = 204, description = "Kept"),
@@ -153,6 +170,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(page))
         .routes(routes!(session))
         .routes(routes!(act))
+        .routes(routes!(patch))
         .routes(routes!(comment))
         .routes(routes!(answer))
         .routes(routes!(holding))

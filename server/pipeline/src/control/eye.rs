@@ -2,6 +2,7 @@
 
 use super::pilot::HoldReason;
 use parfocal_autofocus::FieldOfView;
+use parfocal_base::PatchPlace;
 use parfocal_base::step::Hold;
 use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{ContentArea, Patch, PatchArea, Reconstructor, View, rgb_patch, rgb_view};
@@ -18,17 +19,18 @@ impl Eye {
         Self { reconstructor }
     }
 
-    /// Place of the patch in `image`: at the centre of `content`, or of the picture if there is no content area.
+    /// Where the patch at `place` lies in `image`. Without a content area the picture's centre is that of the circle.
     ///
     /// # Errors
     /// If the picture is smaller than a patch.
-    pub fn find(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<PatchArea, HoldReason> {
-        let (width, height) = match image {
-            FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
-            FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
-        };
-
-        PatchArea::central(width, height, content).map_err(|error| {
+    pub fn find(
+        &self,
+        image: &FrameImage,
+        place: PatchPlace,
+        content: Option<&ContentArea>,
+    ) -> Result<PatchArea, HoldReason> {
+        let (width, height) = cells(image);
+        PatchArea::at(place, width, height, content).map_err(|error| {
             HoldReason::new(Hold::CameraFailed, &format!("the camera's picture cannot be used: {error}"))
         })
     }
@@ -52,5 +54,13 @@ impl Eye {
             }
             (FieldOfView::Wide | FieldOfView::Surroundings, FrameImage::Rgb(rgb)) => rgb_view(rgb, area),
         }
+    }
+}
+
+/// Width and height of `image` in mosaic cells; in pixels, for a colour picture.
+pub fn cells(image: &FrameImage) -> (usize, usize) {
+    match image {
+        FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
+        FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
     }
 }

@@ -29,6 +29,7 @@ use parfocal_base::ids::SegmentId;
 use tokio::sync::{mpsc, watch};
 
 use parfocal_base::FocalPower;
+use parfocal_base::PatchPlace;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::priority::Standing;
@@ -68,6 +69,20 @@ pub enum Command {
     },
     /// The content area found by the imaging thread; `None` if it sees none.
     ContentArea(Option<ContentArea>),
+    /// Where to look, and whether to hold the focus. The lens does not move by it.
+    Aim(Aim),
+}
+
+/// Where the policy looks, as people have chosen.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Aim {
+    /// Place of the patch.
+    pub place: PatchPlace,
+    /// How often people have chosen a place since the server started. So a page can tell a choice from a place that was
+    /// set back.
+    pub choices: u64,
+    /// Whether the focus is held: the policy is not asked, and the lens stays where it is.
+    pub held: bool,
 }
 
 /// A frame with all results of its step. Goes to the imaging thread.
@@ -79,6 +94,8 @@ pub struct ControlledFrame {
     pub patch: PatchArea,
     /// Content area by which the patch was placed, if known.
     pub content_area: Option<ContentArea>,
+    /// Where people have chosen to look.
+    pub aim: Aim,
     /// The record of its step.
     pub record: StepRecord,
     /// The policy's belief, if it has one.
@@ -119,6 +136,17 @@ pub struct ControlStatus {
     pub latency_p99_micros: u32,
     /// Scheduling priority of the loop's thread.
     pub priority: Standing,
+    /// What people can point at.
+    pub sight: Sight,
+}
+
+/// What a place in the picture means: the size of the picture, and the bright circle in it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Sight {
+    /// Width and height of the latest picture, in mosaic cells; 0 before the first.
+    pub cells: (usize, usize),
+    /// The content area in use, in cells.
+    pub content_area: Option<ContentArea>,
 }
 
 /// Access to the loop for the rest of the server.

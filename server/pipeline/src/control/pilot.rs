@@ -51,13 +51,15 @@ pub struct Pilot {
     runner: Option<Runner>,
     failed: Option<(Moment, HoldReason)>,
     hung: Vec<JoinHandle<()>>,
+    /// Whether the instance in charge must forget what it saw before it is asked again.
+    forgets: bool,
 }
 
 impl Pilot {
     /// A pilot without a policy. It will wait at most `patience` for an answer.
     pub fn new(registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let registry = Arc::new(registry);
-        Self { registry, clock, patience, policy: None, runner: None, failed: None, hung: Vec::new() }
+        Self { registry, clock, patience, policy: None, runner: None, failed: None, hung: Vec::new(), forgets: false }
     }
 
     /// Puts a new instance of `policy` in charge, or no policy.
@@ -69,6 +71,11 @@ impl Pilot {
             // A failure to start is reported at the first question, which tries again.
             let _ = self.start(MOST_HUNG_AT_ALL);
         }
+    }
+
+    /// Makes the policy forget what it has seen before it is asked again.
+    pub const fn forget(&mut self) {
+        self.forgets = true;
     }
 
     /// The policy in charge.
@@ -94,7 +101,7 @@ impl Pilot {
 
         let Some(runner) = &mut self.runner else { return Err(starting()) };
         let proven = runner.proven;
-        runner.ask(now, seen);
+        runner.ask(now, seen, std::mem::take(&mut self.forgets));
 
         match runner.answer(self.patience) {
             Some(Ok(advice)) => {
@@ -140,6 +147,8 @@ impl Pilot {
             ));
         }
 
+        // A new instance has seen nothing yet.
+        self.forgets = false;
         let runner = Runner::start(self.registry.clone(), name, self.clock.clone());
         self.runner = Some(runner.map_err(|error| {
             tracing::error!(%error, "no thread for a policy");

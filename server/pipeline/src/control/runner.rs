@@ -23,6 +23,8 @@ use parfocal_imaging::View;
 struct Question {
     view: View,
     focal_power: FocalPower,
+    /// Whether the policy must forget what it saw before.
+    anew: bool,
 }
 
 /// The outcome of a question.
@@ -80,12 +82,12 @@ impl Runner {
     }
 
     /// Asks the policy and does not wait. The thread has real-time priority until [`Self::answer`] stops waiting for
-    /// it.
-    pub fn ask(&mut self, now: Moment, seen: &Observation<'_>) {
+    /// it. If `anew`, the policy first forgets what it saw before.
+    pub fn ask(&mut self, now: Moment, seen: &Observation<'_>, anew: bool) {
         self.hurry();
         self.asked_at = Some(now);
         // If the thread has ended, the reason is among the answers.
-        let _ = self.questions.try_send(Question { view: seen.view.clone(), focal_power: seen.focal_power });
+        let _ = self.questions.try_send(Question { view: seen.view.clone(), focal_power: seen.focal_power, anew });
     }
 
     /// Time at which the open question was asked; `None` if no question is open.
@@ -182,7 +184,13 @@ fn serve(
 fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answer {
     let began = clock.now();
     let seen = Observation { view: &question.view, focal_power: question.focal_power };
-    let decision = guarded(|| policy.step(&seen)).map_err(Failure::Panicked)?;
+    let decide = || {
+        if question.anew {
+            policy.forget();
+        }
+        policy.step(&seen)
+    };
+    let decision = guarded(decide).map_err(Failure::Panicked)?;
     let took = clock.now().since(began);
     Advice::new(decision, took).map_err(|failure| policy.fault().map_or(failure, Failure::Outside))
 }

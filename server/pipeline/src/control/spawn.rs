@@ -15,7 +15,7 @@ use super::source::Source;
 use super::stepper::Stepper;
 use super::tap::Tap;
 use super::window::LatencyWindow;
-use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot};
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot, Sight};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::priority::{self, Place, Standing};
@@ -171,6 +171,7 @@ impl Worker {
             latency_p50_micros: 0,
             latency_p99_micros: 0,
             priority: Standing::Ordinary,
+            sight: Sight::default(),
         };
 
         Self {
@@ -261,7 +262,10 @@ impl Worker {
 
         let changed = {
             let last = self.status.borrow();
-            last.held != held || last.message != message || last.policy.as_ref() != self.stepper.policy()
+            last.held != held
+                || last.message != message
+                || last.policy.as_ref() != self.stepper.policy()
+                || last.sight != self.stepper.sight()
         };
         if !changed && now.since(self.published_at) < STATUS_INTERVAL {
             return;
@@ -288,6 +292,7 @@ impl Worker {
             latency_p50_micros: figures.p50,
             latency_p99_micros: figures.p99,
             priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
+            sight: self.stepper.sight(),
         }));
     }
 }

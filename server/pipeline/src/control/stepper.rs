@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use super::advice::Advice;
 use super::attribution::Attribution;
-use super::eye::Eye;
+use super::eye::{Eye, cells};
 use super::pilot::{HoldReason, Pilot};
 use super::runner::guarded;
-use super::{Command, ControlledFrame, Drive};
+use super::{Aim, Command, ControlledFrame, Drive, Sight};
 use parfocal_autofocus::{Observation, Registry};
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
@@ -18,7 +18,7 @@ use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::Frame;
 use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth};
-use parfocal_imaging::{ContentArea, PatchArea};
+use parfocal_imaging::PatchArea;
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation that runs faster than
 /// real time.
@@ -32,7 +32,10 @@ pub struct Stepper {
     /// Whether a frame was exposed after the lens had reached the policy's start. Until then the policy is not asked.
     placed: bool,
     segment: Option<SegmentId>,
-    content_area: Option<ContentArea>,
+    /// Where people have chosen to look.
+    aim: Aim,
+    /// What people can point at.
+    sight: Sight,
     /// The last focal power that the lens accepted.
     asked: FocalPower,
     /// The focal power to command next. Differs from `asked` only while the lens does not accept commands.
@@ -57,7 +60,8 @@ impl Stepper {
             drive: Drive::Manual(start),
             placed: false,
             segment: None,
-            content_area: None,
+            aim: Aim::default(),
+            sight: Sight::default(),
             asked: start,
             wanted: start,
             lens_fault: None,
@@ -75,13 +79,23 @@ impl Stepper {
     /// Carries out `command`. Drive and segment change together, between two frames.
     pub fn obey(&mut self, command: Command) {
         match command {
-            Command::ContentArea(area) => self.content_area = area,
+            Command::ContentArea(area) => self.sight.content_area = area,
+            Command::Aim(aim) => self.take_aim(aim),
             Command::Drive { drive, segment } => {
                 self.segment = segment;
                 self.change_driver(drive);
                 self.tell_lens();
             }
         }
+    }
+
+    /// Looks where people have chosen. What the policy saw at another place, or before the focus was held, is not
+    /// compared with what it sees from now on.
+    fn take_aim(&mut self, aim: Aim) {
+        if aim.place != self.aim.place || (self.aim.held && !aim.held) {
+            self.pilot.forget();
+        }
+        self.aim = aim;
     }
 
     fn change_driver(&mut self, drive: Drive) {
@@ -108,7 +122,9 @@ impl Stepper {
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
         // While the lens is disconnected, its focal power is unknown.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
-        let patch = self.eye.find(&frame.image, self.content_area.as_ref())?;
+        self.sight.cells = cells(&frame.image);
+        let content_area = self.sight.content_area;
+        let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;
 
         let asks = self.asks_policy(&frame);
         let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
@@ -131,10 +147,11 @@ impl Stepper {
             latency_micros: micros(self.clock.now().since(frame.exposed_at)),
             held: self.hold_reason().map(|reason| reason.hold),
             optimal: frame.truth.map(|truth| truth.optimal),
+            patch: (column(patch.x), column(patch.y)),
         };
 
         let belief = advice.and_then(|advice| advice.belief);
-        Ok(ControlledFrame { frame, patch, content_area: self.content_area, record, belief })
+        Ok(ControlledFrame { frame, patch, content_area, aim: self.aim, record, belief })
     }
 
     /// Called while no frames come. Repeats the command to the lens, so that the slider works without a camera, and a
@@ -151,6 +168,9 @@ impl Stepper {
         match &self.drive {
             Drive::Manual(_) => return Ok(false),
             Drive::Hold { .. } => return Err(HoldReason::new(Hold::Paused, "paused on request")),
+            Drive::Policy { .. } if self.aim.held => {
+                return Err(HoldReason::new(Hold::FocusHeld, "the focus is held on request"));
+            }
             Drive::Policy { .. } => {}
         }
 
@@ -223,6 +243,12 @@ impl Stepper {
         self.asked
     }
 
+    /// What people can point at.
+    #[must_use]
+    pub const fn sight(&self) -> Sight {
+        self.sight
+    }
+
     /// The policy that drives the lens, if any.
     #[must_use]
     pub const fn policy(&self) -> Option<&PolicyName> {
@@ -238,4 +264,8 @@ impl Stepper {
 
 fn micros(duration: Duration) -> u32 {
     u32::try_from(duration.as_micros()).unwrap_or(u32::MAX)
+}
+
+fn column(pixels: usize) -> u32 {
+    u32::try_from(pixels).unwrap_or(u32::MAX)
 }

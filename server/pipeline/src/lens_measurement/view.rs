@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::MeasurementError;
 use crate::control::Eye;
 use parfocal_autofocus::mgm;
+use parfocal_base::PatchPlace;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_devices::camera::{Camera, CameraError};
 
@@ -38,7 +39,7 @@ impl View {
         loop {
             match self.camera.next_frame(PATIENCE) {
                 Ok(frame) => {
-                    let area = self.eye.find(&frame.image, None)?;
+                    let area = self.eye.find(&frame.image, PatchPlace::CENTRE, None)?;
                     return Ok((frame.middle(), mgm(&self.eye.patch(&frame.image, area))));
                 }
                 Err(error @ CameraError::BadSource(_)) => return Err(error.into()),

@@ -148,6 +148,7 @@ mod tests {
             latency_micros: 900,
             held: None,
             optimal: None,
+            patch: (240, 120),
         }
     }
 

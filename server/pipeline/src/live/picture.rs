@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
+use crate::control::Aim;
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_base::step::Hold;
@@ -31,6 +32,8 @@ pub struct Picture {
     pub patch: PatchArea,
     /// The content area in use at that time, in cells.
     pub content_area: Option<ContentArea>,
+    /// Where people had chosen to look at that time.
+    pub aim: Aim,
 }
 
 /// What the loop did with the frame. Never shown to surgeons.

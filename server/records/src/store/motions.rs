@@ -40,7 +40,7 @@ impl Reader {
         for (segment, setting) in segments {
             let mut rows = sqlx::query_as::<_, Row>(
                 "SELECT run, exposed_ns, asked, measured, optimal,
-                     coalesce(held IN ('paused', 'lens-failed', 'camera-failed'), FALSE) AS held
+                     coalesce(held IN ('paused', 'focus-held', 'lens-failed', 'camera-failed'), FALSE) AS held
                  FROM telemetry WHERE segment = ? ORDER BY number",
             )
             .bind(segment)

@@ -235,7 +235,8 @@ async fn insert(
 ) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO telemetry (run, frame, exposed_ns, segment, policy, asked, measured, metric, policy_micros,
-         latency_micros, held, optimal, picture_width) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         latency_micros, held, optimal, picture_width, patch_x, patch_y)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(run)
     .bind(record.frame.cast_signed())
@@ -251,6 +252,8 @@ async fn insert(
     .bind(record.held.map(Hold::name))
     .bind(record.optimal.map(FocalPower::get))
     .bind(seen.filter(|_| record.segment.is_some()))
+    .bind(record.patch.0)
+    .bind(record.patch.1)
     .execute(connection)
     .await?;
     Ok(())

@@ -9,6 +9,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::ConductError;
 use parfocal_base::FocalPower;
+use parfocal_base::PatchPlace;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
@@ -20,12 +21,13 @@ use parfocal_trial::consent::Consent;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::grace::Grace;
 use parfocal_trial::phase::Phase;
+use parfocal_trial::pointing::Choice;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::refusal::Refusal;
 use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::{
-    Plan, SessionState, decide, decide_by_hand, decide_small_picture, decide_tablet, decide_time,
+    Plan, SessionState, decide, decide_by_hand, decide_choice, decide_small_picture, decide_tablet, decide_time,
 };
 use parfocal_trial::tablet::{PictureSize, Presence, Report};
 use parfocal_trial::unblinding::Circumstances;
@@ -135,6 +137,8 @@ enum StopCause {
     TimeLimit,
     /// The operator focuses by hand, after the session was stopped.
     ByHand { to: FocalPower, left_at: Option<FocalPower> },
+    /// Somebody chose what is to be in focus.
+    Choice(Choice),
     /// The surgeon's tablet went away, or is back.
     Tablet(Presence),
     /// The surgeon's picture is smaller than the protocol allows.
@@ -265,7 +269,10 @@ impl Course {
     /// If `by` may not do this, or the action does not fit the session's state.
     pub fn stop(&mut self, by: Actor, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
         self.record_movement();
-        self.record_sight(at, wall);
+        // Who holds the focus goes on looking.
+        if !matches!(action, Action::HoldFocus { .. }) {
+            self.record_sight(at, wall);
+        }
         self.take(Stop { by, cause: StopCause::Action(action), at, wall })
     }
 
@@ -291,6 +298,14 @@ impl Course {
         decide_by_hand(&self.state, by.role, to, left_at)?;
         self.movement = Some(Movement { by, to, at, wall });
         Ok(())
+    }
+
+    /// Looks where somebody has chosen. The event is recorded as soon as the disk takes it.
+    ///
+    /// # Errors
+    /// If `by` may not do this, the protocol does not allow it, or no setting is being inspected.
+    pub fn choose(&mut self, by: Actor, choice: Choice, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
+        self.take(Stop { by, cause: StopCause::Choice(choice), at, wall })
     }
 
     /// Whether the last event is a movement by hand no longer than `time` before `at`.
@@ -386,6 +401,7 @@ impl Course {
             StopCause::Action(action) => decide(&self.state, stop.by.role, action, stop.at)?,
             StopCause::TimeLimit => decide_time(&self.state, stop.at),
             StopCause::ByHand { to, left_at } => decide_by_hand(&self.state, stop.by.role, *to, *left_at)?,
+            StopCause::Choice(choice) => decide_choice(&self.state, stop.by.role, choice)?,
             StopCause::Tablet(presence) => decide_tablet(&self.state, *presence, stop.at),
             StopCause::SmallPicture => decide_small_picture(&self.state, stop.at),
             StopCause::Seen(seen) => vec![seen.clone()],
@@ -454,6 +470,10 @@ impl Course {
             | EventKind::TabletAway { .. }
             | EventKind::TabletBack
             | EventKind::PicturesSeen { .. }
+            | EventKind::PatchPlaced { .. }
+            | EventKind::PatchCentred { .. }
+            | EventKind::FocusHeld { .. }
+            | EventKind::FocusReleased { .. }
             | EventKind::Unblinded { .. } => self.begin_at,
             _ => None,
         };
@@ -548,6 +568,15 @@ impl Course {
         };
 
         Some(Command::Drive { drive, segment })
+    }
+
+    /// Where the policy looks, and whether the focus is held. `None` before the session's start and after its end, when
+    /// the session has no say in it.
+    pub const fn aim(&self) -> Option<(PatchPlace, bool)> {
+        match self.state.phase() {
+            Phase::Ready | Phase::Completed | Phase::Aborted => None,
+            _ => Some((self.state.patch(), self.state.focus_held())),
+        }
     }
 
     fn policy_of(&self, segment: SegmentId) -> Option<PolicyName> {

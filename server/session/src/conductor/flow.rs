@@ -13,7 +13,7 @@ use super::course::Course;
 use super::{ConductError, Live, Pen, Shared, views};
 use parfocal_base::FocalPower;
 use parfocal_base::ids::SessionId;
-use parfocal_pipeline::control::{Command, Drive};
+use parfocal_pipeline::control::{Aim, Command, Drive};
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::event::{Event, EventKind};
@@ -325,20 +325,43 @@ impl Shared {
     fn hold(&self, live: &mut Live) {
         let wanted = live.course.as_ref().and_then(Course::lens_command);
         let policy_drives = matches!(live.commanded, Some(Command::Drive { drive: Drive::Policy { .. }, .. }));
-        if !policy_drives || wanted == live.commanded {
+        if policy_drives && wanted != live.commanded {
+            let hold = match wanted {
+                Some(hold @ Command::Drive { drive: Drive::Hold { .. }, .. }) => hold,
+                _ => HOLD,
+            };
+            self.control.send(hold.clone());
+            live.commanded = Some(hold);
+        }
+        // After it, so that no policy takes a step where a hold on request ends with a pause.
+        self.aim(live);
+    }
+
+    /// Tells the control loop where the session looks, and whether it holds the focus, if that changed. At the end of a
+    /// session the patch goes back to the centre.
+    pub(super) fn aim(&self, live: &mut Live) {
+        let wanted = live.course.as_ref().and_then(Course::aim);
+        if wanted.is_none() && !live.aimed_by_session {
             return;
         }
 
-        let hold = match wanted {
-            Some(hold @ Command::Drive { drive: Drive::Hold { .. }, .. }) => hold,
-            _ => HOLD,
-        };
-        self.control.send(hold.clone());
-        live.commanded = Some(hold);
+        live.aimed_by_session = wanted.is_some();
+        let (place, held) = wanted.unwrap_or_default();
+        self.look(live, Aim { place, held, ..live.aim });
+    }
+
+    /// Sends `aim` to the control loop if it is another one.
+    pub(super) fn look(&self, live: &mut Live, aim: Aim) {
+        if aim != live.aim {
+            self.control.send(Command::Aim(aim));
+            live.aim = aim;
+        }
     }
 
     /// Sends the control loop the session's present command, if it changed.
-    fn drive(&self, live: &mut Live) {
+    pub(super) fn drive(&self, live: &mut Live) {
+        // Before it, so that a policy that begins looks at the right place from its first step on.
+        self.aim(live);
         let wanted = live.course.as_ref().and_then(Course::lens_command);
         if wanted == live.commanded {
             return;

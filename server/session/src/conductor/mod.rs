@@ -17,6 +17,7 @@ mod flow;
 mod keeping;
 mod lens;
 mod library;
+mod pointing;
 mod remarks;
 mod reports;
 mod studies;
@@ -119,6 +120,9 @@ struct Live {
     course: Option<Course>,
     /// The session's last command to the control loop.
     commanded: Option<Command>,
+    /// Where the policy was last told to look, and whether that was a session's command.
+    aim: Aim,
+    aimed_by_session: bool,
     /// Why the last attempt to record a stop failed; `None` if it did not.
     unrecorded_because: Option<String>,
 }
@@ -178,7 +182,13 @@ impl Conductor {
             registry,
             clock,
             run_clock,
-            live: std::sync::Mutex::new(Live { course: None, commanded: None, unrecorded_because: None }),
+            live: std::sync::Mutex::new(Live {
+                course: None,
+                commanded: None,
+                aim: Aim::default(),
+                aimed_by_session: false,
+                unrecorded_because: None,
+            }),
             pen: Mutex::new(Pen { random, practice_random }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),

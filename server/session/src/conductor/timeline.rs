@@ -36,6 +36,12 @@ pub struct Timeline {
     pub absences: Vec<PauseSpan>,
     /// What size of picture the surgeon saw, and how many.
     pub sights: Vec<SightSpan>,
+    /// When somebody chose what is to be in focus.
+    pub choices: Vec<TimelineChoice>,
+    /// Whether a choice stays in the settings that follow. Otherwise each setting begins at the centre.
+    pub patch_stays: bool,
+    /// When the focus was held on request.
+    pub holds: Vec<HoldSpan>,
     /// The focal path.
     pub points: Vec<TimelinePoint>,
     /// The comments.
@@ -78,6 +84,28 @@ pub struct SightSpan {
     pub size: PictureSize,
     /// Pictures a second.
     pub per_second: f64,
+}
+
+/// A choice of what is to be in focus.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelineChoice {
+    /// When it was made, in seconds.
+    pub seconds: f64,
+    /// Number of the frame that was on screen.
+    pub frame: u64,
+    /// Where the picture was touched, in mosaic cells from its left edge; none for the centre of the bright circle.
+    pub x: Option<f64>,
+    /// Where the picture was touched, in mosaic cells from its top edge; none for the centre of the bright circle.
+    pub y: Option<f64>,
+}
+
+/// When the focus was held on request.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct HoldSpan {
+    /// Start, in seconds.
+    pub from: f64,
+    /// End, in seconds; none while it lasts.
+    pub to: Option<f64>,
 }
 
 /// A point of the focal path.
@@ -229,6 +257,9 @@ impl Conductor {
             pauses: pauses(&events, &points),
             absences: absences(&events),
             sights: sights(&events),
+            choices: choices(&events),
+            patch_stays: course.protocol.patch.stays(),
+            holds: holds(&events),
             points,
             comments,
             set_aside: set_aside(&course, &answers, runs, start),
@@ -379,6 +410,39 @@ fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
                 spans.push(PauseSpan { from: at, to: None, reason: kind.in_words(|_| 0) });
             }
             EventKind::TabletBack | EventKind::Completed | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    spans
+}
+
+/// When somebody chose what is to be in focus.
+fn choices(events: &[(f64, &EventKind)]) -> Vec<TimelineChoice> {
+    let choice = |&(seconds, kind): &(f64, &EventKind)| {
+        let choice = kind.choice()?;
+        let x = choice.at.map(|touch| touch.x);
+        let y = choice.at.map(|touch| touch.y);
+        Some(TimelineChoice { seconds, frame: choice.frame, x, y })
+    };
+    events.iter().filter_map(choice).collect()
+}
+
+/// When the focus was held. Whatever stops the setting's clock releases it.
+fn holds(events: &[(f64, &EventKind)]) -> Vec<HoldSpan> {
+    let mut spans: Vec<HoldSpan> = Vec::new();
+    for &(at, kind) in events {
+        match kind {
+            EventKind::FocusHeld { .. } => spans.push(HoldSpan { from: at, to: None }),
+            EventKind::FocusReleased { .. }
+            | EventKind::Paused { .. }
+            | EventKind::ServerRestarted { .. }
+            | EventKind::SegmentFinished { .. }
+            | EventKind::Aborted { .. } => {
                 if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
                     open.to = Some(at);
                 }

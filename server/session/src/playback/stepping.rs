@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use parfocal_autofocus::{Observation, Policy};
 use parfocal_base::FocalPower;
+use parfocal_base::PatchPlace;
 use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{Calibration, ContentArea, GrayImage, Reconstructor, RgbImage, content_area};
 use parfocal_pipeline::control::Eye;
@@ -105,7 +106,7 @@ impl<'a> Stepping<'a> {
         }
 
         let image = FrameImage::Mosaic(Arc::new(mosaic));
-        let patch = self.eye.find(&image, self.area.as_ref());
+        let patch = self.eye.find(&image, PatchPlace::CENTRE, self.area.as_ref());
         let patch = patch.map_err(|reason| SteppingError::NoPatch { frame, reason: reason.message })?;
         let view = self.eye.look(&image, patch, self.policy.field_of_view());
 

@@ -13,6 +13,7 @@ use crate::allocation::Order;
 use crate::consent;
 use crate::grace::DEFAULT_GRACE;
 use crate::instruments::{nasa_tlx, recognition, surg_tlx};
+use crate::pointing::PatchRule;
 use crate::question::{Question, QuestionKind};
 use crate::tablet::WhenAway;
 use parfocal_base::FocalPower;
@@ -82,6 +83,12 @@ struct File {
     voice_days: Option<Spanned<u32>>,
     #[serde(default)]
     when_tablet_away: WhenAway,
+    #[serde(default)]
+    patch: Option<Spanned<String>>,
+    #[serde(default)]
+    patch_stays: Option<Spanned<bool>>,
+    #[serde(default)]
+    hold: bool,
     #[serde(default)]
     least_picture_width: Option<Spanned<u32>>,
     #[serde(default)]
@@ -194,6 +201,8 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         voice: file.voice,
         voice_days: voice_days(&file)?,
         when_tablet_away: file.when_tablet_away,
+        patch: patch_rule(&file)?,
+        hold: file.hold,
         least_picture_width: file.least_picture_width.as_ref().map(least_picture_width).transpose()?,
         consent: file.consent_version.as_ref().map(consent_version).transpose()?,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
@@ -233,6 +242,27 @@ fn voice_days(file: &File) -> Result<Option<u32>, Fault> {
         return Err(Fault::new(days.span(), "voice_days", "needs 'voice = true'"));
     }
     between(days, "voice_days", 1..=LONGEST_VOICE_DAYS, " days").map(Some)
+}
+
+/// Reads who chooses the patch's place.
+fn patch_rule(file: &File) -> Result<PatchRule, Fault> {
+    let free = match &file.patch {
+        None => false,
+        Some(rule) => match rule.get_ref().as_str() {
+            "centre" => false,
+            "surgeon" => true,
+            other => {
+                let message = format!("must be \"centre\" or \"surgeon\", not \"{other}\"");
+                return Err(Fault::new(rule.span(), "patch", message));
+            }
+        },
+    };
+
+    match &file.patch_stays {
+        Some(stays) if !free => Err(Fault::new(stays.span(), "patch_stays", "needs 'patch = \"surgeon\"'")),
+        stays if free => Ok(PatchRule::Surgeon { stays: stays.as_ref().is_some_and(|stays| *stays.get_ref()) }),
+        _ => Ok(PatchRule::Centre),
+    }
 }
 
 fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {

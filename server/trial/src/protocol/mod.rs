@@ -15,6 +15,7 @@ pub use fault::ProtocolError;
 pub(crate) use file::{between, identifier};
 
 use super::allocation::Order;
+use super::pointing::PatchRule;
 use super::question::Question;
 use super::tablet::WhenAway;
 use parfocal_base::FocalPower;
@@ -57,6 +58,10 @@ pub struct Protocol {
     pub record: Record,
     /// What happens to a segment's clock while no tablet shows the surgeon's page.
     pub when_tablet_away: WhenAway,
+    /// Who chooses the patch's place.
+    pub patch: PatchRule,
+    /// Whether the focus may be held during an inspection.
+    pub hold: bool,
     /// Width in pixels that the surgeon's picture must have; a session with a smaller one is paused.
     pub least_picture_width: Option<u32>,
     /// Version of the consent text that a participant must have consented to before a session starts; none if no
@@ -204,6 +209,27 @@ mod tests {
         assert!(without.contains("key 'voice_days': needs 'voice = true'"), "{without}");
         let none = voice("voice = true\nvoice_days = 0").unwrap_err();
         assert!(none.contains("must be from 1 to 10980 days, not 0"), "{none}");
+    }
+
+    #[test]
+    fn the_patch_stays_at_the_centre_unless_the_protocol_lets_the_surgeon_point() {
+        let rule = |lines: &str| {
+            let source = PAPER.replace("repeats = 2", &format!("repeats = 2\n{lines}"));
+            let protocol = Protocol::parse(&source, "trial.toml", &known());
+            protocol.map(|protocol| (protocol.patch, protocol.hold)).map_err(|error| error.to_string())
+        };
+
+        assert_eq!(rule(""), Ok((PatchRule::Centre, false)));
+        assert_eq!(rule("patch = \"centre\""), Ok((PatchRule::Centre, false)));
+        assert_eq!(rule("patch = \"surgeon\""), Ok((PatchRule::Surgeon { stays: false }, false)));
+        assert_eq!(
+            rule("patch = \"surgeon\"\npatch_stays = true\nhold = true"),
+            Ok((PatchRule::Surgeon { stays: true }, true))
+        );
+        let unknown = rule("patch = \"center\"").unwrap_err();
+        assert!(unknown.contains("key 'patch': must be \"centre\" or \"surgeon\", not \"center\""), "{unknown}");
+        let alone = rule("patch_stays = true").unwrap_err();
+        assert!(alone.contains("key 'patch_stays': needs 'patch = \"surgeon\"'"), "{alone}");
     }
 
     #[test]

@@ -8,14 +8,15 @@ use crate::action::Action;
 use crate::answers::is_whole;
 use crate::event::EventKind;
 use crate::phase::Phase;
+use crate::pointing::{Choice, Touch};
 use crate::question::Question;
 use crate::reason;
 use crate::refusal::Refusal;
 use crate::role::Role;
 use crate::tablet::{Presence, WhenAway};
-use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
+use parfocal_base::{FocalPower, PatchPlace};
 
 /// The events that `action` by `by` causes at `now`. Empty if the action was done before (a double click, a stale tab).
 ///
@@ -31,6 +32,8 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
         Action::FinishQuestions { segment: None } => finish_closing(state),
         Action::Pause { reason } => pause(state, by, reason, now),
         Action::GiveReason { event, reason } => give_reason(state, *event, reason),
+        Action::HoldFocus { segment } => hold_focus(state, *segment),
+        Action::ReleaseFocus { segment } => release_focus(state, *segment),
         Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
         Action::Abort { reason } => abort(state, reason, now),
         Action::Withdraw { reason } => withdraw(state, reason),
@@ -67,6 +70,38 @@ pub fn decide_by_hand(
         ));
     }
     Ok(vec![EventKind::FocusedByHand { focal_power, left_at }])
+}
+
+/// The events that are caused when `by` chooses what is to be in focus.
+///
+/// # Errors
+/// If `by` may not do this, the protocol does not allow it, or no setting is being inspected.
+pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<Vec<EventKind>, Refusal> {
+    if !matches!(by, Role::Surgeon | Role::Operator) {
+        return Err(Refusal::only("the surgeon or the operator"));
+    }
+    if !state.plan.patch.is_free() {
+        return Err(Refusal::conflict("the protocol keeps the focus on the centre of the view"));
+    }
+
+    let segment = state.segment().filter(|_| state.running());
+    let segment = segment.ok_or_else(|| not_inspecting(state, "the focus is pointed"))?;
+    Ok(match choice.at {
+        Some(Touch { x, y }) => {
+            vec![EventKind::PatchPlaced { segment, frame: choice.frame, x, y, place: choice.place }]
+        }
+        None if state.patch == PatchPlace::CENTRE => Vec::new(),
+        None => vec![EventKind::PatchCentred { segment, frame: choice.frame }],
+    })
+}
+
+/// The refusal of something that is done only while a setting is inspected.
+fn not_inspecting(state: &SessionState, what: &str) -> Refusal {
+    if state.paused.is_some() {
+        Refusal::conflict("the session is paused")
+    } else {
+        Refusal::Conflict(format!("{what} only while a setting is inspected"))
+    }
 }
 
 /// The events that are caused by what the surgeon's tablets report: that none shows the page any longer, or one does
@@ -118,6 +153,9 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
     let (who, fits): (&str, bool) = match action {
         Action::Start | Action::GiveReason { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
         Action::Pause { .. } => ("the operator or the surgeon", matches!(by, Role::Operator | Role::Surgeon)),
+        Action::HoldFocus { .. } | Action::ReleaseFocus { .. } => {
+            ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator))
+        }
         Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
         Action::FinishSegment { .. } => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
         Action::Resume => {
@@ -244,6 +282,25 @@ fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<Eve
         return Err(Refusal::conflict("there is no such pause, or its reason was given"));
     }
     Ok(vec![EventKind::ReasonGiven { about: event, reason }])
+}
+
+fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    if !state.plan.hold {
+        return Err(Refusal::conflict("the protocol does not let anybody hold the focus"));
+    }
+    match current(state, segment)? {
+        Some(_) if state.running() => {
+            Ok(if state.focus_held { Vec::new() } else { vec![EventKind::FocusHeld { segment }] })
+        }
+        Some(_) => Err(not_inspecting(state, "the focus is held")),
+        None => Ok(Vec::new()),
+    }
+}
+
+fn release_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    // Whatever else ended the hold did so for this button too.
+    let holds = current(state, segment)?.is_some() && state.focus_held;
+    Ok(if holds { vec![EventKind::FocusReleased { segment }] } else { Vec::new() })
 }
 
 fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {

@@ -21,16 +21,20 @@ use std::time::Duration;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-pub use decide::{decide, decide_by_hand, decide_restart, decide_small_picture, decide_tablet, decide_time};
+pub use decide::{
+    decide, decide_by_hand, decide_choice, decide_restart, decide_small_picture, decide_tablet, decide_time,
+};
 pub use inspections::{Inspection, inspections};
 
 use super::event::{Event, EventKind};
 use super::phase::Phase;
+use super::pointing::PatchRule;
 use super::protocol::Protocol;
 use super::question::{AnswerValue, Question};
 use super::role::Role;
 use super::standing::{GivenAnswer, counted};
 use super::tablet::WhenAway;
+use parfocal_base::PatchPlace;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 
@@ -50,6 +54,10 @@ pub struct Plan {
     pub consent: Option<String>,
     /// What happens to a segment's clock while no tablet shows the surgeon's page.
     pub when_tablet_away: WhenAway,
+    /// Who chooses the patch's place.
+    pub patch: PatchRule,
+    /// Whether the focus may be held.
+    pub hold: bool,
 }
 
 impl Plan {
@@ -63,6 +71,8 @@ impl Plan {
             closing: protocol.closing.clone(),
             consent: protocol.consent.clone(),
             when_tablet_away: protocol.when_tablet_away,
+            patch: protocol.patch,
+            hold: protocol.hold,
         }
     }
 
@@ -104,6 +114,10 @@ pub struct SessionState {
     withdrawn: bool,
     /// Whether the last event about the surgeon's tablet says that it is away.
     tablet_away: bool,
+    /// Place of the patch.
+    patch: PatchPlace,
+    /// Whether the focus is held on request.
+    focus_held: bool,
     /// Numbers of the pauses without a reason, oldest first.
     unreasoned: Vec<u32>,
     /// Version of the consent text that the participant consented to last.
@@ -135,6 +149,8 @@ impl SessionState {
             unblinded: false,
             withdrawn: false,
             tablet_away: false,
+            patch: PatchPlace::CENTRE,
+            focus_held: false,
             unreasoned: Vec::new(),
             consented: None,
             answers: BTreeMap::new(),
@@ -175,6 +191,18 @@ impl SessionState {
     #[must_use]
     pub fn may_be_focused_by_hand(&self) -> bool {
         self.phase == Phase::Aborted || (self.paused.is_some() && !self.ended())
+    }
+
+    /// Place of the patch.
+    #[must_use]
+    pub const fn patch(&self) -> PatchPlace {
+        self.patch
+    }
+
+    /// Whether the focus is held on request.
+    #[must_use]
+    pub const fn focus_held(&self) -> bool {
+        self.focus_held
     }
 
     /// Numbers of the events of people who paused the session without giving a reason, oldest first.
@@ -280,6 +308,9 @@ impl SessionState {
             }
             EventKind::SegmentFinished { inspected_ms, .. } => {
                 self.stop_clock(*inspected_ms);
+                if !self.plan.patch.stays() {
+                    self.patch = PatchPlace::CENTRE;
+                }
                 self.asked = self.done + 1;
                 if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
             }
@@ -296,6 +327,10 @@ impl SessionState {
                     self.unreasoned.push(event.number);
                 }
             }
+            EventKind::PatchPlaced { place, .. } => self.patch = *place,
+            EventKind::PatchCentred { .. } => self.patch = PatchPlace::CENTRE,
+            EventKind::FocusHeld { .. } => self.focus_held = true,
+            EventKind::FocusReleased { .. } => self.focus_held = false,
             EventKind::ReasonGiven { about, .. } => self.unreasoned.retain(|number| number != about),
             EventKind::TabletAway { .. } => self.tablet_away = true,
             EventKind::TabletBack => self.tablet_away = false,
@@ -321,6 +356,7 @@ impl SessionState {
     fn stop_clock(&mut self, inspected_ms: u64) {
         self.inspected = Duration::from_millis(inspected_ms);
         self.running_since = None;
+        self.focus_held = false;
     }
 
     const fn leave_segment(&mut self) {

@@ -29,6 +29,8 @@ fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
         closing: if asks_closing { vec![question("z", false)] } else { Vec::new() },
         consent: None,
         when_tablet_away: WhenAway::Pause,
+        patch: PatchRule::default(),
+        hold: false,
     }
 }
 

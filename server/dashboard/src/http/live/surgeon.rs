@@ -10,6 +10,7 @@ use utoipa::ToSchema;
 
 use super::audience::Audience;
 use crate::http::App;
+use parfocal_base::PatchPlace;
 use parfocal_base::step::Hold;
 use parfocal_imaging::PatchArea;
 use parfocal_pipeline::control::ControlStatus;
@@ -46,6 +47,10 @@ pub(super) struct SurgeonFrame {
     patch: PatchArea,
     /// The bright circle, in cells, if one is detected.
     area: Option<Circle>,
+    /// Whether somebody has chosen what is to be in focus, so that the patch is not at the centre.
+    pointed: bool,
+    /// How often somebody has chosen since the server started. When this grows, the patch was placed.
+    choices: u64,
 }
 
 /// A circle in mosaic cells.
@@ -71,6 +76,8 @@ impl SurgeonFrame {
             estimated: picture.estimated,
             patch: picture.patch,
             area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),
+            pointed: picture.aim.place != PatchPlace::CENTRE,
+            choices: picture.aim.choices,
         }
     }
 }

@@ -160,6 +160,11 @@ const ALL: [Kept; 17] = [
             ("picture_height", "payload ->> 'height'"),
             ("pictures", "payload ->> 'pictures'"),
             ("over_ms", "payload ->> 'over_ms'"),
+            ("frame", "payload -> 'frame'"),
+            ("touched_x", "payload -> 'x'"),
+            ("touched_y", "payload -> 'y'"),
+            ("patch_across", "payload -> '$.place[0]'"),
+            ("patch_down", "payload -> '$.place[1]'"),
         ],
         ..kept("event", EventRow::TABLE)
     },

@@ -22,8 +22,8 @@ use crate::store::{
     Answer, Comment, DeviceEvent, Erased, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
     StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
 };
-use parfocal_base::FocalPower;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_base::{FocalPower, PatchPlace};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::grace::Grace;
@@ -429,6 +429,9 @@ impl Blinded {
             };
 
             let seen = event.kind.seen();
+            let choice = event.kind.choice();
+            let touched = choice.and_then(|choice| choice.at);
+            let place = choice.filter(|choice| choice.at.is_some()).map(|choice| choice.place);
             EventRow {
                 session: self.session(),
                 number: event.number,
@@ -450,6 +453,11 @@ impl Blinded {
                 picture_height: seen.map(|seen| seen.size.height),
                 pictures: seen.map(|seen| seen.pictures),
                 over_ms: seen.map(|seen| seen.over_ms),
+                frame: choice.map(|choice| choice.frame),
+                touched_x: touched.map(|touched| touched.x),
+                touched_y: touched.map(|touched| touched.y),
+                patch_across: place.map(PatchPlace::across),
+                patch_down: place.map(PatchPlace::down),
             }
         };
 

@@ -393,8 +393,9 @@ table! {
         ).open(),
         kind: &'static str = means(
             "Kind of event: created, started, segment-started, segment-finished, questions-finished, paused, \
-             reason-given, focused-by-hand, tablet-away, tablet-back, pictures-seen, resumed, server-restarted, \
-             completed, aborted, withdrawn or unblinded",
+             reason-given, focused-by-hand, tablet-away, tablet-back, pictures-seen, patch-placed, \
+             patch-centred, focus-held, focus-released, resumed, server-restarted, completed, aborted, withdrawn or \
+             unblinded",
         ).open(),
         setting: Option<usize> = SETTING_IF_ANY,
         segment: Option<SegmentId> = SEGMENT_IF_ANY.open(),
@@ -430,6 +431,24 @@ table! {
         over_ms: Option<u64> = means(
             "Duration in which they were drawn, up to the event; empty for other events than pictures-seen",
         ).in_unit("ms").open(),
+        frame: Option<u64> = means(
+            "Number of the frame that was on screen when somebody chose what is to be in focus; empty for other events \
+             than patch-placed and patch-centred",
+        ).open(),
+        touched_x: Option<f64> = means(
+            "Where the picture was touched, from its left edge; empty for other events than patch-placed",
+        ).in_unit("mosaic cells").open(),
+        touched_y: Option<f64> = means(
+            "Where the picture was touched, from its top edge; empty for other events than patch-placed",
+        ).in_unit("mosaic cells").open(),
+        patch_across: Option<f64> = means(
+            "How far the patch's new place lies to the right of the bright circle's centre; empty for other events than \
+             patch-placed",
+        ).in_unit("radii of the bright circle").open(),
+        patch_down: Option<f64> = means(
+            "How far the patch's new place lies below the bright circle's centre; empty for other events than \
+             patch-placed",
+        ).in_unit("radii of the bright circle").open(),
     }
 }
 
@@ -744,8 +763,8 @@ table! {
              lens was unavailable",
         ).in_unit("focal power, 0..1"),
         held: bool = means(
-            "Whether the lens was held because of a pause or a failure of lens or camera; holds caused by the \
-             policy would reveal it and are in policy_steps.csv",
+            "Whether the lens was held on request, because of a pause, or because of a failure of lens or camera; holds \
+             caused by the policy would reveal it and are in policy_steps.csv",
         ),
         optimal: Option<f64> = means(
             "Best focal power for the frame; empty unless camera and lens are simulated",
@@ -753,6 +772,8 @@ table! {
         picture_width: Option<i64> = means(
             "Width of the picture on the surgeon's tablet, to half a second; empty if no tablet showed one",
         ).in_unit("px"),
+        patch_x: i64 = means("Left column of the patch").in_unit("mosaic cells"),
+        patch_y: i64 = means("Top row of the patch").in_unit("mosaic cells"),
     }
 }
 
@@ -804,7 +825,7 @@ table! {
         policy_micros: i64 = means("Duration of the policy's step").in_unit("us"),
         latency_micros: i64 = means("Time from the end of the exposure to the lens command").in_unit("us"),
         held: Option<String> = means(
-            "Why the lens was held; empty if it was not: paused, policy-panicked, policy-nonsense, policy-slow, \
+            "Why the lens was held; empty if it was not: paused, focus-held, policy-panicked, policy-nonsense, policy-slow, \
              policy-unavailable, lens-failed or camera-failed",
         ),
     }

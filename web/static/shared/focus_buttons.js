@@ -1,0 +1,74 @@
+// The buttons beside the picture for where the focus looks: *Centre*, and *Hold focus* where the protocol has it.
+
+import { byId, setText } from "./dom.js";
+import { Hold, isHoldKey } from "./hold.js";
+
+/**
+ * @param {import("./pointing.js").Pointing} pointing
+ * @param {(hold: boolean) => void} ask asks the server to hold or to release the focus
+ */
+export function focusButtons(pointing, ask) {
+  const centre = byId("centre", HTMLButtonElement);
+  const button = byId("hold", HTMLButtonElement);
+  const hold = new Hold({ ask, now: () => performance.now() });
+
+  /**
+   * Follows what may be done now, and whether the focus is held.
+   *
+   * @param {{ points: boolean, mayPoint: boolean, holds: boolean, mayHold: boolean, held: boolean }} may whether the
+   *   buttons are there, and whether they work now
+   */
+  function follow({ points, mayPoint, holds, mayHold, held }) {
+    pointing.allowed = mayPoint;
+    if (!mayPoint) pointing.takeBack();
+    hold.held = held;
+    centre.hidden = !points;
+    centre.disabled = !mayPoint;
+    button.hidden = !holds;
+    button.disabled = !mayHold;
+    button.setAttribute("aria-pressed", String(held));
+    setText(button, held ? "Focus held" : "Hold focus");
+  }
+
+  const open = () => !button.hidden && !button.disabled;
+
+  centre.onclick = () => pointing.centre();
+
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0 || !open()) return;
+    // Keeps focus and selection where they are, in case a comment is being typed.
+    event.preventDefault();
+    button.setPointerCapture(event.pointerId);
+    hold.press(`pointer ${event.pointerId}`);
+  });
+  // On the whole window: the finger may have left the button.
+  for (const end of ["pointerup", "pointercancel"]) {
+    addEventListener(end, (event) => {
+      if (event instanceof PointerEvent) hold.release(`pointer ${event.pointerId}`);
+    });
+  }
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+
+  addEventListener(
+    "keydown",
+    (event) => {
+      const at = document.activeElement;
+      const inField = at?.matches("textarea, select, input, [contenteditable]") ?? false;
+      const onButton = at === button && (event.key === " " || event.key === "Enter");
+      if (!open() || event.isComposing || !(onButton || isHoldKey(event, inField))) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      if (!event.repeat) hold.press(`key ${event.code || event.key}`);
+    },
+    true,
+  );
+  addEventListener("keyup", (event) => {
+    if (hold.release(`key ${event.code || event.key}`)) event.preventDefault();
+  });
+  const leave = () => hold.leave();
+  addEventListener("blur", leave);
+  addEventListener("pagehide", leave);
+  document.addEventListener("visibilitychange", () => document.hidden && leave());
+
+  return { follow };
+}
