@@ -206,8 +206,9 @@ async fn steps_put_at_the_end_of_an_old_session_are_found() {
     let mut trial = Trial::start(folder.path()).await;
     trial.whole_session("practice").await;
     trial.store.close().await;
-    let more = "INSERT INTO telemetry (run, frame, exposed_ns, segment, asked, policy_micros, latency_micros)
-        SELECT run, 999, exposed_ns, segment, 0.5, 1, 1 FROM telemetry WHERE segment = 2 LIMIT 1";
+    let more = "INSERT INTO telemetry (run, frame, exposed_ns, segment, asked, policy_micros, latency_micros,
+            patch_x, patch_y)
+        SELECT run, 999, exposed_ns, segment, 0.5, 1, 1, 240, 120 FROM telemetry WHERE segment = 2 LIMIT 1";
     let wrong = said(&after(&folder.path().join("parfocal.db"), more, None).await, "chain").unwrap_err();
     assert!(wrong.contains("telemetry: 1 steps of segment") && wrong.contains("inserted"), "{wrong}");
 }

@@ -29,8 +29,8 @@ async fn insert(pool: &SqlitePool, segment: i64, frames: &[Frame]) {
     for (number, frame) in frames.iter().enumerate() {
         sqlx::query(
             "INSERT INTO telemetry (run, frame, exposed_ns, segment, asked, measured, policy_micros, latency_micros,
-                 held, optimal)
-             VALUES (?, ?, ?, ?, ?, ?, 0, 0, ?, ?)",
+                 held, optimal, patch_x, patch_y)
+             VALUES (?, ?, ?, ?, ?, ?, 0, 0, ?, ?, 240, 120)",
         )
         .bind(frame.run)
         .bind(i64::try_from(number).unwrap())

@@ -205,6 +205,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/operator/patch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Points the focus at a place in the picture, or back at the centre. In a session it is recorded, and only while a
+         *     setting is inspected whose protocol lets the surgeon point.
+         */
+        post: operations["operator_patch"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/operator/recording": {
         parameters: {
             query?: never;
@@ -826,6 +846,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/surgeon/patch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Points the focus at a place in the picture, or back at the centre. In a session it is recorded, and only while a
+         *     setting is inspected whose protocol lets the surgeon point.
+         */
+        post: operations["surgeon_patch"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/surgeon/session": {
         parameters: {
             query?: never;
@@ -1350,6 +1390,16 @@ export interface components {
             reason: string;
         } | {
             /** @enum {string} */
+            action: "hold-focus";
+            /** @description Segment that is inspected. */
+            segment: components["schemas"]["SegmentId"];
+        } | {
+            /** @enum {string} */
+            action: "release-focus";
+            /** @description Segment that is inspected. */
+            segment: components["schemas"]["SegmentId"];
+        } | {
+            /** @enum {string} */
             action: "resume";
         } | {
             /** @enum {string} */
@@ -1846,6 +1896,19 @@ export interface components {
             /** @description The program's version. */
             version: string;
         };
+        /** @description When the focus was held on request. */
+        HoldSpan: {
+            /**
+             * Format: double
+             * @description Start, in seconds.
+             */
+            from: number;
+            /**
+             * Format: double
+             * @description End, in seconds; none while it lasts.
+             */
+            to?: number | null;
+        };
         /** @description The number of comments and answers that a surgeon's device still holds. */
         Holding: {
             /** @description Device that holds them. */
@@ -1953,6 +2016,16 @@ export interface components {
             session: components["schemas"]["SessionId"];
             /** @description Value of the answer. */
             value: components["schemas"]["AnswerValue"];
+        };
+        /** @description A request to look elsewhere. */
+        NewChoice: {
+            at?: components["schemas"]["Touch"] | null;
+            /**
+             * Format: int64
+             * @description Number of the frame that was on screen.
+             */
+            frame: number;
+            session?: components["schemas"]["SessionId"] | null;
         };
         /** @description A comment as a surgeon's browser sends it. */
         NewComment: components["schemas"]["Sight"] & components["schemas"]["Origin"] & components["schemas"]["CommentContent"] & {
@@ -2881,6 +2954,10 @@ export interface components {
             };
             /** @description Number of comments saved so far in this session, without those that were taken back. */
             comments: number;
+            /** @description Whether the focus is held on request. */
+            focus_held: boolean;
+            /** @description Whether the protocol lets the surgeon hold the focus. */
+            holding: boolean;
             /** @description Whether the surgeon may pause the session. */
             may_pause: boolean;
             /** @description Whether the surgeon may resume the session: not after a pause by the operator. */
@@ -2890,6 +2967,8 @@ export interface components {
             paused_by?: components["schemas"]["PauseCause"] | null;
             /** @description Phase of the session. */
             phase: components["schemas"]["Phase"];
+            /** @description Whether the protocol lets the surgeon choose what is to be in focus. */
+            pointing: boolean;
             /** @description Whether this is a practice session. */
             practice: boolean;
             /** @description Prompt to show now, for example "How does the focus feel now?"; none if none is due. */
@@ -2942,8 +3021,14 @@ export interface components {
         Timeline: {
             /** @description When no tablet showed the surgeon's page. */
             absences: components["schemas"]["PauseSpan"][];
+            /** @description When somebody chose what is to be in focus. */
+            choices: components["schemas"]["TimelineChoice"][];
             /** @description The comments. */
             comments: components["schemas"]["TimelineComment"][];
+            /** @description When the focus was held on request. */
+            holds: components["schemas"]["HoldSpan"][];
+            /** @description Whether a choice stays in the settings that follow. Otherwise each setting begins at the centre. */
+            patch_stays: boolean;
             /** @description When the session was paused and the lens held where it was. */
             pauses: components["schemas"]["PauseSpan"][];
             /** @description The focal path. */
@@ -2954,6 +3039,29 @@ export interface components {
             settings: components["schemas"]["SettingSpan"][];
             /** @description What size of picture the surgeon saw, and how many. */
             sights: components["schemas"]["SightSpan"][];
+        };
+        /** @description A choice of what is to be in focus. */
+        TimelineChoice: {
+            /**
+             * Format: int64
+             * @description Number of the frame that was on screen.
+             */
+            frame: number;
+            /**
+             * Format: double
+             * @description When it was made, in seconds.
+             */
+            seconds: number;
+            /**
+             * Format: double
+             * @description Where the picture was touched, in mosaic cells from its left edge; none for the centre of the bright circle.
+             */
+            x?: number | null;
+            /**
+             * Format: double
+             * @description Where the picture was touched, in mosaic cells from its top edge; none for the centre of the bright circle.
+             */
+            y?: number | null;
         };
         /** @description A comment on the timeline. */
         TimelineComment: components["schemas"]["CommentContent"] & {
@@ -3043,6 +3151,19 @@ export interface components {
              * @description Length in seconds.
              */
             seconds: number;
+        };
+        /** @description Where a picture was touched. */
+        Touch: {
+            /**
+             * Format: double
+             * @description Mosaic cells from the picture's left edge.
+             */
+            x: number;
+            /**
+             * Format: double
+             * @description Mosaic cells from the picture's top edge.
+             */
+            y: number;
         };
         /** @description Result of Page's test. */
         Trend: {
@@ -4397,6 +4518,145 @@ export interface operations {
                 };
             };
             /** @description No such code */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; see its log */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    operator_patch: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewChoice"];
+            };
+        };
+        responses: {
+            /** @description The next frame is focused there */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The request took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The protocol or the state of the session does not allow it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The Content-Type is not application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address, and the request names another host */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The place lies outside the picture */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -9168,6 +9428,145 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    surgeon_patch: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewChoice"];
+            };
+        };
+        responses: {
+            /** @description The next frame is focused there */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The request took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The protocol or the state of the session does not allow it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The Content-Type is not application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address, and the request names another host */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The place lies outside the picture */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; see its log */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
                 };
             };
         };

@@ -524,6 +524,9 @@ class Health(TypedDict):
     version: str
     """The program's version."""
 
+HoldSpan = TypedDict("HoldSpan", {"from": "float", "to": "NotRequired[float | None]"})
+"""When the focus was held on request."""
+
 class Holding(TypedDict):
     """The number of comments and answers that a surgeon's device still holds."""
 
@@ -649,6 +652,16 @@ class NewAnswer(TypedDict):
     value: AnswerValue
     """Value of the answer."""
 
+class NewChoice(TypedDict):
+    """A request to look elsewhere."""
+
+    at: NotRequired[Touch | None]
+
+    frame: int
+    """Number of the frame that was on screen."""
+
+    session: NotRequired[SessionId | None]
+
 NewComment = dict[str, Any]
 """A comment as a surgeon's browser sends it."""
 
@@ -727,6 +740,12 @@ class OperatorView(TypedDict):
     comments: int
     """Number of comments saved so far in this session, without those that were taken back."""
 
+    focus_held: bool
+    """Whether the focus is held on request."""
+
+    holding: bool
+    """Whether the protocol lets the surgeon hold the focus."""
+
     may_pause: bool
     """Whether the surgeon may pause the session."""
 
@@ -740,6 +759,9 @@ class OperatorView(TypedDict):
 
     phase: Phase
     """Phase of the session."""
+
+    pointing: bool
+    """Whether the protocol lets the surgeon choose what is to be in focus."""
 
     practice: bool
     """Whether this is a practice session."""
@@ -1676,6 +1698,12 @@ class SurgeonView(TypedDict):
     comments: int
     """Number of comments saved so far in this session, without those that were taken back."""
 
+    focus_held: bool
+    """Whether the focus is held on request."""
+
+    holding: bool
+    """Whether the protocol lets the surgeon hold the focus."""
+
     may_pause: bool
     """Whether the surgeon may pause the session."""
 
@@ -1689,6 +1717,9 @@ class SurgeonView(TypedDict):
 
     phase: Phase
     """Phase of the session."""
+
+    pointing: bool
+    """Whether the protocol lets the surgeon choose what is to be in focus."""
 
     practice: bool
     """Whether this is a practice session."""
@@ -1757,8 +1788,17 @@ class Timeline(TypedDict):
     absences: builtins.list[PauseSpan]
     """When no tablet showed the surgeon's page."""
 
+    choices: builtins.list[TimelineChoice]
+    """When somebody chose what is to be in focus."""
+
     comments: builtins.list[TimelineComment]
     """The comments."""
+
+    holds: builtins.list[HoldSpan]
+    """When the focus was held on request."""
+
+    patch_stays: bool
+    """Whether a choice stays in the settings that follow. Otherwise each setting begins at the centre."""
 
     pauses: builtins.list[PauseSpan]
     """When the session was paused and the lens held where it was."""
@@ -1774,6 +1814,23 @@ class Timeline(TypedDict):
 
     sights: builtins.list[SightSpan]
     """What size of picture the surgeon saw, and how many."""
+
+class TimelineChoice(TypedDict):
+    """A choice of what is to be in focus."""
+
+    frame: int
+    """Number of the frame that was on screen."""
+
+    seconds: float
+    """When it was made, in seconds."""
+
+    x: NotRequired[float | None]
+    """Where the picture was touched, in mosaic cells from its left edge; none for the centre of the
+    bright circle."""
+
+    y: NotRequired[float | None]
+    """Where the picture was touched, in mosaic cells from its top edge; none for the centre of the
+    bright circle."""
 
 TimelineComment = dict[str, Any]
 """A comment on the timeline."""
@@ -1815,6 +1872,15 @@ class TimelineVoice(TypedDict):
 
     seconds: float
     """Length in seconds."""
+
+class Touch(TypedDict):
+    """Where a picture was touched."""
+
+    x: float
+    """Mosaic cells from the picture's left edge."""
+
+    y: float
+    """Mosaic cells from the picture's top edge."""
 
 class Trend(TypedDict):
     """Result of Page's test."""
@@ -2034,6 +2100,11 @@ class OperatorRequests:
         """Adds a participant; one that exists already stays as it is. Answers with all codes."""
         return self._call("POST", "/api/operator/participants", body={"code": code})
 
+    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> None:
+        """Points the focus at a place in the picture, or back at the centre. In a session it is
+        recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
+        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+
     def status(self) -> RecordingStatus:
         """The state of recording, and how long the disk will last."""
         return self._call("GET", "/api/operator/recording")
@@ -2219,6 +2290,11 @@ class SurgeonRequests:
         without being warned."""
         return self._call("POST", "/api/surgeon/holding", answer="nothing", body={"device": device, "holding": holding, "session": session})
 
+    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> None:
+        """Points the focus at a place in the picture, or back at the centre. In a session it is
+        recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
+        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+
     def session(self) -> SurgeonView | None:
         """The session under way; null if there is none."""
         return self._call("GET", "/api/surgeon/session")
@@ -2339,6 +2415,11 @@ class AsyncOperatorRequests:
     def add_participant(self, *, code: str) -> Awaitable[builtins.list[str]]:
         """Adds a participant; one that exists already stays as it is. Answers with all codes."""
         return self._call("POST", "/api/operator/participants", body={"code": code})
+
+    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> Awaitable[None]:
+        """Points the focus at a place in the picture, or back at the centre. In a session it is
+        recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
+        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
 
     def status(self) -> Awaitable[RecordingStatus]:
         """The state of recording, and how long the disk will last."""
@@ -2524,6 +2605,11 @@ class AsyncSurgeonRequests:
         """Notes how much of a session a surgeon's device still holds, so that nobody unblinds it
         without being warned."""
         return self._call("POST", "/api/surgeon/holding", answer="nothing", body={"device": device, "holding": holding, "session": session})
+
+    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> Awaitable[None]:
+        """Points the focus at a place in the picture, or back at the centre. In a session it is
+        recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
+        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
 
     def session(self) -> Awaitable[SurgeonView | None]:
         """The session under way; null if there is none."""

@@ -45,6 +45,10 @@ async fn is_live(browser: &Browser) {
     until("a picture", || async { browser.is(".viewer-stale", "hidden").await }).await;
 }
 
+/// Whether anything is drawn over the picture.
+const ANYTHING: &str = "const context = document.querySelector('.viewer-overlay').getContext('2d');
+    return context.getImageData(0, 0, 2000, 2000).data.some((value) => value > 0);";
+
 /// Waits until ring or corners stand at `PLACE`, or nothing does.
 async fn shows(browser: &Browser, mark: bool) {
     until(if mark { "a mark" } else { "no mark" }, || async { (marked(browser).await > 0) == mark }).await;
@@ -53,7 +57,8 @@ async fn shows(browser: &Browser, mark: bool) {
 /// The kinds of the session's events about the focus, with the frames that were on screen.
 async fn events(server: &Server) -> Vec<(String, Option<i64>)> {
     let pool = database(server.data.path()).await;
-    let sql = "SELECT kind, payload ->> 'frame' FROM events WHERE kind LIKE 'patch-%' OR kind LIKE 'focus-%' ORDER BY number";
+    let sql =
+        "SELECT kind, payload ->> 'frame' FROM events WHERE kind LIKE 'patch-%' OR kind LIKE 'focus-%' ORDER BY number";
     let events = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
     pool.close().await;
     events
@@ -117,11 +122,7 @@ async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms()
     operator.click("#view").await;
     operator.focus("#view").await;
     operator.tools("Input.dispatchKeyEvent", key("keyDown", "ArrowRight", 8)).await;
-    until("the choice on the tablet", || async {
-        one.run("return document.querySelector('.viewer-overlay').getContext('2d').getImageData(0, 0, 2000, 2000).data.some((value) => value > 0)", &[])
-            .await == json!(true)
-    })
-    .await;
+    until("the choice on the tablet", || async { one.run(ANYTHING, &[]).await == json!(true) }).await;
     shoot(&operator, "pointing-2-operator").await;
     operator.focus("#view").await;
     operator.type_into("#view", "c").await;

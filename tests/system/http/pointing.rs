@@ -69,8 +69,8 @@ async fn outside_sessions_both_tablets_and_the_operator_see_the_place_that_was_c
 fn seen_of(header: &Value) -> String {
     let area = &header["area"];
     let (x, y) = middle(header);
-    let across = ((x - area["x"].as_f64().unwrap_or_default()) / 10.0).round();
-    let down = ((y - area["y"].as_f64().unwrap_or_default()) / 10.0).round();
+    let across = ((x - area["x"].as_f64().unwrap_or_default()) / 10.0).round() as i64;
+    let down = ((y - area["y"].as_f64().unwrap_or_default()) / 10.0).round() as i64;
     format!("{across} {down} {}", header["pointed"])
 }
 

@@ -15,14 +15,6 @@ import { followZooming } from "./zooming.js";
 const STALE_MS = 500;
 const LOOK_MS = 250;
 
-/**
- * What keys do with the place that is to be in focus.
- *
- * @typedef {object} Nudged
- * @property {(across: number, down: number) => void} nudge
- * @property {() => void} centre
- */
-
 /** A live view within an element, which must be positioned and have a size of its own. */
 export class Viewer {
   /** The live connection. It also brings the session's view and the devices' state. */

@@ -19,12 +19,20 @@ const PAGE = 400;
 const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /**
+ * What keys do with the place that is to be in focus.
+ *
+ * @typedef {object} Nudged
+ * @property {(across: number, down: number) => void} nudge
+ * @property {() => void} centre
+ */
+
+/**
  * Lets people zoom `framing` by input on `element`. Calls `changed` after each change.
  *
  * @param {HTMLElement} element
  * @param {import("./framing.js").Framing} framing
  * @param {() => void} changed
- * @param {import("./gestures.js").Tappable & import("./viewer.js").Nudged} taps
+ * @param {import("./gestures.js").Tappable & Nudged} taps
  */
 export function followZooming(element, framing, changed, taps) {
   const gestures = new Gestures(framing, taps);

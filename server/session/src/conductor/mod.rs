@@ -46,7 +46,7 @@ use course::{Course, RunClock};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SessionId;
-use parfocal_pipeline::control::{Command, ControlHandle};
+use parfocal_pipeline::control::{Aim, Command, ControlHandle};
 use parfocal_records::store::Store;
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
