@@ -136,7 +136,8 @@ export class Viewer {
     });
     this.#element.setAttribute(
       "aria-label",
-      "Live view. Plus and minus zoom, zero shows everything. Where it is allowed, Shift with an arrow points the focus, and C brings it back to the centre.",
+      "Live view. Plus and minus zoom, zero shows everything. Where it is allowed, Shift with an arrow points " +
+        "the focus, and C brings it back to the centre.",
     );
     return this.#pointing;
   }
