@@ -1,4 +1,4 @@
-//! Pointing at what is to be in focus, and holding it, on the real pages: by taps, by the mouse, by keys, on two tablets.
+//! Pointing at what is to be in focus, and holding it, on the real pages: by taps, mouse and keys, on two tablets.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Pointing at what is to be in focus, over HTTP: every page sees the same place, and the place says nothing of a policy.
+//! Pointing at what is to be in focus, over HTTP: every page sees the same place, which says nothing of a policy.
 
 use std::collections::BTreeSet;
 
