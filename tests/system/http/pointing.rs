@@ -96,7 +96,10 @@ async fn ring_and_corners_are_the_same_under_every_policy() {
         let begun = page.heard.len();
         let header = page.watch_until(|header| header["area"].is_object()).await.header;
         let (x, y) = (header["area"]["x"].as_f64().unwrap(), header["area"]["y"].as_f64().unwrap());
-        let touch = |across: f64, down: f64| json!({"session": id, "frame": header["frame"], "at": {"x": x + across, "y": y + down}});
+        let touch = |across: f64, down: f64| {
+            let at = json!({"x": x + across, "y": y + down});
+            json!({"session": id, "frame": header["frame"], "at": at})
+        };
 
         let mut choices = header["choices"].as_u64().unwrap();
         for body in [touch(-40.0, 20.0), touch(30.0, 0.0), json!({"session": id, "frame": 1})] {
