@@ -72,13 +72,15 @@ struct External {
     wide: bool,
     blur: Option<BlurRate>,
     frames: u32,
+    /// Whether the process must forget what it saw before it gets the next frame.
+    anew: bool,
     fault: Option<Fault>,
 }
 
 impl External {
     fn new(running: Running, shared: Arc<Shared>) -> Self {
         let wide = running.process.is_wide();
-        Self { running: Some(running), shared, wide, blur: None, frames: 0, fault: None }
+        Self { running: Some(running), shared, wide, blur: None, frames: 0, anew: true, fault: None }
     }
 
     fn time(&self) -> u64 {
@@ -94,8 +96,9 @@ impl External {
             return Err(self.fault.clone().unwrap_or(Fault::Late));
         };
 
-        if self.frames == 0 {
+        if self.anew {
             process.reset(time, blur)?;
+            self.anew = false;
         }
         self.frames += 1;
         process.ask(seen, time, blur, patience)
@@ -122,6 +125,10 @@ impl Policy for External {
 
     fn learn_of(&mut self, blur: BlurRate) {
         self.blur = Some(blur);
+    }
+
+    fn forget(&mut self) {
+        self.anew = true;
     }
 
     fn fault(&self) -> Option<Fault> {

@@ -13,8 +13,8 @@ const LEAST_MOVE: f64 = 1e-9;
 /// A time between frames that is longer than this is a gap, in nanoseconds.
 const GAP_NS: i64 = 1_000_000_000;
 
-/// How the lens was driven in a setting. Frames at which the loop held the lens for a pause or a failed device are left
-/// out. Frames that were held because of the policy are counted.
+/// How the lens was driven in a setting. Frames at which the loop held the lens on request, for a pause or for a failed
+/// device are left out. Frames that were held because of the policy are counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Motion {
     /// Setting, from 1.
@@ -36,7 +36,7 @@ pub struct Motion {
 }
 
 /// A row of telemetry: run, end of the exposure in nanoseconds, focal power commanded, focal power at exposure,
-/// optimum, and whether the loop was held for a pause or a failed device.
+/// optimum, and whether the loop was held on request, for a pause or for a failed device.
 pub type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
 
 /// Figures of ended sessions, by session. Their telemetry no longer changes.
