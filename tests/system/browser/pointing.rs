@@ -54,6 +54,36 @@ async fn shows(browser: &Browser, mark: bool) {
     until(if mark { "a mark" } else { "no mark" }, || async { (marked(browser).await > 0) == mark }).await;
 }
 
+/// Taps the surgeon's view until a ring stands there: on a busy machine the picture may be too old to be pointed at.
+async fn point(browser: &Browser) {
+    is_live(browser).await;
+    tap(browser).await;
+    until("a ring", || async {
+        if marked(browser).await > 0 {
+            return true;
+        }
+        let refused = browser.text("#trouble").await.contains("not live");
+        if refused && browser.is(".viewer-stale", "hidden").await {
+            tap(browser).await;
+        }
+        false
+    })
+    .await;
+}
+
+/// Taps *Centre*, again where the picture was too old, until `other` shows no mark any more.
+async fn centre(browser: &Browser, other: &Browser) {
+    is_live(browser).await;
+    browser.click("#centre").await;
+    until("no mark", || async {
+        if browser.text("#trouble").await.contains("not live") {
+            browser.click("#centre").await;
+        }
+        marked(other).await == 0
+    })
+    .await;
+}
+
 /// The kinds of the session's events about the focus, with the frames that were on screen.
 async fn events(server: &Server) -> Vec<(String, Option<i64>)> {
     let pool = database(server.data.path()).await;
@@ -95,7 +125,7 @@ async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms()
             look();
         }, { once: true });";
     one.run(stands, &[]).await;
-    tap(&one).await;
+    point(&one).await;
     until("a ring", || async { one.run("return window.ring", &[]).await.is_number() }).await;
     let took = one.run("return window.ring", &[]).await.as_f64().unwrap();
     println!("the ring stood {took:.0} ms after the tap");
@@ -107,8 +137,7 @@ async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms()
         accessible::check_reach(&one, &format!("a surgeon's page with Centre at {width}x{height}")).await;
     }
     shoot(&one, "pointing-1-no-session").await;
-    one.click("#centre").await;
-    shows(&other, false).await;
+    centre(&one, &other).await;
 
     one.double_click("#view").await;
     one.sees(".viewer-unzoom", "2.5×").await;
@@ -121,12 +150,18 @@ async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms()
     is_live(&operator).await;
     operator.click("#view").await;
     operator.focus("#view").await;
-    operator.tools("Input.dispatchKeyEvent", key("keyDown", "ArrowRight", 8)).await;
-    until("the choice on the tablet", || async { one.run(ANYTHING, &[]).await == json!(true) }).await;
+    until("the choice on the tablet", || async {
+        operator.tools("Input.dispatchKeyEvent", key("keyDown", "ArrowRight", 8)).await;
+        one.run(ANYTHING, &[]).await == json!(true)
+    })
+    .await;
     shoot(&operator, "pointing-2-operator").await;
     operator.focus("#view").await;
-    operator.type_into("#view", "c").await;
-    assert_eq!(operator.text("#pointing-trouble").await, "");
+    until("the centre again", || async {
+        operator.type_into("#view", "c").await;
+        one.run(ANYTHING, &[]).await == json!(false)
+    })
+    .await;
 }
 
 /// A key event as Chromium's own protocol has it.
@@ -140,9 +175,7 @@ async fn in_a_session_each_tap_and_each_hold_is_an_event_and_outlives_a_reload()
     let mut theatre = Theatre::on(&driver, Arc::new(tempfile::tempdir().unwrap())).await;
     theatre.begin("P-01", "pointing").await;
     theatre.tap_notice(1).await;
-    is_live(&theatre.surgeon).await;
-    tap(&theatre.surgeon).await;
-    shows(&theatre.surgeon, true).await;
+    point(&theatre.surgeon).await;
     until("the event", || async { kinds(&theatre.server).await == ["patch-placed"] }).await;
     assert!(events(&theatre.server).await[0].1.is_some_and(|frame| frame > 0));
     for (width, height) in TABLET {
@@ -170,8 +203,7 @@ async fn in_a_session_each_tap_and_each_hold_is_an_event_and_outlives_a_reload()
     theatre.surgeon.tools("Input.dispatchKeyEvent", key("keyUp", "F24", 0)).await;
     theatre.surgeon.sees("#hold", "Focus held").await;
     assert_eq!(theatre.surgeon.value("#comment").await, "half a sent");
-    theatre.surgeon.click("#centre").await;
-    shows(&theatre.surgeon, false).await;
+    centre(&theatre.surgeon, &theatre.surgeon).await;
     let expected = ["patch-placed", "focus-held", "focus-released", "focus-held", "patch-centred"];
     until("all events", || async { kinds(&theatre.server).await == expected }).await;
 
