@@ -121,13 +121,13 @@ async fn each_setting_begins_at_the_centre_unless_the_protocol_lets_the_choice_s
         let session = trial.begin(protocol).await;
         inspect(&mut trial).await;
         trial.conductor.choose(Role::Surgeon, touch(session, 306.0, 136.0)).await.unwrap();
-        trial.wait(Duration::from_secs(60)).await;
+        trial.wait(Duration::from_mins(1)).await;
         assert_eq!(trial.view().phase, Phase::Notice);
         inspect(&mut trial).await;
 
         let last = aims(&mut trial).pop().unwrap();
         assert_eq!((last.place, last.choices), (next, 1), "{protocol}: that it went back is nobody's choice");
-        trial.wait(Duration::from_secs(60)).await;
+        trial.wait(Duration::from_mins(1)).await;
         assert_eq!(trial.view().phase, Phase::Completed);
         let expected: &[Aim] = if next == place { &[aim(PatchPlace::CENTRE, 1)] } else { &[] };
         assert_eq!(aims(&mut trial), expected, "{protocol}: after the end it is at the centre");
@@ -208,23 +208,23 @@ async fn the_focus_is_held_until_it_is_released_or_the_clock_stops() {
     inspect(&mut trial).await;
     let segment = trial.view().segment.unwrap();
     trial.commanded();
-    let held = |held| Command::Aim(Aim { held, ..Aim::default() });
+    let aimed = |held| Command::Aim(Aim { held, ..Aim::default() });
 
     let hold = Action::HoldFocus { segment };
     trial.surgeon(hold.clone()).await;
     trial.surgeon(hold.clone()).await;
-    assert_eq!(trial.commanded(), [held(true)], "the policy stays in charge, so that it goes on at once");
+    assert_eq!(trial.commanded(), [aimed(true)], "the policy stays in charge, so that it goes on at once");
     assert!(trial.view().focus_held && trial.operator_view().surgeon.focus_held);
     trial.wait(Duration::from_secs(2)).await;
     trial.conductor.act(Role::Operator, session, Action::ReleaseFocus { segment }).await.unwrap();
-    assert_eq!(trial.commanded(), [held(false)]);
+    assert_eq!(trial.commanded(), [aimed(false)]);
 
     // A pause ends it, before any policy can take a step.
     trial.surgeon(hold).await;
     trial.commanded();
     trial.surgeon(Action::Pause { reason: String::new() }).await;
     let paused = Command::Drive { drive: Drive::Hold { at: None }, segment: Some(segment) };
-    assert_eq!(trial.commanded(), [paused, held(false)]);
+    assert_eq!(trial.commanded(), [paused, aimed(false)]);
     trial.surgeon(Action::ReleaseFocus { segment }).await;
     trial.surgeon(Action::Resume).await;
     assert!(!trial.view().focus_held);

@@ -150,10 +150,10 @@ impl Page {
                 }
             }
         };
-        match tokio::time::timeout(PATIENCE, watched).await {
-            Ok(frame) => frame,
-            Err(_) => panic!("waited {PATIENCE:?} for a picture that fits; the last message: {:?}", self.heard.last()),
-        }
+        let Ok(frame) = tokio::time::timeout(PATIENCE, watched).await else {
+            panic!("waited {PATIENCE:?} for a picture that fits; the last message: {:?}", self.heard.last());
+        };
+        frame
     }
 
     /// Waits for and acknowledges `count` frames.

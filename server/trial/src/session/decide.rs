@@ -90,7 +90,7 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
         Some(Touch { x, y }) => {
             vec![EventKind::PatchPlaced { segment, frame: choice.frame, x, y, place: choice.place }]
         }
-        None if state.patch == PatchPlace::CENTRE => Vec::new(),
+        None if state.pointed.patch == PatchPlace::CENTRE => Vec::new(),
         None => vec![EventKind::PatchCentred { segment, frame: choice.frame }],
     })
 }
@@ -290,7 +290,7 @@ fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>
     }
     match current(state, segment)? {
         Some(_) if state.running() => {
-            Ok(if state.focus_held { Vec::new() } else { vec![EventKind::FocusHeld { segment }] })
+            Ok(if state.pointed.held { Vec::new() } else { vec![EventKind::FocusHeld { segment }] })
         }
         Some(_) => Err(not_inspecting(state, "the focus is held")),
         None => Ok(Vec::new()),
@@ -299,7 +299,7 @@ fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>
 
 fn release_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
     // Whatever else ended the hold did so for this button too.
-    let holds = current(state, segment)?.is_some() && state.focus_held;
+    let holds = current(state, segment)?.is_some() && state.pointed.held;
     Ok(if holds { vec![EventKind::FocusReleased { segment }] } else { Vec::new() })
 }
 

@@ -114,15 +114,21 @@ pub struct SessionState {
     withdrawn: bool,
     /// Whether the last event about the surgeon's tablet says that it is away.
     tablet_away: bool,
-    /// Place of the patch.
-    patch: PatchPlace,
-    /// Whether the focus is held on request.
-    focus_held: bool,
+    pointed: Pointed,
     /// Numbers of the pauses without a reason, oldest first.
     unreasoned: Vec<u32>,
     /// Version of the consent text that the participant consented to last.
     consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
+}
+
+/// What people have chosen of the focus.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pointed {
+    /// Place of the patch.
+    patch: PatchPlace,
+    /// Whether the focus is held on request.
+    held: bool,
 }
 
 /// The answers to one question.
@@ -149,8 +155,7 @@ impl SessionState {
             unblinded: false,
             withdrawn: false,
             tablet_away: false,
-            patch: PatchPlace::CENTRE,
-            focus_held: false,
+            pointed: Pointed { patch: PatchPlace::CENTRE, held: false },
             unreasoned: Vec::new(),
             consented: None,
             answers: BTreeMap::new(),
@@ -196,13 +201,13 @@ impl SessionState {
     /// Place of the patch.
     #[must_use]
     pub const fn patch(&self) -> PatchPlace {
-        self.patch
+        self.pointed.patch
     }
 
     /// Whether the focus is held on request.
     #[must_use]
     pub const fn focus_held(&self) -> bool {
-        self.focus_held
+        self.pointed.held
     }
 
     /// Numbers of the events of people who paused the session without giving a reason, oldest first.
@@ -309,7 +314,7 @@ impl SessionState {
             EventKind::SegmentFinished { inspected_ms, .. } => {
                 self.stop_clock(*inspected_ms);
                 if !self.plan.patch.stays() {
-                    self.patch = PatchPlace::CENTRE;
+                    self.pointed.patch = PatchPlace::CENTRE;
                 }
                 self.asked = self.done + 1;
                 if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
@@ -327,10 +332,10 @@ impl SessionState {
                     self.unreasoned.push(event.number);
                 }
             }
-            EventKind::PatchPlaced { place, .. } => self.patch = *place,
-            EventKind::PatchCentred { .. } => self.patch = PatchPlace::CENTRE,
-            EventKind::FocusHeld { .. } => self.focus_held = true,
-            EventKind::FocusReleased { .. } => self.focus_held = false,
+            EventKind::PatchPlaced { place, .. } => self.pointed.patch = *place,
+            EventKind::PatchCentred { .. } => self.pointed.patch = PatchPlace::CENTRE,
+            EventKind::FocusHeld { .. } => self.pointed.held = true,
+            EventKind::FocusReleased { .. } => self.pointed.held = false,
             EventKind::ReasonGiven { about, .. } => self.unreasoned.retain(|number| number != about),
             EventKind::TabletAway { .. } => self.tablet_away = true,
             EventKind::TabletBack => self.tablet_away = false,
@@ -356,7 +361,7 @@ impl SessionState {
     fn stop_clock(&mut self, inspected_ms: u64) {
         self.inspected = Duration::from_millis(inspected_ms);
         self.running_since = None;
-        self.focus_held = false;
+        self.pointed.held = false;
     }
 
     const fn leave_segment(&mut self) {
