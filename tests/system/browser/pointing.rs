@@ -157,8 +157,12 @@ async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms()
     .await;
     shoot(&operator, "pointing-2-operator").await;
     operator.focus("#view").await;
+    // Each choice draws a ring, so the key is pressed again only where the picture was too old for it.
+    operator.type_into("#view", "c").await;
     until("the centre again", || async {
-        operator.type_into("#view", "c").await;
+        if operator.text("#pointing-trouble").await.contains("not live") {
+            operator.type_into("#view", "c").await;
+        }
         one.run(ANYTHING, &[]).await == json!(false)
     })
     .await;
