@@ -19,7 +19,7 @@ function header(x = 256, y = 136, choices = 0) {
 function pointing() {
   const done = {
     /** @type {unknown[]} */ sent: [],
-    /** @type {unknown[]} */ told: [],
+    /** @type {unknown[]} */ reported: [],
     now: 0,
     why: "",
     /** @type {Error | null} */ refusal: null,
@@ -46,7 +46,7 @@ function pointing() {
     },
     now: () => done.now,
     changed: () => {},
-    told: (trouble) => done.told.push(trouble),
+    report: (trouble) => done.reported.push(trouble),
     whyNot: () => done.why,
   });
   made.allowed = true;
@@ -111,7 +111,7 @@ test("a picture that is not live, a place beside it and a page that may not poin
   done.why = "not live";
   made.tap({ x: 300, y: 90 });
   made.centre();
-  assert.deepEqual([made.ring, done.told], [null, ["not live", "not live"]]);
+  assert.deepEqual([made.ring, done.reported], [null, ["not live", "not live"]]);
   done.why = "";
   for (const at of [
     { x: -1, y: 5 },
@@ -126,14 +126,14 @@ test("a picture that is not live, a place beside it and a page that may not poin
   assert.deepEqual([done.sent, made.ring], [[], null]);
 });
 
-test("a refusal takes the ring back and is told", async () => {
+test("a refusal takes the ring back and is reported", async () => {
   const { made, done } = pointing();
   done.refusal = new Error("the session is paused");
   made.tap({ x: 300, y: 90 });
   done.wait(300);
   await Promise.resolve();
   await Promise.resolve();
-  assert.deepEqual([made.ring, done.told], [null, [done.refusal]]);
+  assert.deepEqual([made.ring, done.reported], [null, [done.refusal]]);
 });
 
 test("keys move the place step by step, and only where they end is sent", () => {

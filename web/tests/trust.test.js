@@ -25,8 +25,8 @@ test("a server that answers only unencrypted is not trusted, and one that answer
 });
 
 test("each verdict has words of its own", () => {
-  const said = Object.values(WORDS).map((words) => words.said);
-  assert.equal(new Set(said).size, 3);
+  const findings = Object.values(WORDS).map((words) => words.finding);
+  assert.equal(new Set(findings).size, 3);
 });
 
 test("the steps of the present device are open first", () => {

@@ -98,7 +98,7 @@ async fn another_session(server: &mut Server) {
 /// Exports the unblinded study, whose page is open, with its policies.
 async fn export_with_policies(page: &Browser, server: &mut Server) {
     page.click("#export-unblinded").await;
-    page.sees("#export-told", "The export with policies is ready: 1 session").await;
+    page.sees("#export-state", "The export with policies is ready: 1 session").await;
     page.sees("#export-ready", "Download the package").await;
     page.sees_no("#export-progress").await;
     shoot(page, "study-5-exported").await;
@@ -118,7 +118,7 @@ async fn export(page: &Browser) {
     page.click("#export-blinded").await;
     page.sees("#export-ready", "Download the package").await;
     page.reload().await;
-    page.sees("#export-told", "The export without policies is ready: 1 session").await;
+    page.sees("#export-state", "The export without policies is ready: 1 session").await;
     page.sees("#export-ready", "Download the package").await;
     page.sees_no("#export-progress").await;
     shoot(page, "study-3-exported").await;

@@ -54,7 +54,7 @@ export function offerBackup() {
     go.disabled = isRunning;
     byId("backup-download").hidden = now.state !== "ready";
     tell(trouble, now.state === "failed" ? `No backup was made: ${now.reason}.` : "");
-    setText(byId("backup-told"), words(now));
+    setText(byId("backup-state"), words(now));
     if (isRunning) setTimeout(ask, ASK_AGAIN_MS);
   }
 

@@ -118,7 +118,7 @@ function listComments(comments) {
     const words = commentWords(comment, zone);
     const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);
     const kept = comment.withdrawn ? make("del", {}, words) : words;
-    const said = isSaid ? kept : make("em", {}, kept);
+    const shown = isSaid ? kept : make("em", {}, kept);
     const late = comment.late && make("span", { className: "badge warn" }, "late");
     const back = comment.withdrawn && make("span", { className: "badge" }, "taken back at once");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
@@ -136,7 +136,7 @@ function listComments(comments) {
       },
       make("span", { className: "when" }, clockText(comment.seconds)),
       make("span", { className: "muted where" }, where, seen),
-      make("span", { className: "said" }, said, late && " ", late, back && " ", back),
+      make("span", { className: "said" }, shown, late && " ", late, back && " ", back),
     );
   });
   const items = lines.map((line, index) => {

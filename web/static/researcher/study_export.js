@@ -50,7 +50,7 @@ export function showExport(study) {
     for (const button of buttons) button.disabled = isRunning;
     byId("export-progress").hidden = !isRunning;
     byId("export-ready").hidden = now.state !== "ready";
-    setText(byId("export-told"), now.state === "ready" ? readyWords(now) : "");
+    setText(byId("export-state"), now.state === "ready" ? readyWords(now) : "");
     tell(trouble, now.state === "failed" ? failedWords(now) : "");
 
     if (now.state === "running") {

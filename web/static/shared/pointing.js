@@ -18,7 +18,7 @@ const NUDGE = 1 / 24;
  * @property {(run: () => void, ms: number) => () => void} later runs `run` after a while, unless the result is called
  * @property {() => number} now milliseconds
  * @property {() => void} changed the ring is drawn anew
- * @property {(trouble: unknown) => void} told called with what went wrong; null after something went well
+ * @property {(trouble: unknown) => void} report called with what went wrong; null after something went well
  * @property {() => string} whyNot why the picture cannot be pointed at now; empty if it can
  */
 
@@ -103,7 +103,7 @@ export class Pointing {
   #isOpen() {
     if (!this.allowed) return false;
     const why = this.#parts.whyNot();
-    if (why !== "") this.#parts.told(why);
+    if (why !== "") this.#parts.report(why);
     return why === "";
   }
 
@@ -126,10 +126,10 @@ export class Pointing {
   async #send(frame, at) {
     try {
       await this.#parts.send(frame, at);
-      this.#parts.told(null);
+      this.#parts.report(null);
     } catch (error) {
       this.#clear();
-      this.#parts.told(error);
+      this.#parts.report(error);
     }
   }
 

@@ -120,12 +120,12 @@ export class Viewer {
    * Lets people point at the picture.
    *
    * @param {import("./pointing.js").Parts["send"]} send
-   * @param {import("./pointing.js").Parts["told"]} told
+   * @param {import("./pointing.js").Parts["report"]} report
    */
-  pointBy(send, told) {
+  pointBy(send, report) {
     this.#pointing = new Pointing({
       send,
-      told,
+      report,
       later: (run, ms) => {
         const timer = setTimeout(run, ms);
         return () => clearTimeout(timer);
@@ -262,9 +262,9 @@ function cellsOf({ width, height, per_cell: perCell }) {
  * @param {boolean} connected
  */
 function staleText(age, connected) {
-  const told =
+  const text =
     age === null ? "Waiting for the first picture" : `Not live: the picture is ${ageText(age)} old`;
-  return connected ? told : `${told} · connecting`;
+  return connected ? text : `${text} · connecting`;
 }
 
 /** @param {number} ms */

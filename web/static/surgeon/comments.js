@@ -193,8 +193,8 @@ export class Comments {
 
     // The comment counts as made now, no matter when it was begun.
     const { key } = this.#draft?.take() ?? {};
-    const said = comment({ kind: "text", text }, { ...here, ...this.#begun });
-    const entry = this.#outbox.add(PATH, said, null, { key });
+    const body = comment({ kind: "text", text }, { ...here, ...this.#begun });
+    const entry = this.#outbox.add(PATH, body, null, { key });
     this.write("");
     this.trouble = "";
     return entry;

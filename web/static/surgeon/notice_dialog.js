@@ -29,11 +29,11 @@ export function noticeDialog(box, accept) {
   /** @param {KeyboardEvent} event */
   function onKey(event) {
     const writing = focusBefore === box && box.value !== "";
-    const told = guard.key(event, performance.now(), { open: dialog.open, writing });
-    if (told === "pass") return;
+    const verdict = guard.key(event, performance.now(), { open: dialog.open, writing });
+    if (verdict === "pass") return;
 
     event.preventDefault();
-    if (told !== "write") return;
+    if (verdict !== "write") return;
     box.setRangeText(event.key, box.selectionStart, box.selectionEnd, "end");
     box.dispatchEvent(new Event("input"));
   }

@@ -115,15 +115,15 @@ export class Origins {
    * @param {Stamp} stamp
    * @returns {Api.Origin}
    */
-  tell({ clock, ...told }) {
+  tell({ clock, ...sent }) {
     const onThisPage = clock.page === this.#page ? clock : null;
     const waited = onThisPage
       ? this.#clock.page() - onThisPage.at + this.#slept - onThisPage.slept
-      : this.#clock.wall() - told.client_millis;
+      : this.#clock.wall() - sent.client_millis;
     const awake = onThisPage !== null && this.#slept === onThisPage.slept;
 
     return {
-      ...told,
+      ...sent,
       waited_millis: Math.max(0, Math.round(waited)),
       waited_by: awake ? "page-clock" : "wall-clock",
     };

@@ -102,7 +102,7 @@ export function drawRanking(answer, heading, changed) {
       make("span", { className: "grip", "aria-hidden": "true" }, "⠿"),
       place,
     );
-    const said = answer.saidOf(setting);
+    const words = answer.saidOf(setting);
     const item = make(
       "li",
       {},
@@ -111,7 +111,7 @@ export function drawRanking(answer, heading, changed) {
         "span",
         { className: "what" },
         `Setting ${setting}`,
-        said !== "" && make("span", { className: "said" }, said),
+        words !== "" && make("span", { className: "said" }, words),
       ),
       mover("up", `Move setting ${setting} up`, "↑", index, index - 1),
       mover("down", `Move setting ${setting} down`, "↓", index, index + 1),

@@ -34,10 +34,10 @@ go.onclick = async () => {
   draw(tried);
   try {
     await post("/api/surgeon/tablet-trials", { device: device(store), tried });
-    setText(byId("told"), "The operator’s page shows it, too, in the card “Ready for a trial?”.");
+    setText(byId("result"), "The operator’s page shows it, too, in the card “Ready for a trial?”.");
   } catch (error) {
     tellTrouble(
-      byId("told"),
+      byId("result"),
       error,
       "The server did not answer, so the operator does not know it yet. Try again.",
     );

@@ -18,9 +18,9 @@ function ask(address) {
 
 async function check() {
   const found = await judge(ask, location.host);
-  const { said, advice } = WORDS[found];
+  const { finding, advice } = WORDS[found];
   verdict.dataset.verdict = found;
-  setText(verdict, said);
+  setText(verdict, finding);
   setText(byId("check-advice"), advice);
   byId("go-on").hidden = found !== "trusted";
 }

@@ -43,19 +43,19 @@ export function kindOf(agent, touches) {
   return "linux";
 }
 
-/** @type {Record<Verdict, {said: string, advice: string}>} */
+/** @type {Record<Verdict, {finding: string, advice: string}>} */
 export const WORDS = {
   trusted: {
-    said: "Yes, this device trusts the server.",
+    finding: "Yes, this device trusts the server.",
     advice:
       "If somebody went past the browser’s warning on this device before, close the browser and check again.",
   },
   "not-trusted": {
-    said: "Not yet.",
+    finding: "Not yet.",
     advice: "Follow the steps for this device below. This page checks again when you come back to it.",
   },
   unreachable: {
-    said: "The server does not answer.",
+    finding: "The server does not answer.",
     advice: "Check that this device is on the server’s network, and that the server runs.",
   },
 };
