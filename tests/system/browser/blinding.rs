@@ -30,19 +30,22 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 59] = [
+const KEYS: [&str; 64] = [
     "age",
     "answers",
     "area",
     "camera_simulated",
     "certificate_until",
+    "choices",
     "comments",
     "error",
     "estimated",
     "first",
+    "focus_held",
     "frame",
     "height",
     "high",
+    "holding",
     "id",
     "kind",
     "labels",
@@ -60,6 +63,8 @@ const KEYS: [&str; 59] = [
     "paused_by",
     "per_cell",
     "phase",
+    "pointed",
+    "pointing",
     "points",
     "practice",
     "prompt",
