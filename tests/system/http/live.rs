@@ -232,7 +232,21 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let frame = surgeon.frame().await;
     assert_eq!(
         frame.fields(),
-        ["age", "area", "estimated", "frame", "height", "patch", "per_cell", "reduced", "run", "travel", "width"]
+        [
+            "age",
+            "area",
+            "choices",
+            "estimated",
+            "frame",
+            "height",
+            "patch",
+            "per_cell",
+            "pointed",
+            "reduced",
+            "run",
+            "travel",
+            "width"
+        ]
     );
     assert!(frame.header["age"].as_f64().unwrap() % 100.0 == 0.0, "finer, it would hold the policy's own time");
     surgeon.sent_so_far().await;
