@@ -167,12 +167,11 @@ impl<'a> SpectrumSum<'a> {
 fn cells(circle: Circle, columns: usize, rows: usize) -> Vec<(usize, usize)> {
     let side = CELL as f64;
     let middle = |cell: usize| (cell as f64 + 0.5) * side;
-    // The last column may be narrower than the sample that was meant.
-    let cell_of = |place: f64, cells: usize| ((place / side) as usize).min(cells - 1);
-    let (centre_column, centre_row) = (cell_of(circle.x, columns), cell_of(circle.y, rows));
+    let (centre_column, centre_row) = ((circle.x / side) as usize, (circle.y / side) as usize);
 
-    let reach = (circle.radius / side).ceil() as usize + 1;
-    let near = |centre: usize, cells: usize| centre.saturating_sub(reach)..(centre.saturating_add(reach)).min(cells);
+    // A radius may be larger than any number of cells.
+    let reach = ((circle.radius / side).ceil() as usize).saturating_add(1);
+    let near = |centre: usize, cells: usize| centre.saturating_sub(reach)..centre.saturating_add(reach).min(cells);
     let within = |column: usize, row: usize| {
         let distance = (middle(column) - circle.x).hypot(middle(row) - circle.y);
         distance <= circle.radius || (column, row) == (centre_column, centre_row)
@@ -222,6 +221,9 @@ mod tests {
 
     #[test]
     fn a_circle_beyond_the_rim_takes_what_is_there() {
+        for radius in [1e6, f64::MAX] {
+            assert_eq!(of(&Calibration::default(), Circle { x: 15.9, y: 11.9, radius }).cells, 12, "{radius}");
+        }
         let spectrum = of(&Calibration::default(), Circle { x: 0.0, y: 0.0, radius: 1e6 });
         assert_eq!(spectrum.cells, 12);
         assert_eq!(
