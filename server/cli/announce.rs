@@ -14,7 +14,8 @@ use parfocal_imaging::Calibration;
 use parfocal_pipeline::control::ControlStatus;
 use parfocal_trial::role::Role;
 
-/// The announcement of a server that is reachable at `reach`, and by OpenIGTLink at `linked`. On a `terminal` the QR code has colours.
+/// The announcement of a server that is reachable at `reach`, and by OpenIGTLink at `linked`. On a `terminal` the QR
+/// code has colours.
 pub fn announcement(
     reach: &Reach,
     keys: &Keys,

@@ -52,8 +52,8 @@ pub struct Arguments {
         conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"]
     )]
     stacks: Vec<String>,
-    /// Format of .raw and .bin files in --stacks: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one of their
-    /// length.
+    /// Format of .raw and .bin files in --stacks: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the one
+    /// of their length.
     #[arg(long, value_name = "FORMAT", requires = "stacks")]
     raw: Option<PixelFormat>,
     /// Tell the policies how fast the optic blurs: pixels (standard deviation) for a change of focal power by 1, as

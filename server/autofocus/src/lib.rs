@@ -106,7 +106,7 @@ mod tests {
     use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch};
 
     /// What is seen of `picture` with the patch's corner at `(x, y)`.
-    fn view(picture: &GrayImage, (x, y): (usize, usize)) -> View {
+    pub fn view(picture: &GrayImage, (x, y): (usize, usize)) -> View {
         let level = |x: usize, y: usize| picture.data[y * picture.width + x];
         let patch = Patch(std::array::from_fn(|i| level(x + i % PATCH_SIDE, y + i / PATCH_SIDE)));
         View::around(patch, (x, y), (picture.width, picture.height), |square| {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::cli::output::{Failure, print};
 use parfocal_base::files::replace;
+use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Circle, Spectrum, SpectrumSum};
 use parfocal_recording::Recording;
@@ -49,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let table = table(&PlaceSpectrum::new(&calibration, &spectrum)).map_err(|error| error.to_string())?;
     let Some(out) = &arguments.out else {
         print(&String::from_utf8_lossy(&table))?;
-        eprintln!("{}", summary(&spectrum));
+        tell(format_args!("{}", summary(&spectrum)));
         return Ok(());
     };
     replace(out, &table).map_err(|error| format!("cannot write {}: {error}", out.display()))?;

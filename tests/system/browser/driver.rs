@@ -239,6 +239,13 @@ impl Browser {
         self.chrome("goog/cdp/execute", json!({ "cmd": command, "params": parameters })).await
     }
 
+    /// Touches the screen with a finger at each of these points; without points, lifts the fingers.
+    pub async fn touch(&self, kind: &str, points: &[(f64, f64)]) {
+        let points: Vec<Value> =
+            points.iter().enumerate().map(|(id, (x, y))| json!({ "x": x, "y": y, "id": id })).collect();
+        self.tools("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points })).await;
+    }
+
     /// Errors logged by the page's scripts since the last call.
     pub async fn complaints(&self) -> Vec<String> {
         let log = self.chrome("se/log", json!({ "type": "browser" })).await;

@@ -20,9 +20,8 @@ const PLACE: (f64, f64) = (0.6, 0.42);
 /// Taps the view at `PLACE`, as a finger does.
 async fn tap(browser: &Browser) {
     let view = browser.area("#view").await;
-    let point = json!([{ "x": view.left + PLACE.0 * view.width, "y": view.top + PLACE.1 * view.height, "id": 0 }]);
-    browser.tools("Input.dispatchTouchEvent", json!({ "type": "touchStart", "touchPoints": point })).await;
-    browser.tools("Input.dispatchTouchEvent", json!({ "type": "touchEnd", "touchPoints": [] })).await;
+    browser.touch("touchStart", &[(view.left + PLACE.0 * view.width, view.top + PLACE.1 * view.height)]).await;
+    browser.touch("touchEnd", &[]).await;
 }
 
 /// How many points of the overlay around `PLACE` have the colour of ring and corners.

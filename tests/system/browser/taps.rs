@@ -1,7 +1,5 @@
 //! How often the surgeon touches the tablet in the paper's trial: each touch is time in which nobody looks at the tissue.
 
-use serde_json::{Value, json};
-
 use super::driver::{Browser, Driver};
 use super::theatre::Theatre;
 use super::wait::until;
@@ -82,14 +80,10 @@ async fn tap_point(surgeon: &Browser, name: &str, point: u8) {
 async fn hold(surgeon: &Browser, css: &str) {
     surgeon.sees(css, "").await;
     let area = surgeon.area(css).await;
-    let finger = json!({ "x": area.left + area.width / 2.0, "y": area.top + area.height / 2.0 });
-    touch(surgeon, "touchStart", &[finger]).await;
+    let finger = (area.left + area.width / 2.0, area.top + area.height / 2.0);
+    surgeon.touch("touchStart", &[finger]).await;
     surgeon.sees_no(css).await;
-    touch(surgeon, "touchEnd", &[]).await;
-}
-
-async fn touch(surgeon: &Browser, kind: &str, points: &[Value]) {
-    surgeon.tools("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points })).await;
+    surgeon.touch("touchEnd", &[]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -101,13 +95,13 @@ async fn a_long_touch_that_slides_off_finishes_nothing() {
     theatre.tap_notice(1).await;
 
     let area = surgeon.area("#finish").await;
-    let button = json!({ "x": area.left + area.width / 2.0, "y": area.top + area.height / 2.0 });
-    touch(surgeon, "touchStart", &[button]).await;
+    let button = (area.left + area.width / 2.0, area.top + area.height / 2.0);
+    surgeon.touch("touchStart", &[button]).await;
     until("the button to fill", || async { surgeon.count("#finish.held").await == 1 }).await;
     let picture = theatre.picture().await;
-    touch(surgeon, "touchMove", &[json!({ "x": area.left, "y": picture.top + 40.0 })]).await;
+    surgeon.touch("touchMove", &[(area.left, picture.top + 40.0)]).await;
     until("the button to be let go", || async { surgeon.count("#finish.held").await == 0 }).await;
-    touch(surgeon, "touchEnd", &[]).await;
+    surgeon.touch("touchEnd", &[]).await;
 
     // A short tap afterwards is the first of two, so nothing was finished and nothing is half done.
     surgeon.sees("#finish", "Done with this setting").await;

@@ -1,7 +1,7 @@
 //! The picture on the page: fitted to the bright circle, at the size that the screen can show, and zoomed only by
 //! people.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::driver::{Area, Browser, Driver};
 use super::screenshots::{resize, set_screen, shoot};
@@ -124,13 +124,6 @@ async fn a_finer_screen_gets_larger_pictures_at_the_same_place_without_a_flash()
     assert_eq!(places.len(), 1, "{places:?}");
 }
 
-/// Touches the screen at these points; without points, lifts the fingers.
-async fn touch(browser: &Browser, kind: &str, points: &[(f64, f64)]) {
-    let points: Vec<Value> =
-        points.iter().enumerate().map(|(id, (x, y))| json!({ "x": x, "y": y, "id": id })).collect();
-    browser.tools("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points })).await;
-}
-
 async fn turn_wheel(browser: &Browser, x: f64, y: f64, by: f64) {
     let wheel = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": by });
     browser.tools("Input.dispatchMouseEvent", wheel).await;
@@ -155,9 +148,9 @@ async fn the_surgeon_zooms_by_taps_pinches_and_keys_and_gets_larger_pictures() {
 
     // One finger drags.
     let before = surgeon.area(PICTURE).await;
-    touch(&surgeon, "touchStart", &[(x, y)]).await;
-    touch(&surgeon, "touchMove", &[(x + 60.0, y + 30.0)]).await;
-    touch(&surgeon, "touchEnd", &[]).await;
+    surgeon.touch("touchStart", &[(x, y)]).await;
+    surgeon.touch("touchMove", &[(x + 60.0, y + 30.0)]).await;
+    surgeon.touch("touchEnd", &[]).await;
     let after = surgeon.area(PICTURE).await;
     assert!((after.left - before.left - 60.0).abs() < 1.0 && (after.top - before.top - 30.0).abs() < 1.0);
 
@@ -165,9 +158,9 @@ async fn the_surgeon_zooms_by_taps_pinches_and_keys_and_gets_larger_pictures() {
     is_enlarged(&surgeon, fitted, 1.0).await;
     assert_eq!(surgeon.area(PICTURE).await, fitted);
 
-    touch(&surgeon, "touchStart", &[(x - 50.0, y), (x + 50.0, y)]).await;
-    touch(&surgeon, "touchMove", &[(x - 100.0, y), (x + 100.0, y)]).await;
-    touch(&surgeon, "touchEnd", &[]).await;
+    surgeon.touch("touchStart", &[(x - 50.0, y), (x + 50.0, y)]).await;
+    surgeon.touch("touchMove", &[(x - 100.0, y), (x + 100.0, y)]).await;
+    surgeon.touch("touchEnd", &[]).await;
     is_enlarged(&surgeon, fitted, 2.0).await;
     surgeon.click(".viewer-unzoom").await;
     is_enlarged(&surgeon, fitted, 1.0).await;

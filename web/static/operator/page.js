@@ -3,11 +3,11 @@
 import { get, post } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, setText } from "../shared/dom.js";
-import { focusButtons } from "../shared/focus_buttons.js";
+import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import "../shared/sign_in.js";
-import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
+import { serverAnswered } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { drawCamera } from "./camera_card.js";
 import { followChecks } from "./checks_card.js";
@@ -42,7 +42,7 @@ const contact = new Contact({ page: () => performance.now(), wall: () => Date.no
 const viewer = new Viewer(byId("view"), "operator", byId("colour"));
 const pointing = viewer.pointBy(
   (frame, at) => post("/api/operator/patch", { session: session?.session ?? null, frame, at }),
-  tellPointing,
+  (trouble) => tellPointing(byId("pointing-trouble"), trouble),
 );
 const focus = focusButtons(pointing, holdFocus);
 const traces = new Traces(byId("traces"));
@@ -62,22 +62,10 @@ function followSession(next) {
   known = true;
   sessionCard.follow(session);
   followLink(session);
-  followFocusButtons();
+  focus.follow(session);
   redrawFocus();
   drawTheWarnings();
   drawNow();
-}
-
-/** Outside sessions one may always point. */
-function followFocusButtons() {
-  const looking = session?.phase === "inspecting" && !session.paused;
-  focus.follow({
-    points: session ? session.pointing && session.phase === "inspecting" : true,
-    mayPoint: session ? session.pointing && looking : true,
-    holds: (session?.holding ?? false) && session?.phase === "inspecting",
-    mayHold: looking,
-    held: session?.focus_held ?? false,
-  });
 }
 
 /** @param {boolean} hold */
@@ -88,18 +76,11 @@ async function holdFocus(hold) {
   const action = hold ? "hold-focus" : "release-focus";
   try {
     await followAnswer(post("/api/operator/actions", { session: session.session, action, segment }));
-    tellPointing(null);
+    tellPointing(byId("pointing-trouble"), null);
   } catch (error) {
-    followFocusButtons();
-    tellPointing(error);
+    focus.follow(session);
+    tellPointing(byId("pointing-trouble"), error);
   }
-}
-
-/** @param {unknown} trouble */
-function tellPointing(trouble) {
-  const element = byId("pointing-trouble");
-  if (typeof trouble === "string" || trouble === null) tell(element, trouble ?? "");
-  else tellTrouble(element, trouble, "The server does not answer, so the focus was not moved.");
 }
 
 function drawNow() {

@@ -2,6 +2,20 @@
 
 import { byId, setText } from "./dom.js";
 import { Hold, isHoldKey } from "./hold.js";
+import { tell, tellTrouble } from "./trouble.js";
+
+/** @typedef {Pick<Api.SurgeonView, "phase" | "paused" | "pointing" | "holding" | "focus_held">} View */
+
+/**
+ * Says in `element` why the focus was not moved; with null, that nothing is wrong any more.
+ *
+ * @param {HTMLElement} element
+ * @param {unknown} trouble
+ */
+export function tellPointing(element, trouble) {
+  if (typeof trouble === "string" || trouble === null) tell(element, trouble ?? "");
+  else tellTrouble(element, trouble, "The server does not answer, so the focus was not moved.");
+}
 
 /**
  * @param {import("./pointing.js").Pointing} pointing
@@ -13,19 +27,24 @@ export function focusButtons(pointing, ask) {
   const hold = new Hold({ ask, now: () => performance.now() });
 
   /**
-   * Follows what may be done now, and whether the focus is held.
+   * Follows what may be done now, and whether the focus is held. Outside sessions one may always point.
    *
-   * @param {{ points: boolean, mayPoint: boolean, holds: boolean, mayHold: boolean, held: boolean }} may whether the
-   *   buttons are there, and whether they work now
+   * @param {View | null} session
+   * @param {boolean} [isOver] whether the page's link is over, so that nothing may be done any more
    */
-  function follow({ points, mayPoint, holds, mayHold, held }) {
+  function follow(session, isOver = false) {
+    const inspecting = session?.phase === "inspecting";
+    const looking = inspecting && !session.paused;
+    const mayPoint = !isOver && (session === null || (session.pointing && looking));
+    const held = session?.focus_held ?? false;
+
     pointing.allowed = mayPoint;
     if (!mayPoint) pointing.takeBack();
     hold.held = held;
-    centre.hidden = !points;
+    centre.hidden = isOver || !(session === null || (session.pointing && inspecting));
     centre.disabled = !mayPoint;
-    button.hidden = !holds;
-    button.disabled = !mayHold;
+    button.hidden = isOver || !(inspecting && session.holding);
+    button.disabled = !looking;
     button.setAttribute("aria-pressed", String(held));
     setText(button, held ? "Focus held" : "Hold focus");
   }

@@ -3,7 +3,7 @@
 import { get, inWords, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
-import { focusButtons } from "../shared/focus_buttons.js";
+import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import { Sight } from "../shared/sight.js";
@@ -74,7 +74,7 @@ const viewer = new Viewer(byId("view"), "surgeon", byId("colour"));
 const sight = new Sight();
 const pointing = viewer.pointBy(
   (frame, at) => post("/api/surgeon/patch", { session: state?.session ?? null, frame, at }),
-  tellPointing,
+  (trouble) => tellPointing(byId("trouble"), trouble),
 );
 const focus = focusButtons(pointing, (hold) => {
   const segment = state?.segment;
@@ -151,7 +151,7 @@ function follow(next) {
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
 
   drawBar();
-  followFocus();
+  focus.follow(state, over);
   box.follow(state);
   talking.follow(state);
   followMicrophone();
@@ -209,28 +209,6 @@ async function act(action) {
 function isStillMeant(action) {
   if (state === null) return false;
   return !("segment" in action) || action.segment === (state.segment ?? null);
-}
-
-/* Where the focus looks */
-
-/** Outside sessions one may always point. */
-function followFocus() {
-  const looking = state?.phase === "inspecting" && !state.paused;
-  focus.follow({
-    points: !over && (state ? state.pointing && state.phase === "inspecting" : true),
-    mayPoint: !over && (state ? state.pointing && looking : true),
-    holds: !over && (state?.holding ?? false) && state?.phase === "inspecting",
-    mayHold: looking,
-    held: state?.focus_held ?? false,
-  });
-}
-
-/** @param {unknown} trouble */
-function tellPointing(trouble) {
-  const element = byId("trouble");
-  if (typeof trouble === "string") tell(element, trouble);
-  else if (trouble === null) tell(element, "");
-  else tellTrouble(element, trouble, "The server does not answer, so the focus was not moved.");
 }
 
 /* Microphone */
@@ -443,7 +421,7 @@ async function leave() {
   forgetPage();
   lastView.forget();
   viewer.end();
-  followFocus();
+  focus.follow(state, over);
   if (!isEnded(state)) followServer(null);
   drawPanel();
   drawNow();

@@ -266,10 +266,10 @@ mod tests {
     use super::*;
     use crate::belief::spread_over_bins;
     use crate::networks::BINS;
+    use crate::tests::view;
     use parfocal_base::FocalPower;
     use parfocal_devices::simulation::blur::gaussian_blur;
     use parfocal_devices::simulation::texture::texture;
-    use parfocal_imaging::GrayImage;
 
     #[test]
     fn the_gradient_of_a_ramp_is_eight_a_level() {
@@ -287,17 +287,6 @@ mod tests {
         assert_eq!(part_inside(-10, 128), Some((10, 22)));
         assert_eq!(part_inside(110, 128), Some((0, 18)));
         assert_eq!((part_inside(-17, 128), part_inside(113, 128), part_inside(300, 128)), (None, None, None));
-    }
-
-    /// What is seen of `picture` with the patch's corner at `(x, y)`.
-    fn view(picture: &GrayImage, (x, y): (usize, usize)) -> View {
-        let level = |x: usize, y: usize| picture.data[y * picture.width + x];
-        let patch = Patch(std::array::from_fn(|i| level(x + i % PATCH_SIDE, y + i / PATCH_SIDE)));
-        View::around(patch, (x, y), (picture.width, picture.height), |square| {
-            (0..square.side * square.side)
-                .map(|i| level(square.x + i % square.side, square.y + i / square.side))
-                .collect()
-        })
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn find(name: &str) -> Result<PathBuf, String> {
     if name.contains('/') {
         let file = PathBuf::from(name);
         return match file.metadata() {
-            Ok(about) if about.is_file() && about.permissions().mode() & 0o111 != 0 => Ok(file),
+            Ok(_) if is_program(&file) => Ok(file),
             Ok(_) => {
                 Err(format!("{name} is not a program; make the file executable, or name the program that runs it"))
             }

@@ -21,7 +21,8 @@ use parfocal_base::{BlurRate, PolicyName};
 pub const PREFIX: &str = "exec:";
 const SUMMARY: &str = "a policy in another process";
 
-/// Adds the policy of a command to `registry`, if `name` begins with [`PREFIX`]. Starts the process. If it cannot be used, it is listed as unavailable, with the reason.
+/// Adds the policy of a command to `registry`, if `name` begins with [`PREFIX`]. Starts the process. If it cannot be
+/// used, it is listed as unavailable, with the reason.
 #[must_use]
 pub fn with_command(registry: Registry, name: &PolicyName, settings: &Settings) -> Registry {
     let Some(text) = name.as_str().strip_prefix(PREFIX) else { return registry };

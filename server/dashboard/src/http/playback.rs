@@ -51,6 +51,17 @@ async fn recordings(
     Ok(Json(found))
 }
 
+/// A frame of a session's recording.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+struct FramePath {
+    session: SessionId,
+    /// The recording's name
+    recording: String,
+    /// The frame's place in the recording, from 0
+    frame: usize,
+}
+
 /// The resolution at which a mosaic is developed.
 #[derive(Debug, Clone, Copy, Default, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
@@ -84,12 +95,7 @@ struct PictureQuery {
 /// A frame of a recording of an unblinded session. Frames count from 0.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}",
     tag = "researcher",
-    params(
-        ("session" = SessionId, Path),
-        ("recording" = String, Path, description = "The recording's name"),
-        ("frame" = usize, Path, description = "The frame's place in the recording, from 0"),
-        PictureQuery,
-    ),
+    params(FramePath, PictureQuery),
     responses(
     (status = 200, description = "The picture", content_type = "image/jpeg"),
     (status = 404, description = "No such session, recording or frame", body = ErrorBody),
@@ -98,7 +104,7 @@ struct PictureQuery {
 async fn frame(
     by: Researcher,
     State(app): State<AppState>,
-    Path((session, recording, frame)): Path<(SessionId, String, usize)>,
+    Path(FramePath { session, recording, frame }): Path<FramePath>,
     Query(query): Query<PictureQuery>,
 ) -> Result<impl IntoResponse, Error> {
     by.for_session(&app, session).await?;
@@ -123,22 +129,17 @@ struct PlaceQuery {
 /// The spectrum at a place of a recorded mosaic of an unblinded session. Frames count from 0.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}/spectrum",
     tag = "researcher",
-    params(
-        ("session" = SessionId, Path),
-        ("recording" = String, Path, description = "The recording's name"),
-        ("frame" = usize, Path, description = "The frame's place in the recording, from 0"),
-        PlaceQuery,
-    ),
+    params(FramePath, PlaceQuery),
     responses(
     (status = 200, body = PlaceSpectrum),
-    (status = 422, description = "No such place in the picture", body = ErrorBody),
     (status = 404, description = "No such session, recording or frame, or it has no bands", body = ErrorBody),
     (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody),
+    (status = 422, description = "No such place in the picture", body = ErrorBody),
     (status = 500, description = "The frame is damaged", body = ErrorBody)))]
 async fn spectrum(
     by: Researcher,
     State(app): State<AppState>,
-    Path((session, recording, frame)): Path<(SessionId, String, usize)>,
+    Path(FramePath { session, recording, frame }): Path<FramePath>,
     Query(PlaceQuery { x, y, radius }): Query<PlaceQuery>,
 ) -> Result<Json<PlaceSpectrum>, Error> {
     by.for_session(&app, session).await?;

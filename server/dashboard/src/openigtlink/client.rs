@@ -103,11 +103,11 @@ async fn tell(
     shared: &Shared,
 ) -> End {
     let mut states = source.status.clone();
-    let mut told = None;
+    let mut last_sent = None;
     loop {
         let condition = condition(&states.borrow_and_update());
-        if told != Some(condition) {
-            told = Some(condition);
+        if last_sent != Some(condition) {
+            last_sent = Some(condition);
             let message = shot::status(shared.version(), source.clock.wall(), condition);
             if let Err(end) = send(&mut to, message).await {
                 return end;
@@ -129,7 +129,7 @@ async fn tell(
                     return End::Closed;
                 }
             }
-            () = shared.asked.notified() => told = None,
+            () = shared.asked.notified() => last_sent = None,
         }
     }
 }

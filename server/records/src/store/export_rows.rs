@@ -89,11 +89,13 @@ impl Reader {
     ) -> Result<(), E> {
         // Holds caused by the policy are left out, because they would reveal it: only learned policies take time to
         // start and to compute.
-        let sql = "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured,
-                    coalesce(t.held IN ('paused', 'focus-held', 'lens-failed', 'camera-failed'), FALSE) AS held,
-                    t.optimal, t.picture_width, t.patch_x, t.patch_y
+        let sql = concat!(
+            "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, ",
+            held_openly!(),
+            " AS held, t.optimal, t.picture_width, t.patch_x, t.patch_y
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
-             WHERE g.session = ? ORDER BY g.setting, t.number";
+             WHERE g.session = ? ORDER BY g.setting, t.number"
+        );
         self.hand_out(session, sql, take).await
     }
 

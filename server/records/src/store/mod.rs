@@ -4,6 +4,10 @@
 //! data syncs every commit to the disk before it is acknowledged. The one for telemetry does not. Readers never write.
 //! A lock on the folder keeps a second server out, while programs that only read come and go.
 
+// Before those that use its macro.
+#[macro_use]
+mod held;
+
 mod accesses;
 mod accounts;
 mod actors;

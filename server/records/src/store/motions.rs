@@ -38,11 +38,11 @@ impl Reader {
 
         let mut motions = Vec::new();
         for (segment, setting) in segments {
-            let mut rows = sqlx::query_as::<_, Row>(
-                "SELECT run, exposed_ns, asked, measured, optimal,
-                     coalesce(held IN ('paused', 'focus-held', 'lens-failed', 'camera-failed'), FALSE) AS held
-                 FROM telemetry WHERE segment = ? ORDER BY number",
-            )
+            let mut rows = sqlx::query_as::<_, Row>(concat!(
+                "SELECT run, exposed_ns, asked, measured, optimal, ",
+                held_openly!(),
+                " AS held FROM telemetry WHERE segment = ? ORDER BY number"
+            ))
             .bind(segment)
             .fetch(self.pool());
 

@@ -80,8 +80,8 @@ impl Shared {
         action: &Action,
         signature: Option<&Signature>,
     ) -> Result<(), ConductError> {
-        // While the disk refuses to record a stop, somebody is trying most of the time. Anyone who asks then gets the reason at once,
-        // not after waiting for that attempt and one more.
+        // While the disk refuses to record a stop, somebody is trying most of the time. Anyone who asks then gets the
+        // reason at once, not after waiting for that attempt and one more.
         let refused = self.live().unrecorded_because.clone();
         let mut pen = match refused {
             Some(because) => self.pen.try_lock().map_err(|_| ConductError::Storage(because))?,

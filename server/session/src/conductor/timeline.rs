@@ -403,21 +403,29 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
 
 /// When no tablet showed the surgeon's page.
 fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
-    let mut spans: Vec<PauseSpan> = Vec::new();
+    let begins = |kind: &EventKind| matches!(kind, EventKind::TabletAway { .. });
+    let ends =
+        |kind: &EventKind| matches!(kind, EventKind::TabletBack | EventKind::Completed | EventKind::Aborted { .. });
+    let span = |(from, to, kind): (f64, Option<f64>, &EventKind)| PauseSpan { from, to, reason: kind.in_words(|_| 0) };
+    spans(events, begins, ends).into_iter().map(span).collect()
+}
+
+/// The spans of time from each event that `begins` one to the next that `ends` it, if there is one, with the first event.
+fn spans<'a>(
+    events: &[(f64, &'a EventKind)],
+    begins: impl Fn(&EventKind) -> bool,
+    ends: impl Fn(&EventKind) -> bool,
+) -> Vec<(f64, Option<f64>, &'a EventKind)> {
+    let mut spans: Vec<(f64, Option<f64>, &EventKind)> = Vec::new();
     for &(at, kind) in events {
-        match kind {
-            EventKind::TabletAway { .. } => {
-                spans.push(PauseSpan { from: at, to: None, reason: kind.in_words(|_| 0) });
-            }
-            EventKind::TabletBack | EventKind::Completed | EventKind::Aborted { .. } => {
-                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
-                    open.to = Some(at);
-                }
-            }
-            _ => {}
+        if begins(kind) {
+            spans.push((at, None, kind));
+        } else if ends(kind)
+            && let Some((_, to @ None, _)) = spans.last_mut()
+        {
+            *to = Some(at);
         }
     }
-
     spans
 }
 
@@ -434,24 +442,18 @@ fn choices(events: &[(f64, &EventKind)]) -> Vec<TimelineChoice> {
 
 /// When the focus was held. Whatever stops the setting's clock releases it.
 fn holds(events: &[(f64, &EventKind)]) -> Vec<HoldSpan> {
-    let mut spans: Vec<HoldSpan> = Vec::new();
-    for &(at, kind) in events {
-        match kind {
-            EventKind::FocusHeld { .. } => spans.push(HoldSpan { from: at, to: None }),
+    let begins = |kind: &EventKind| matches!(kind, EventKind::FocusHeld { .. });
+    let ends = |kind: &EventKind| {
+        matches!(
+            kind,
             EventKind::FocusReleased { .. }
-            | EventKind::Paused { .. }
-            | EventKind::ServerRestarted { .. }
-            | EventKind::SegmentFinished { .. }
-            | EventKind::Aborted { .. } => {
-                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
-                    open.to = Some(at);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    spans
+                | EventKind::Paused { .. }
+                | EventKind::ServerRestarted { .. }
+                | EventKind::SegmentFinished { .. }
+                | EventKind::Aborted { .. }
+        )
+    };
+    spans(events, begins, ends).into_iter().map(|(from, to, _)| HoldSpan { from, to }).collect()
 }
 
 /// What the surgeon saw. Each of these events describes the time before it.

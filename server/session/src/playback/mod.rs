@@ -1,5 +1,6 @@
-//! Playback: plays a session's recordings as times, pictures and spectra for the researcher's page, and runs a policy over any
-//! recording. The page gets nothing else from a recording. The focal power comes with the timeline, under its rules.
+//! Playback: plays a session's recordings as times, pictures and spectra for the researcher's page, and runs a policy
+//! over any recording. The page gets nothing else from a recording. The focal power comes with the timeline, under its
+//! rules.
 
 mod error;
 mod player;

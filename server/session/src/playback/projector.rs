@@ -1,5 +1,5 @@
-//! Makes the pictures and spectra of recordings, one after another, on a thread of low priority. A session under way has
-//! precedence: only the people who play an earlier session have to wait.
+//! Makes the pictures and spectra of recordings, one after another, on a thread of low priority. A session under way
+//! has precedence: only the people who play an earlier session have to wait.
 
 use std::path::{Path, PathBuf};
 

@@ -25,13 +25,15 @@ pub const SEALED: [&str; 5] = ["policy", "metric", "policy_micros", "latency_mic
 
 /// Selects the columns of both, those of `SEALED` with `step_` before their names. Gives steps `?2 + 1` to `?2 + ?3` of
 /// segment `?1`.
-const STEPS: &str = "SELECT t.run, t.frame, t.exposed_ns, t.asked, t.measured,
-        iif(coalesce(t.held IN ('paused', 'focus-held', 'lens-failed', 'camera-failed'), FALSE), 'true', 'false')
-            AS held,
+const STEPS: &str = concat!(
+    "SELECT t.run, t.frame, t.exposed_ns, t.asked, t.measured, iif(",
+    held_openly!(),
+    ", 'true', 'false') AS held,
         t.optimal, t.picture_width, t.patch_x, t.patch_y, p.name AS step_policy, t.metric AS step_metric,
         t.policy_micros AS step_policy_micros, t.latency_micros AS step_latency_micros, t.held AS step_held
     FROM telemetry AS t LEFT JOIN policies AS p ON p.number = t.policy
-    WHERE t.segment = (SELECT number FROM segments WHERE segment = ?1) ORDER BY t.number LIMIT ?3 OFFSET ?2";
+    WHERE t.segment = (SELECT number FROM segments WHERE segment = ?1) ORDER BY t.number LIMIT ?3 OFFSET ?2"
+);
 
 /// Which steps of a segment a block holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
