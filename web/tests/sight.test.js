@@ -78,6 +78,20 @@ test("the operator sees whether the surgeon’s tablet is there, and is warned d
   assert.deepEqual(warnings(status({}), true), []);
 });
 
+test("a focus that people hold or pause is no trouble, and one that the loop holds is", () => {
+  const loop = (/** @type {Stream.OperatorStatus["held"]} */ held) => {
+    const now = { ...status({}), held, message: "the focus is held" };
+    return {
+      lamp: lamps(now).find(({ name }) => name === "focus loop")?.level,
+      warnings: warnings(now, true).length,
+    };
+  };
+  for (const held of /** @type {const} */ (["paused", "focus-held"])) {
+    assert.deepEqual(loop(held), { lamp: "", warnings: 0 }, held);
+  }
+  assert.deepEqual(loop("policy-slow"), { lamp: "bad", warnings: 1 });
+});
+
 test("while the tablet is away, the line does not say that the surgeon is looking", () => {
   const facts = { known: true, missed: false, heardAt: null, refused: false, working: true, wrong: false };
   /** @type {Api.OperatorView} */

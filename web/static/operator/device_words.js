@@ -4,6 +4,18 @@
 /** @typedef {{ name: string, figure: string, level: "" | "warn" | "bad", title: string }} Lamp */
 /** @typedef {{ text: string, level: "warn" | "bad" }} Warning */
 
+/** Holds that people asked for: no trouble. @type {(string | null)[]} */
+const ON_REQUEST = ["paused", "focus-held"];
+
+/**
+ * Whether the focus is held although nobody asked for it.
+ *
+ * @param {Pick<Status, "held">} status
+ */
+function isHeldInTrouble({ held }) {
+  return held !== null && !ON_REQUEST.includes(held);
+}
+
 /** @param {number} micros */
 function milliseconds(micros) {
   return (micros / 1000).toFixed(2);
@@ -18,7 +30,6 @@ function milliseconds(micros) {
 export function lamps(status) {
   const { camera, lens } = status;
   const lost = camera.lost > 0 ? ` · ${camera.lost} lost since the server’s start` : "";
-  const isHeld = status.held !== null && status.held !== "paused";
 
   return [
     {
@@ -36,7 +47,7 @@ export function lamps(status) {
     {
       name: "focus loop",
       figure: `${status.steps_per_second.toFixed(0)} steps/s · ${latencyWords(status)}`,
-      level: isHeld ? "bad" : "",
+      level: isHeldInTrouble(status) ? "bad" : "",
       title: status.message ?? "",
     },
     tabletLamp(status.tablet),
@@ -108,7 +119,7 @@ export function warnings(status, inSession) {
   if (!lens.working) all.push({ text: `Lens: ${lens.message}`, level: "bad" });
   else if (lens.caution) all.push({ text: `Lens: ${lens.message}`, level: "warn" });
 
-  if (held !== null && held !== "paused" && !cameraHolds && !lensHolds) {
+  if (isHeldInTrouble(status) && !cameraHolds && !lensHolds) {
     const message = status.message ?? "the lens is held where it is.";
     all.push({ text: `Focus loop: ${message}`, level: "bad" });
   }
