@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { Pictures } from "../static/researcher/pictures.js";
-import { momentText, valuesAt } from "../static/researcher/player_words.js";
+import { chosenPatchAt, momentText, valuesAt } from "../static/researcher/player_words.js";
 import { Playhead } from "../static/researcher/playhead.js";
 import { lastComment, metricPath, Scale, settingAt } from "../static/researcher/timeline.js";
 import { Track } from "../static/researcher/track.js";
@@ -284,6 +284,23 @@ test("playback that leaves frames out begins anew after a gap, and ends with the
   assert.equal(playhead.frame, 4, "and a step leads from what is on screen");
 });
 
+/**
+ * @param {number} setting
+ * @param {number} seconds
+ * @param {number} frame
+ * @param {Partial<Api.TimelinePoint>} rest
+ * @returns {Api.TimelinePoint}
+ */
+const point = (setting, seconds, frame, rest) => ({
+  setting,
+  seconds,
+  frame,
+  asked: 0.5,
+  patch_x: 240,
+  patch_y: 120,
+  ...rest,
+});
+
 /** @type {Api.Timeline} */
 const TIMELINE = {
   absences: [],
@@ -295,10 +312,10 @@ const TIMELINE = {
     { setting: 2, from: 12, to: 20 },
   ],
   points: [
-    { setting: 1, seconds: 0, frame: 1, asked: 0.5, measured: 0.45, metric: 10 },
-    { setting: 1, seconds: 10, frame: 2, asked: 0.6, measured: 0.55, metric: 20 },
-    { setting: 2, seconds: 12, frame: 3, asked: 0.5, metric: 0.5 },
-    { setting: 2, seconds: 20, frame: 4, asked: 0.7, metric: 0.25 },
+    point(1, 0, 1, { asked: 0.5, measured: 0.45, metric: 10 }),
+    point(1, 10, 2, { asked: 0.6, measured: 0.55, metric: 20 }),
+    point(2, 12, 3, { asked: 0.5, metric: 0.5 }),
+    point(2, 20, 4, { asked: 0.7, metric: 0.25 }),
   ],
   sights: [],
   choices: [],
@@ -348,4 +365,29 @@ test("the last comment is the latest of those said by then, whatever order they 
     [2, 3, 10, 30].map((seconds) => lastComment(comments, seconds)),
     [-1, 1, 0, 2],
   );
+});
+
+test("the patch is shown where somebody chose it, from then on and in that setting alone", () => {
+  const timeline = {
+    ...TIMELINE,
+    choices: [
+      { seconds: 4, frame: 40, x: 300, y: 100 },
+      { seconds: 8, frame: 80 },
+    ],
+    points: [
+      point(1, 3.9, 39, {}),
+      point(1, 4.4, 44, { patch_x: 284, patch_y: 84 }),
+      point(1, 8.1, 81, {}),
+      point(2, 13, 130, {}),
+    ],
+  };
+  const patch = { x: 284, y: 84, width: 32, height: 32 };
+  assert.deepEqual(
+    [3.9, 4, 6, 8.1, 13].map((seconds) => chosenPatchAt(timeline, seconds)),
+    [null, patch, patch, null, null],
+  );
+  // Where a choice stays, it counts in the next setting too; but what was not measured nearby is not shown.
+  const stays = { ...timeline, patch_stays: true, choices: timeline.choices.slice(0, 1) };
+  assert.deepEqual(chosenPatchAt(stays, 13), { x: 240, y: 120, width: 32, height: 32 });
+  assert.equal(chosenPatchAt(stays, 19), null);
 });

@@ -31,7 +31,15 @@ const EMPTY = {
  * @param {Partial<Api.TimelinePoint>} [rest]
  * @returns {Api.TimelinePoint}
  */
-const point = (seconds, asked, rest = {}) => ({ seconds, asked, frame: seconds * 10, setting: 1, ...rest });
+const point = (seconds, asked, rest = {}) => ({
+  seconds,
+  asked,
+  frame: seconds * 10,
+  setting: 1,
+  patch_x: 240,
+  patch_y: 120,
+  ...rest,
+});
 
 /** @type {Api.TimelineComment} */
 const COMMENT = {

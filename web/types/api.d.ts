@@ -277,6 +277,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/operator/spectra": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** The spectra at places of the camera's next frame. Not while a session is under way. */
+        post: operations["operator_spectra"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/operator/surgeon-link": {
         parameters: {
             query?: never;
@@ -1944,6 +1961,39 @@ export interface components {
          * @enum {string}
          */
         Kind: "mosaic" | "view";
+        /** @description A circle in the camera's mosaic. */
+        LivePlace: {
+            /**
+             * Format: double
+             * @description All cells whose middle is this near to the centre are taken, in samples. With 0, the cell there.
+             */
+            radius?: number;
+            /**
+             * Format: double
+             * @description Centre: samples of the mosaic from its left edge.
+             */
+            x: number;
+            /**
+             * Format: double
+             * @description Centre: samples of the mosaic from its upper edge.
+             */
+            y: number;
+        };
+        /** @description Places of the live picture. */
+        LivePlaces: {
+            /** @description The places. */
+            places: components["schemas"]["LivePlace"][];
+        };
+        /** @description The spectra of one frame. */
+        LiveSpectra: {
+            /**
+             * Format: int64
+             * @description Number of the frame.
+             */
+            frame: number;
+            /** @description The spectrum at each place, in the order in which they were asked for. */
+            spectra: components["schemas"]["PlaceSpectrum"][];
+        };
         /** @description An event in words. */
         LogLine: {
             /** @description Account of the person who caused the event, if signed in. */
@@ -3128,6 +3178,16 @@ export interface components {
              * @description The optimum, 0 to 1, if a simulation knows it.
              */
             optimal?: number | null;
+            /**
+             * Format: int64
+             * @description Left column of the patch, in mosaic cells.
+             */
+            patch_x: number;
+            /**
+             * Format: int64
+             * @description Top row of the patch, in mosaic cells.
+             */
+            patch_y: number;
             /**
              * Format: double
              * @description When the frame was exposed, in seconds.
@@ -5106,6 +5166,137 @@ export interface operations {
                 };
             };
             /** @description The study has no such site or protocol */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; see its log */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    operator_spectra: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LivePlaces"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveSpectra"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The request took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description A session is under way, the camera delivers nothing, or its pictures have no bands */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The Content-Type is not application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address, and the request names another host */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such place in the picture, too many places, or too large a circle */
             422: {
                 headers: {
                     [name: string]: unknown;

@@ -26,7 +26,9 @@ declare global {
     type NewCorrection = Schemas["NewCorrection"];
     type NewErasure = Schemas["NewErasure"];
     type Outstanding = Schemas["Outstanding"];
+    type BandLevel = Schemas["BandLevel"];
     type Pair = Schemas["Pair"];
+    type PlaceSpectrum = Schemas["PlaceSpectrum"];
     type Question = Schemas["Question"];
     type RecordingCourse = Schemas["RecordingCourse"];
     type RecordingStatus = Schemas["RecordingStatus"];

@@ -555,6 +555,33 @@ class Interval(TypedDict):
 Kind = Literal["mosaic", "view"]
 """What a recording is made of."""
 
+class LivePlace(TypedDict):
+    """A circle in the camera's mosaic."""
+
+    radius: NotRequired[float]
+    """All cells whose middle is this near to the centre are taken, in samples. With 0, the cell there."""
+
+    x: float
+    """Centre: samples of the mosaic from its left edge."""
+
+    y: float
+    """Centre: samples of the mosaic from its upper edge."""
+
+class LivePlaces(TypedDict):
+    """Places of the live picture."""
+
+    places: builtins.list[LivePlace]
+    """The places."""
+
+class LiveSpectra(TypedDict):
+    """The spectra of one frame."""
+
+    frame: int
+    """Number of the frame."""
+
+    spectra: builtins.list[PlaceSpectrum]
+    """The spectrum at each place, in the order in which they were asked for."""
+
 class LogLine(TypedDict):
     """An event in words."""
 
@@ -1853,6 +1880,12 @@ class TimelinePoint(TypedDict):
     optimal: NotRequired[float | None]
     """The optimum, 0 to 1, if a simulation knows it."""
 
+    patch_x: int
+    """Left column of the patch, in mosaic cells."""
+
+    patch_y: int
+    """Top row of the patch, in mosaic cells."""
+
     seconds: float
     """When the frame was exposed, in seconds."""
 
@@ -2122,6 +2155,10 @@ class OperatorRequests:
         """Prepares a session: draws its order, or takes the next place of its study's list, and waits
         for its start."""
         return self._call("POST", "/api/operator/sessions", body={"participant": participant, "protocol": protocol, "study": study})
+
+    def spectra(self, *, places: builtins.list[LivePlace]) -> LiveSpectra:
+        """The spectra at places of the camera's next frame. Not while a session is under way."""
+        return self._call("POST", "/api/operator/spectra", body={"places": places})
 
     def link(self) -> SurgeonLink:
         """The surgeon's link. In a session of a study it is valid only for that session, and ends with
@@ -2438,6 +2475,10 @@ class AsyncOperatorRequests:
         """Prepares a session: draws its order, or takes the next place of its study's list, and waits
         for its start."""
         return self._call("POST", "/api/operator/sessions", body={"participant": participant, "protocol": protocol, "study": study})
+
+    def spectra(self, *, places: builtins.list[LivePlace]) -> Awaitable[LiveSpectra]:
+        """The spectra at places of the camera's next frame. Not while a session is under way."""
+        return self._call("POST", "/api/operator/spectra", body={"places": places})
 
     def link(self) -> Awaitable[SurgeonLink]:
         """The surgeon's link. In a session of a study it is valid only for that session, and ends with

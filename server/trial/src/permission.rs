@@ -21,6 +21,8 @@ pub enum Request {
     MoveLens,
     /// Choose what is to be in focus, outside sessions.
     PlacePatch,
+    /// See spectra of the live picture.
+    SeeSpectra,
 }
 
 /// The state of the current session, in as much detail as these rules need.
@@ -52,7 +54,9 @@ impl CurrentSession {
 /// If `by` may not make this request, or `current` does not allow it.
 pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), Refusal> {
     match request {
-        Request::MakeSession | Request::CloseSession | Request::MoveLens if by != Role::Operator => {
+        Request::MakeSession | Request::CloseSession | Request::MoveLens | Request::SeeSpectra
+            if by != Role::Operator =>
+        {
             return Err(Refusal::only("the operator"));
         }
         Request::PlacePatch if !matches!(by, Role::Surgeon | Role::Operator) => {
@@ -78,6 +82,10 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         (Request::MoveLens, CurrentSession::UnderWay | CurrentSession::Ended) => {
             Err(Refusal::conflict("a session is under way and controls the lens until it is closed"))
         }
+        // Numbers of the picture could help to tell policies apart, as the focal power does. Hidden for as long.
+        (Request::SeeSpectra, CurrentSession::UnderWay | CurrentSession::Ended) => Err(Refusal::conflict(
+            "a session is under way; spectra of the live picture are shown again once it is closed",
+        )),
         _ => Ok(()),
     }
 }
@@ -172,8 +180,8 @@ mod tests {
 
     const ROLES: [Role; 4] = [Role::Surgeon, Role::Operator, Role::Researcher, Role::System];
 
-    const REQUESTS: [Request; 4] =
-        [Request::MakeSession, Request::CloseSession, Request::AddParticipant, Request::MoveLens];
+    const REQUESTS: [Request; 5] =
+        [Request::MakeSession, Request::CloseSession, Request::AddParticipant, Request::MoveLens, Request::SeeSpectra];
 
     const PHASES: [Phase; 7] = [
         Phase::Ready,
@@ -219,6 +227,15 @@ mod tests {
                 matches!(refused, Err(Refusal::Conflict(text)) if text.contains("until it is closed")),
                 "{phase:?}"
             );
+        }
+    }
+
+    #[test]
+    fn spectra_of_the_live_picture_are_seen_whenever_the_focal_power_is() {
+        let states = PHASES.map(Some).into_iter().chain([None]).map(CurrentSession::of);
+        for current in states {
+            let seen = check(Role::Operator, Request::SeeSpectra, current).is_ok();
+            assert_eq!(seen, may_see_focal_power(Role::Operator, current), "{current:?}");
         }
     }
 

@@ -28,6 +28,7 @@ mod proxy;
 mod recording_card;
 pub mod screenshots;
 pub mod scripts;
+mod spectra;
 mod study_page;
 mod tabs;
 mod taps;

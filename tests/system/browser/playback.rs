@@ -10,7 +10,7 @@ use super::wait::until;
 const SCRUB: &str = "#player-scrub";
 
 /// Presses a key on the page, wherever its focus is.
-async fn press(page: &Browser, key: &str) {
+pub async fn press(page: &Browser, key: &str) {
     for kind in ["keyDown", "keyUp"] {
         let text = if key == " " && kind == "keyDown" { " " } else { "" };
         page.tools("Input.dispatchKeyEvent", json!({"type": kind, "key": key, "text": text})).await;
@@ -31,12 +31,12 @@ async fn playhead(page: &Browser) -> f64 {
 }
 
 /// Number of the drawn frame, counted over all recordings; -1 before the first is drawn.
-async fn drawn(page: &Browser) -> i64 {
+pub async fn drawn(page: &Browser) -> i64 {
     let frame = page.attribute("#player-picture", "data-frame").await;
     frame.and_then(|frame| frame.parse().ok()).unwrap_or(-1)
 }
 
-async fn until_drawn(page: &Browser, frame: i64) {
+pub async fn until_drawn(page: &Browser, frame: i64) {
     until(&format!("frame {frame} to be drawn"), || async { drawn(page).await == frame }).await;
 }
 
@@ -86,7 +86,7 @@ async fn open_session(theatre: &Theatre) {
     page.sees("#comment-list", "It wanders").await;
 }
 
-async fn unblind(page: &Browser) {
+pub async fn unblind(page: &Browser) {
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
     page.sees("#reason-confirm", "Unblind anyway").await;

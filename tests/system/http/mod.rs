@@ -23,6 +23,7 @@ mod roles;
 mod seed;
 mod service;
 mod sizes;
+mod spectra;
 mod stopping;
 pub mod studies;
 mod study_export;

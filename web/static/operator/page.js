@@ -14,6 +14,7 @@ import { followChecks } from "./checks_card.js";
 import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
+import { LiveSpectra } from "./live_spectra.js";
 import { nowWords } from "./now.js";
 import { followRecording, forgetNotice } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
@@ -45,6 +46,7 @@ const pointing = viewer.pointBy(
   (trouble) => tellPointing(byId("pointing-trouble"), trouble),
 );
 const focus = focusButtons(pointing, holdFocus);
+const spectra = new LiveSpectra(viewer);
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
@@ -63,6 +65,7 @@ function followSession(next) {
   sessionCard.follow(session);
   followLink(session);
   focus.follow(session);
+  spectra.follow(session);
   redrawFocus();
   drawTheWarnings();
   drawNow();
@@ -130,6 +133,7 @@ function redrawFocus() {
 /** @param {Stream.Frame} frame */
 function followFrame({ header, receivedAt }) {
   traces.add(header, receivedAt - header.age - header.travel);
+  spectra.see(header);
   framesWithoutBelief = header.belief ? 0 : framesWithoutBelief + 1;
   byId("belief-choice").hidden = framesWithoutBelief >= BELIEF_FRAMES;
 }

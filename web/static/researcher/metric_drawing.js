@@ -1,7 +1,8 @@
 // Draws the focus metric over time, below the timeline. Each policy has its own metric, so each setting has its own
 // scale. Values can be compared only within a setting.
 
-import { movePlayhead, playheadLine, shape } from "./svg.js";
+import { shape } from "../shared/svg.js";
+import { movePlayhead, playheadLine } from "./playhead_line.js";
 import { metricPath, Scale } from "./timeline.js";
 
 export const METRIC_HEIGHT = 96;

@@ -3,7 +3,8 @@
 import { getPicture, inWords, Refused } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { Pictures } from "./pictures.js";
-import { momentText, valuesAt } from "./player_words.js";
+import { PlayerSpectra } from "./player_spectra.js";
+import { chosenPatchAt, momentText, valuesAt } from "./player_words.js";
 import { Playhead } from "./playhead.js";
 import { Track } from "./track.js";
 
@@ -14,7 +15,7 @@ const AHEAD = 25;
 const BEFORE_COMMENT = 3;
 
 /** Elements that need the keys for themselves. */
-const TYPING = "input:not([type=range]), textarea, select, dialog";
+const TYPING = "input:not(#player-scrub), textarea, select, dialog";
 
 export class Player {
   #session;
@@ -26,7 +27,9 @@ export class Player {
   #playhead;
   /** @type {Pictures<ImageBitmap>} */
   #pictures;
+  /** @type {import("./player_spectra.js").Size} */
   #size = "cell";
+  #spectra;
   /** The frame on the canvas. @type {number | null} */
   #drawn = null;
   /** When playback last moved the playhead, in milliseconds; null while it is paused. @type {number | null} */
@@ -59,9 +62,12 @@ export class Player {
       failed: (error) => this.#failed(error),
     });
 
+    this.#spectra = new PlayerSpectra(session, this.#canvas);
     this.#scrub.max = String(length);
     byId("player").hidden = false;
-    byId("player-sizes").hidden = !recordings.some(({ kind }) => kind === "mosaic");
+    const hasMosaics = recordings.some(({ kind }) => kind === "mosaic");
+    byId("player-sizes").hidden = !hasMosaics;
+    byId("spectra").hidden = !hasMosaics;
     this.#listen();
     this.#show();
   }
@@ -106,7 +112,7 @@ export class Player {
     };
     const size = byId("player-size", HTMLSelectElement);
     size.onchange = () => {
-      this.#size = size.value;
+      this.#size = size.value === "half" ? "half" : "cell";
       this.#drawn = null;
       this.#pictures.clear();
       this.#show();
@@ -212,6 +218,7 @@ export class Player {
     this.#canvas.classList.toggle("elsewhere", frame === null);
     if (frame === null) {
       this.#say("Nothing was recorded at this time.");
+      this.#spectra.follow(null);
       return;
     }
 
@@ -226,6 +233,11 @@ export class Player {
     if (this.#canvas.height !== picture.height) this.#canvas.height = picture.height;
     this.#canvas.getContext("2d", { alpha: false })?.drawImage(picture, 0, 0);
     this.#canvas.dataset.frame = String(frame);
+
+    const place = this.#track.place(frame);
+    if (!place) return;
+    const patch = chosenPatchAt(this.#timeline, place.seconds);
+    this.#spectra.follow({ ...place, size: this.#size, patch, playing: this.#playhead.playing });
   }
 
   /** @param {string} text */

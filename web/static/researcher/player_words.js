@@ -5,6 +5,9 @@ import { nearestPoint, powerOf, settingAt } from "./timeline.js";
 /** Values further away in time than this are not shown for the moment on screen. In seconds. */
 const NEAR = 2;
 
+/** Mosaic cells along each side of the patch. */
+const PATCH = 32;
+
 /**
  * A moment as `1:05.2`.
  *
@@ -18,20 +21,48 @@ export function momentText(seconds) {
 }
 
 /**
- * Where the focus looks at a moment: what was chosen last, in the same setting unless choices stay.
+ * What was chosen last at a moment, in the same setting unless choices stay; null for the centre.
  *
  * @param {Api.Timeline} timeline
  * @param {number} seconds
  */
-function focusAt({ choices, holds, settings, patch_stays: stays }, seconds) {
+function choiceAt({ choices, settings, patch_stays: stays }, seconds) {
   const setting = settings.find(({ from, to }) => from <= seconds && (to == null || seconds <= to));
-  if (!setting) return "–";
-  const isHeld = holds.some(({ from, to }) => from <= seconds && (to == null || seconds <= to));
-  const held = isHeld ? ", held" : "";
+  if (!setting) return null;
   const from = stays ? 0 : setting.from;
   const last = choices.findLast((choice) => from <= choice.seconds && choice.seconds <= seconds);
-  if (last?.x == null || last.y == null) return `centre${held}`;
-  return `${last.x.toFixed(0)}, ${last.y.toFixed(0)}${held}`;
+  return last?.x == null || last.y == null ? null : { x: last.x, y: last.y, seconds: last.seconds };
+}
+
+/**
+ * Where the focus looks at a moment, in words.
+ *
+ * @param {Api.Timeline} timeline
+ * @param {number} seconds
+ */
+function focusAt(timeline, seconds) {
+  if (settingAt(timeline.settings, seconds) === null) return "–";
+  const isHeld = timeline.holds.some(({ from, to }) => from <= seconds && (to == null || seconds <= to));
+  const held = isHeld ? ", held" : "";
+  const choice = choiceAt(timeline, seconds);
+  return choice ? `${choice.x.toFixed(0)}, ${choice.y.toFixed(0)}${held}` : `centre${held}`;
+}
+
+/**
+ * The patch at a moment, in mosaic cells; null unless somebody has chosen its place.
+ *
+ * @param {Api.Timeline} timeline
+ * @param {number} seconds
+ * @returns {Stream.Patch | null}
+ */
+export function chosenPatchAt(timeline, seconds) {
+  const choice = choiceAt(timeline, seconds);
+  if (!choice) return null;
+  // The point before the choice has the patch at its place before.
+  const since = timeline.points.filter((point) => point.seconds >= choice.seconds);
+  const point = nearestPoint(since, seconds);
+  if (!point || Math.abs(point.seconds - seconds) > NEAR) return null;
+  return { x: point.patch_x, y: point.patch_y, width: PATCH, height: PATCH };
 }
 
 /**

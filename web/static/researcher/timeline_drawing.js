@@ -2,8 +2,9 @@
 // and one for each answer that does not count.
 
 import { make } from "../shared/dom.js";
+import { shape } from "../shared/svg.js";
 import { clockText } from "../shared/text.js";
-import { movePlayhead, playheadLine, shape } from "./svg.js";
+import { movePlayhead, playheadLine } from "./playhead_line.js";
 import { HEIGHT, linePath, powerAt, powerOf, Scale } from "./timeline.js";
 import { choiceWords, commentWords, description, setAsideWords, sightWords } from "./timeline_words.js";
 

@@ -131,10 +131,12 @@ function fill(path, names) {
  * @template {Api.GetPath} Path
  * @param {Path} path
  * @param {Record<string, string>} [names]
+ * @param {Record<string, string>} [query]
  * @returns {Promise<Api.Got<Path>>}
  */
-export async function get(path, names = {}) {
-  return (await request("GET", fill(path, names))).body;
+export async function get(path, names = {}, query) {
+  const address = fill(path, names);
+  return (await request("GET", query ? `${address}?${new URLSearchParams(query)}` : address)).body;
 }
 
 /**

@@ -1,6 +1,6 @@
-// A button that copies a text to the clipboard.
+// Buttons that copy a text to the clipboard.
 
-import { setText } from "./dom.js";
+import { make, setText } from "./dom.js";
 
 /** How long the button says that it has copied. */
 const TOLD_MS = 2000;
@@ -26,4 +26,38 @@ export function copyOnPress(button, source) {
     setText(button, "Copied");
     setTimeout(() => setText(button, label), TOLD_MS);
   };
+}
+
+/**
+ * Copies what `text` returns when `button` is pressed. The text stands nowhere on the page.
+ *
+ * @param {HTMLButtonElement} button
+ * @param {() => string} text
+ */
+export function copyText(button, text) {
+  const label = button.textContent ?? "";
+  button.onclick = async () => {
+    try {
+      await navigator.clipboard.writeText(text());
+    } catch {
+      copySelected(text(), button);
+    }
+    setText(button, "Copied");
+    setTimeout(() => setText(button, label), TOLD_MS);
+  };
+}
+
+/**
+ * Copies `text` without the clipboard interface, which is missing on plain http.
+ *
+ * @param {string} text
+ * @param {HTMLElement} beside has the focus before and after
+ */
+function copySelected(text, beside) {
+  const field = make("textarea", { className: "visually-hidden", value: text, "aria-hidden": "true" });
+  beside.after(field);
+  field.select();
+  document.execCommand("copy");
+  field.remove();
+  beside.focus({ preventScroll: true });
 }

@@ -20,7 +20,7 @@ const PEAKING_MARGIN = 8;
  * @param {number} width
  * @param {() => void} path
  */
-function stroke(context, colour, width, path) {
+export function stroke(context, colour, width, path) {
   const shadow = { style: "rgba(0, 0, 0, .55)", lineWidth: width * 2.2 };
   for (const { style, lineWidth } of [shadow, { style: colour, lineWidth: width }]) {
     context.strokeStyle = style;

@@ -15,6 +15,24 @@ import { followZooming } from "./zooming.js";
 const STALE_MS = 500;
 const LOOK_MS = 250;
 
+/** A key moves a tool's cross by this many pixels of the page. So zooming makes it finer. */
+const TOOL_STEP = 8;
+
+/**
+ * What can take the taps and keys that point, in place of pointing at what is to be in focus, and draws on the picture.
+ * Places are in mosaic cells.
+ *
+ * @typedef {object} Tool
+ * @property {boolean} isTaken whether it takes them now
+ * @property {boolean} hasMarks whether it has anything to draw
+ * @property {(cell: import("./framing.js").Point) => void} tap
+ * @property {() => void} takeBack the last tap has become the first of a double tap
+ * @property {(dx: number, dy: number) => void} move a key moves its cross by so many cells
+ * @property {() => void} set a key sets the cross
+ * @property {(context: CanvasRenderingContext2D, pixels: number, line: number) => void} draw `pixels` is screen pixels
+ *   per cell
+ */
+
 /** A live view within an element, which must be positioned and have a size of its own. */
 export class Viewer {
   /** The live connection. It also brings the session's view and the devices' state. */
@@ -41,6 +59,8 @@ export class Viewer {
   #ended = false;
   /** @type {import("./pointing.js").Pointing | null} */
   #pointing = null;
+  /** @type {Tool | null} */
+  #tool = null;
 
   /**
    * @param {HTMLElement} element
@@ -64,10 +84,16 @@ export class Viewer {
       this.#place();
     });
     followZooming(element, this.#framing, () => this.#place(), {
-      tap: (point) => this.#pointing?.tap(this.#cellAt(point)),
-      takeBack: () => this.#pointing?.takeBack(),
-      nudge: (across, down) => this.#pointing?.nudge(across, down),
+      tap: (point) => (this.#takenTool ?? this.#pointing)?.tap(this.#cellAt(point)),
+      takeBack: () => (this.#takenTool ?? this.#pointing)?.takeBack(),
+      nudge: (across, down) => {
+        const step = TOOL_STEP / this.#framing.place.scale;
+        if (this.#takenTool) this.#takenTool.move(across * step, down * step);
+        else this.#pointing?.nudge(across, down);
+      },
       centre: () => this.#pointing?.centre(),
+      set: () => this.#takenTool?.set(),
+      takesArrows: () => this.#takenTool !== null,
     });
     this.#unzoom.onclick = () => {
       this.#framing.reset();
@@ -142,6 +168,20 @@ export class Viewer {
     return this.#pointing;
   }
 
+  /**
+   * Offers `tool` what people do with the picture. Call the returned function when its marks have changed.
+   *
+   * @param {Tool} tool
+   */
+  offer(tool) {
+    this.#tool = tool;
+    return () => this.#drawOverlays();
+  }
+
+  get #takenTool() {
+    return this.#tool?.isTaken ? this.#tool : null;
+  }
+
   /** @param {import("./framing.js").Point} point of the view, CSS pixels */
   #cellAt({ x, y }) {
     const { left, top, scale } = this.#framing.place;
@@ -208,7 +248,8 @@ export class Viewer {
     const { width, height } = context.canvas;
     const ring = this.#pointing?.ring ?? null;
     const corners = this.#shown.has("patch") || (this.#pointing?.isPointed ?? false);
-    const drawn = this.#shown.size > 0 || corners || ring ? this.#last : null;
+    const marks = this.#tool?.hasMarks ? this.#tool : null;
+    const drawn = this.#shown.size > 0 || corners || ring || marks ? this.#last : null;
     // Clearing an empty overlay for each picture would make the browser composite the whole view again each time.
     if (!drawn && this.#isOverlayClear) return;
     context.resetTransform();
@@ -230,6 +271,7 @@ export class Viewer {
     if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, pixels, line);
     if (corners) drawPatch(context, header.patch, pixels, line);
     if (ring) drawRing(context, ring, header.patch, pixels, line);
+    marks?.draw(context, pixels, line);
   }
 
   #tellAge() {

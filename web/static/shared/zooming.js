@@ -19,11 +19,14 @@ const PAGE = 400;
 const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /**
- * What keys do with the place that is to be in focus.
+ * What keys do with the place that is pointed at.
  *
  * @typedef {object} Nudged
  * @property {(across: number, down: number) => void} nudge
  * @property {() => void} centre
+ * @property {() => void} set
+ * @property {() => boolean} takesArrows whether arrows point and arrows with Shift move the picture, or the other way
+ *   round
  */
 
 /**
@@ -71,10 +74,12 @@ export function followZooming(element, framing, changed, taps) {
 
   element.addEventListener("keydown", (event) => {
     if (event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
-    const points = event.shiftKey ? ARROWS[event.key] : undefined;
-    const arrow = framing.zoom > 1 ? ARROWS[event.key] : undefined;
+    const key = ARROWS[event.key];
+    const points = event.shiftKey !== taps.takesArrows() ? key : undefined;
+    const arrow = framing.zoom > 1 ? key : undefined;
 
     if (points) taps.nudge(-points[0], -points[1]);
+    else if (event.key === "Enter") taps.set();
     else if (event.key === "c" || event.key === "C") taps.centre();
     else if (event.key === "+" || event.key === "=") framing.zoomBy(KEY_ZOOM);
     else if (event.key === "-") framing.zoomBy(1 / KEY_ZOOM);

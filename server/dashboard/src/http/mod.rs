@@ -38,6 +38,7 @@ pub mod roles;
 pub mod security;
 mod shutdown;
 mod sign_in;
+mod spectra;
 mod state;
 mod studies;
 mod study_export;
@@ -93,6 +94,7 @@ pub fn router(app: AppState) -> Router {
         .merge(camera::routes())
         .merge(checks::routes())
         .merge(recording::routes())
+        .merge(spectra::routes())
         .merge(researcher::routes())
         .merge(playback::routes())
         .merge(records::routes())

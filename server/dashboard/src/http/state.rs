@@ -67,6 +67,8 @@ pub struct App {
     pub tablets: OpenTablets,
     /// What works on the tablets that were tried.
     pub tablet_trials: TabletTrials,
+    /// Held while spectra of the live picture are computed, so that any number of requests takes one processor at most.
+    pub spectra: tokio::sync::Mutex<()>,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server must shut down; streams then close by themselves.
@@ -108,7 +110,13 @@ impl App {
     /// Whether values that tell policies apart are now hidden from operator and researcher too.
     #[must_use]
     pub fn blinded(&self) -> bool {
+        !may_see_focal_power(Role::Operator, self.current_session())
+    }
+
+    /// The state of the session on the screens.
+    #[must_use]
+    pub fn current_session(&self) -> CurrentSession {
         let phase = self.operator_view.borrow().as_ref().map(|view| view.surgeon.phase);
-        !may_see_focal_power(Role::Operator, CurrentSession::of(phase))
+        CurrentSession::of(phase)
     }
 }

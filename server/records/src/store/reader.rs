@@ -339,5 +339,7 @@ fn path_point(row: &SqliteRow) -> Result<PathPoint, StoreError> {
         measured: row.try_get("measured")?,
         optimal: row.try_get("optimal")?,
         metric: row.try_get("metric")?,
+        patch_x: row.try_get("patch_x")?,
+        patch_y: row.try_get("patch_y")?,
     })
 }

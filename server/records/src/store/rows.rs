@@ -176,6 +176,10 @@ pub struct PathPoint {
     pub optimal: Option<f64>,
     /// The policy's focus metric. Its scale reveals the policy.
     pub metric: Option<f64>,
+    /// Left column of the patch, mosaic cells.
+    pub patch_x: i64,
+    /// Top row of the patch, mosaic cells.
+    pub patch_y: i64,
 }
 
 /// A device started or stopped working.

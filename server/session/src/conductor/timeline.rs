@@ -125,6 +125,10 @@ pub struct TimelinePoint {
     pub optimal: Option<f64>,
     /// The policy's focus metric, on a scale of its own; only after the session was unblinded.
     pub metric: Option<f64>,
+    /// Left column of the patch, in mosaic cells.
+    pub patch_x: i64,
+    /// Top row of the patch, in mosaic cells.
+    pub patch_y: i64,
 }
 
 /// A comment on the timeline.
@@ -219,6 +223,8 @@ impl Conductor {
             measured: point.measured,
             optimal: point.optimal,
             metric: point.metric.filter(|_| with_metric),
+            patch_x: point.patch_x,
+            patch_y: point.patch_y,
         };
 
         let notes = Latest::of(&reader.corrections(session).await?);
@@ -511,6 +517,8 @@ mod tests {
             measured: None,
             optimal: None,
             metric: None,
+            patch_x: 240,
+            patch_y: 120,
         };
         let spans = |points: &[TimelinePoint]| -> Vec<(f64, Option<f64>)> {
             pauses(&events, points).iter().map(|span| (span.from, span.to)).collect()

@@ -10,7 +10,9 @@ use super::error::PlaybackError;
 use super::spectrum::PlaceSpectrum;
 use parfocal_base::priority;
 use parfocal_devices::camera::calibration;
-use parfocal_imaging::{Calibration, Circle, Developer, GrayImage, JpegEncoder, RgbImage, Size, SpectrumSum};
+use parfocal_imaging::{
+    Calibration, Circle, Developer, GrayImage, JpegEncoder, MosaicFrame, RgbImage, Size, SpectrumSum,
+};
 use parfocal_recording::{AnyRecording, Recording, RecordingError};
 
 /// Maximum number of pictures and spectra that wait to be made: enough for the requests that a few pages make ahead.
@@ -114,12 +116,12 @@ impl Open {
     }
 
     /// The spectrum of frame `number`, from 0, within `circle`.
-    pub fn spectrum(&self, number: usize, circle: Circle) -> Result<PlaceSpectrum, PlaybackError> {
-        let (AnyRecording::Mosaic(recording), Some(studio)) = (&self.recording, &self.studio) else {
+    pub fn spectrum(&mut self, number: usize, circle: Circle) -> Result<PlaceSpectrum, PlaybackError> {
+        let (AnyRecording::Mosaic(recording), Some(studio)) = (&self.recording, &mut self.studio) else {
             return Err(PlaybackError::NotFound("a recording of the view has no spectra, only colours".to_owned()));
         };
         let mut sum = SpectrumSum::new(&studio.calibration, circle, recording.size())?;
-        sum.add(&recording.frame(number).map_err(unreadable)?);
+        sum.add(read(&mut studio.latest, recording, number)?);
         Ok(PlaceSpectrum::new(&studio.calibration, &sum.spectrum()))
     }
 }
@@ -131,6 +133,9 @@ struct Studio {
     encoder: JpegEncoder,
     rgb: RgbImage,
     gray: GrayImage,
+    /// The frame that was read last, with its number. The spectra at several places of one frame are asked for one by
+    /// one, and mostly after its picture.
+    latest: Option<(usize, MosaicFrame)>,
 }
 
 impl Studio {
@@ -141,14 +146,28 @@ impl Studio {
             .map_err(|error| PlaybackError::Unreadable(error.to_string()))?;
 
         let developer = Developer::new(&calibration);
-        Ok(Self { calibration, developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
+        Ok(Self { calibration, developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default(), latest: None })
     }
 
     fn picture(&mut self, recording: &Recording, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
-        let mosaic = recording.frame(number).map_err(unreadable)?;
-        self.developer.develop(&mosaic, size, &mut self.rgb, &mut self.gray);
+        let mosaic = read(&mut self.latest, recording, number)?;
+        self.developer.develop(mosaic, size, &mut self.rgb, &mut self.gray);
         self.encoder.encode(&self.rgb).map_err(|error| PlaybackError::Unreadable(error.to_string()))
     }
+}
+
+/// Frame `number` of `recording`: `latest`, if that is it.
+fn read<'a>(
+    latest: &'a mut Option<(usize, MosaicFrame)>,
+    recording: &Recording,
+    number: usize,
+) -> Result<&'a MosaicFrame, PlaybackError> {
+    let kept = latest.take().filter(|(kept, _)| *kept == number);
+    let frame = match kept {
+        Some(frame) => frame,
+        None => (number, recording.frame(number).map_err(unreadable)?),
+    };
+    Ok(&latest.insert(frame).1)
 }
 
 fn unreadable(error: RecordingError) -> PlaybackError {

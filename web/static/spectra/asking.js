@@ -1,0 +1,55 @@
+// Asks for something again and again, one request at a time. Without the DOM.
+
+/**
+ * @typedef {object} Parts
+ * @property {() => Promise<void>} ask asks, and deals with the answer; never rejects
+ * @property {(run: () => void, ms: number) => () => void} later runs `run` after a while, unless the result is called
+ * @property {() => number} now milliseconds
+ */
+
+export class Asking {
+  #parts;
+  #asking = false;
+  /** When to ask next; null if there is nothing to ask. @type {number | null} */
+  #due = null;
+  #forget = () => {};
+
+  /** @param {Parts} parts */
+  constructor(parts) {
+    this.#parts = parts;
+  }
+
+  /**
+   * Asks `ms` from now, or earlier if that was wanted before. While a request is under way, after it.
+   *
+   * @param {number} [ms]
+   */
+  want(ms = 0) {
+    const due = this.#parts.now() + ms;
+    if (this.#due !== null && this.#due <= due) return;
+    this.#due = due;
+    if (!this.#asking) this.#wait();
+  }
+
+  /** Asks no more until it is wanted again. */
+  stop() {
+    this.#due = null;
+    this.#forget();
+  }
+
+  #wait() {
+    this.#forget();
+    if (this.#due === null) return;
+    const ms = this.#due - this.#parts.now();
+    if (ms <= 0) this.#ask();
+    else this.#forget = this.#parts.later(() => this.#ask(), ms);
+  }
+
+  async #ask() {
+    this.#due = null;
+    this.#asking = true;
+    await this.#parts.ask();
+    this.#asking = false;
+    this.#wait();
+  }
+}
