@@ -183,7 +183,6 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
         tablets: OpenTablets::default(),
         tablet_trials: TabletTrials::default(),
-        spectra: tokio::sync::Mutex::default(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.observer(),

@@ -164,6 +164,7 @@ async fn the_researcher_sees_spectra_at_places_of_a_recording() {
     let page = &theatre.operator;
     let recording = recording(&theatre);
     assert_eq!(pixels(page, "#player-marks", CORNERS).await, 0, "nobody has pointed yet");
+    page.show("#player-stage").await;
     shoot(page, "spectra-1-player-empty").await;
 
     // The time from the click to the plot, in the page itself.
@@ -206,7 +207,8 @@ async fn the_researcher_sees_spectra_at_places_of_a_recording() {
         resize(page, width, height).await;
         accessible::check_reach(page, &format!("spectra of a recording at {width}x{height}")).await;
     }
-    page.show("#spectra").await;
+    page.click("#spectra-numbers summary").await;
+    page.show("#spectra-plot").await;
     shoot(page, "spectra-2-player").await;
 
     // The spectra follow the frame on screen, and a radius makes the circles larger.

@@ -17,12 +17,14 @@ pub struct Equipment {
     pub mosaics: Option<(usize, usize)>,
     /// Held while the machine is checked, so that a hanging disk blocks only one thread, however often somebody asks.
     pub(super) look: Arc<Mutex<()>>,
+    /// Held while spectra of the live picture are computed, so that any number of requests takes one processor at most.
+    pub(super) spectra: Mutex<()>,
 }
 
 impl Equipment {
     /// A lens, a calibration and a camera as they were at the start.
     #[must_use]
     pub fn new(lens: Option<LensInfo>, calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
-        Self { lens, calibration, mosaics, look: Arc::default() }
+        Self { lens, calibration, mosaics, look: Arc::default(), spectra: Mutex::default() }
     }
 }

@@ -128,7 +128,7 @@ async fn measure(app: &App, mosaic: Arc<MosaicFrame>, circles: Vec<Circle>) -> R
     let calibration = Arc::clone(&app.equipment.calibration);
     let (reply, found) = oneshot::channel();
 
-    let _one_at_a_time = app.spectra.lock().await;
+    let _one_at_a_time = app.equipment.spectra.lock().await;
     let thread = std::thread::Builder::new().name("spectra".into());
     let started = thread.spawn(move || {
         priority::lower_further();

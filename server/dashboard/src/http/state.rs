@@ -67,8 +67,6 @@ pub struct App {
     pub tablets: OpenTablets,
     /// What works on the tablets that were tried.
     pub tablet_trials: TabletTrials,
-    /// Held while spectra of the live picture are computed, so that any number of requests takes one processor at most.
-    pub spectra: tokio::sync::Mutex<()>,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server must shut down; streams then close by themselves.
