@@ -8,6 +8,7 @@ use clap::builder::RangedU64ValueParser;
 
 use super::output::Failure;
 use parfocal_base::notices::tell;
+use parfocal_imaging::PixelFormat;
 use parfocal_learning::scans::bench::BenchScenes;
 use parfocal_learning::scans::benchmark::FRAMES;
 use parfocal_learning::scans::footage;
@@ -58,6 +59,10 @@ pub struct Arguments {
     /// a focal stack (`DIR:K` makes K of its planes the range 0 to 1). Each gets the same share.
     #[arg(long, value_name = "simulated|relief|DIR", num_args = 1.., default_value = "simulated")]
     scans: Vec<String>,
+    /// Format of .raw and .bin files in focal stacks: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the
+    /// one of their length.
+    #[arg(long, value_name = "FORMAT")]
+    raw: Option<PixelFormat>,
     /// A video (its first 1500 frames), an image or a folder of images instead of drawn pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
@@ -121,7 +126,7 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
     }
 
     if !folders.is_empty() {
-        let bench = BenchScenes::read(&folders, None)?;
+        let bench = BenchScenes::read(&folders, arguments.raw)?;
         for doubt in &bench.doubts {
             tell(format_args!("note: {doubt}"));
         }

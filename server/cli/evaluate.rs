@@ -174,10 +174,9 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     }
 
     let policies = policies(&arguments.policies, &registry);
-    let settings = policy_process::for_evaluation();
-    let registry = policies
-        .iter()
-        .fold(registry, |registry, name| exec::with_command(scripted::with_file(registry, name), name, &settings));
+    let settings = policy_process::for_evaluation(None);
+    let registry =
+        policies.iter().fold(registry, |registry, name| policy_process::with_outside(registry, name, &settings));
 
     // Report a policy that cannot run before doing anything that takes time.
     policies.iter().try_for_each(|name| registry.build(name).map(drop))?;

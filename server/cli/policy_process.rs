@@ -10,6 +10,8 @@ use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
 use super::output::Failure;
 use parfocal_autofocus::exec::{Settings, Times};
+use parfocal_autofocus::{Registry, exec, scripted};
+use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::notices::tell;
 
@@ -43,8 +45,15 @@ pub fn for_serving(clock: &Arc<dyn Clock>) -> Settings {
     }
 }
 
-/// For an evaluation, which nobody waits for, and whose frames are a 25th of a second apart.
-pub fn for_evaluation() -> Settings {
+/// Adds the policy of a file or a command to `registry`, if `name` is one.
+#[must_use]
+pub fn with_outside(registry: Registry, name: &PolicyName, settings: &Settings) -> Registry {
+    exec::with_command(scripted::with_file(registry, name), name, settings)
+}
+
+/// For an evaluation, which nobody waits for, and which has `rate` frames a second, or else 25.
+pub fn for_evaluation(rate: Option<f64>) -> Settings {
+    let period = rate.and_then(|rate| Duration::try_from_secs_f64(rate.recip()).ok());
     Settings {
         launcher: SELF.into(),
         clock: Arc::new(SystemClock),
@@ -52,7 +61,7 @@ pub fn for_evaluation() -> Settings {
         answer: Duration::from_secs(10),
         build: START,
         many: true,
-        times: Times::Every(Duration::from_millis(40)),
+        times: Times::Every(period.unwrap_or(Duration::from_millis(40))),
         say: |line| tell(format_args!("policy: {line}")),
     }
 }

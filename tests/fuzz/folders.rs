@@ -16,8 +16,8 @@ use parfocal_dashboard::tls::Certificates;
 use parfocal_devices::camera::calibration::tables;
 use parfocal_imaging::{Calibration, MosaicFrame};
 use parfocal_recording::{
-    Ended, FORMAT, Header, Recorder, Recording, Shot, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewRecording,
-    ViewWriter, Writer, of_session,
+    Ended, FORMAT, Header, PatchRow, Recorder, Recording, Shot, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader,
+    ViewRecording, ViewWriter, Writer, of_session,
 };
 use parfocal_records::store::export::verify::verify;
 use tempfile::TempDir;
@@ -212,6 +212,7 @@ fn make_recording(folder: &Path) {
             asked: FocalPower::MIDDLE,
             measured: None,
             optimal: None,
+            patch: PatchRow { corner: (0, 0), jumps: 0 },
             mosaic: Arc::new(MosaicFrame::new(SIZE, SIZE, vec![number as u16; SIZE * SIZE]).unwrap()),
         });
     }

@@ -17,7 +17,7 @@ use parfocal_base::clock::{Clock, Moment, SystemClock};
 use parfocal_devices::camera::{self, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
 use parfocal_imaging::{Calibration, MosaicFrame};
-use parfocal_recording::{CALIBRATION, FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
+use parfocal_recording::{CALIBRATION, FORMAT, Header, PatchRow, Recorder, Recording, Shot, VERSION, Writer};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -130,6 +130,7 @@ fn made_up_by(folder: &TempDir, frames: usize, size: (usize, usize), calibration
             asked: FocalPower::new(frame as f64 / frames as f64).unwrap(),
             measured: None,
             optimal: None,
+            patch: PatchRow { corner: (frame as u64, 3), jumps: frame as u64 / 10 },
             mosaic: Arc::new(mosaic_of(frame, size)),
         });
         // Wait: if more frames were offered at once than fit, some would be lost, as they should.
@@ -159,7 +160,7 @@ fn python_reads_every_sample_and_the_wavelengths_are_coordinates() {
     assert_eq!(found["units"], "nm");
     assert_eq!(found["started"], "2026-03-01T12:00:00.25Z");
     let coordinates = found["coordinates"].as_array().unwrap();
-    for name in ["wavelength", "fwhm", "time", "focal_power_asked", "focal_power_measured", "frame_number"] {
+    for name in ["wavelength", "fwhm", "time", "focal_power_asked", "frame_number", "patch_x"] {
         assert!(coordinates.contains(&name.into()), "{name} is no coordinate: {coordinates:?}");
     }
 
@@ -177,6 +178,7 @@ fn python_reads_every_sample_and_the_wavelengths_are_coordinates() {
     assert_eq!(found["numbers"][59], 165);
     assert!((found["seconds"][59].as_f64().unwrap() - 65.0 * 0.02).abs() < 1e-9);
     assert!((found["asked"][30].as_f64().unwrap() - 0.5).abs() < 1e-12);
+    assert_eq!(found["patches"][59], serde_json::json!([59, 3, 5]));
 
     let told = info(&recording);
     assert_eq!((&told["frames"], &told["frames_missing"], &told["frames_lost"]), (&60.into(), &6.into(), &0.into()));
@@ -338,6 +340,7 @@ fn what_does_not_fit_into_a_recorder_is_lost_and_counted() {
         asked: FocalPower::MIDDLE,
         measured: None,
         optimal: None,
+        patch: PatchRow { corner: (240, 120), jumps: 0 },
         mosaic: Arc::new(MosaicFrame::new(2048, 1088, vec![number as u16; 2048 * 1088]).unwrap()),
     };
     let shots: Vec<Shot> = (1..=100).map(shot).collect();

@@ -38,6 +38,7 @@ if mosaics.shape[0] > 0:
         "numbers": dataset.frame_number.values.tolist(),
         "seconds": seconds.tolist(),
         "asked": dataset.focal_power_asked.values.tolist(),
+        "patches": np.stack([dataset.patch_x, dataset.patch_y, dataset.patch_jumps], axis=-1).tolist(),
     }
 
 if len(sys.argv) > 2:

@@ -1,6 +1,7 @@
 //! A policy stepped over a recording.
 
 use std::collections::BTreeMap;
+use std::fs;
 
 use super::*;
 
@@ -44,13 +45,24 @@ fn a_policy_steps_over_a_recording_and_says_what_it_saw_and_asked() {
         last_metric = metric;
     }
 
-    // The metric is that of the patch in the developed picture, worked out by another command.
+    // The metric is that of the patch in the developed picture, worked out by another command. Before the loop has seen
+    // the circle, its patch is at the picture's middle, and afterwards within the detection's tremor.
     let pictures = folder.path().join("pictures");
-    done(&["recording", "video", text(&recording), "--out", text(&pictures), "--pictures", "tiff", "--to", "0"]);
-    let seen = done(&["inspect", text(&pictures.join("frame000000.tiff")), "--json"]);
-    let seen: Value = serde_json::from_str(seen.trim()).unwrap();
-    assert_eq!(seen["patch"]["x"].to_string(), rows[0]["patch_x"], "{seen}");
-    assert!((seen["mgm"].as_f64().unwrap() - value(&rows[0], "metric")).abs() < 1e-3, "{seen} {:?}", rows[0]);
+    done(&["recording", "video", text(&recording), "--out", text(&pictures), "--pictures", "tiff", "--to", "0.5"]);
+    let mut files: Vec<PathBuf> = fs::read_dir(&pictures).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let named = files.iter().map(|file| text(file));
+    let seen = done(&["inspect", "--json"].into_iter().chain(named).collect::<Vec<_>>());
+    let seen: Vec<Value> = seen.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let corner = |seen: &Value| (seen["patch"]["x"].to_string(), seen["patch"]["y"].to_string());
+    let same =
+        seen.iter().zip(&rows).filter(|(seen, row)| corner(seen) == (row["patch_x"].clone(), row["patch_y"].clone()));
+    let mut compared = 0;
+    for (seen, row) in same {
+        assert!((seen["mgm"].as_f64().unwrap() - value(row, "metric")).abs() < 1e-3, "{seen} {row:?}");
+        compared += 1;
+    }
+    assert!(compared > 0, "{seen:?}");
 
     let fixed = stepped(&folder, &recording, "fixed");
     let start = value(&fixed[0], "focal_power");
@@ -67,7 +79,104 @@ fn a_table_is_written_whole_or_not_at_all() {
         complaint(&parfocal(&["recording", "step", text(&recording), "--policy", policy, "--out", text(&out)]))
     };
     assert!(step("guess").contains("there is no policy 'guess'"));
+    assert!(step("file:/no/such.pt").contains("cannot read /no/such.pt"));
+    assert!(step("exec:/no/such/program").contains("there is no program /no/such/program"));
     // The made-up mosaics are smaller than a patch.
     assert!(step("fixed").contains("frame 0 holds nothing to focus on"), "{}", step("fixed"));
     assert!(!out.exists());
+}
+
+/// A recording of 96x40 cells whose level rises by the same amount from cell to cell. Its patch
+/// moves to the right by a cell a frame, and jumps in frame 6.
+fn slope(folder: &TempDir) -> PathBuf {
+    const SIZE: (usize, usize) = (4 * 96, 4 * 40);
+    let path = folder.path().join("slope");
+    let calibration = Calibration::default();
+    let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
+    camera::calibration::save(&path.join(CALIBRATION), &calibration, &[]).unwrap();
+
+    let recorder = Recorder::start(writer, Moment::default()).unwrap();
+    let level = |place: usize| (100 + place % SIZE.0 / 4) as u16;
+    let mosaic = Arc::new(MosaicFrame::new(SIZE.0, SIZE.1, (0..SIZE.0 * SIZE.1).map(level).collect()).unwrap());
+    for frame in 0..12u64 {
+        recorder.intake().offer(Shot {
+            number: frame,
+            exposed_at: Moment::from_nanos(frame * 20_000_000),
+            exposure: Duration::from_millis(2),
+            asked: FocalPower::MIDDLE,
+            measured: None,
+            optimal: None,
+            patch: PatchRow { corner: (if frame < 6 { frame } else { 50 + frame }, 8), jumps: u64::from(frame >= 6) },
+            mosaic: Arc::clone(&mosaic),
+        });
+        wait_for(|| recorder.progress().frames > frame);
+    }
+    assert_eq!(recorder.stop().lost, 0);
+    path
+}
+
+/// The name of a policy in a process of its own, `outside.py`, that does `deed` in the sixth frame that it sees.
+fn outside(deed: &str) -> String {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings/outside.py");
+    format!("exec:python3 -s '{script}' {deed}")
+}
+
+#[test]
+fn a_policy_in_another_process_steps_on_the_patch_where_it_was() {
+    let folder = TempDir::new().unwrap();
+    let recording = slope(&folder);
+    let out = folder.path().join("steps.csv");
+    let policy = outside("nothing");
+    done(&["recording", "step", text(&recording), "--policy", &policy, "--out", text(&out)]);
+    let rows: Vec<BTreeMap<String, String>> =
+        csv::Reader::from_path(out).unwrap().deserialize().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 12);
+
+    // Its metric is the patch's mean level, which tells the column.
+    let rise = value(&rows[1], "metric") - value(&rows[0], "metric");
+    assert!(rise > 0.0, "{rows:?}");
+    for (row, frame) in rows.iter().zip(0..) {
+        let column = if frame < 6 { frame } else { 50 + frame };
+        assert_eq!((value(row, "patch_x"), value(row, "patch_y")), (f64::from(column), 8.0));
+        let found = (value(row, "metric") - value(&rows[0], "metric")) / rise;
+        assert!((found - f64::from(column)).abs() < 0.01 * f64::from(column.max(1)), "{found} is not {column}");
+        // Its target tells how many frames it has seen since it was told to forget.
+        let seen = if frame < 6 { frame } else { frame - 6 };
+        assert!((value(row, "target") - 0.01 * f64::from(seen + 1)).abs() < 1e-9, "{row:?}");
+    }
+}
+
+#[test]
+fn a_process_that_fails_leaves_no_table_and_says_why() {
+    let folder = TempDir::new().unwrap();
+    let recording = slope(&folder);
+    let out = folder.path().join("steps.csv");
+    for (deed, words) in [
+        ("end", "at frame 5 the policy gave no focal power: its process ended (exit code 3)"),
+        ("nonsense", "at frame 5 the policy gave no focal power: it sent 5 bytes where an answer has 40"),
+        ("nan", "at frame 5 the policy returned NaN, which is not a focal power from 0 to 1"),
+        ("hang", "at frame 5 the policy gave no focal power: it did not answer in time"),
+    ] {
+        let arguments = ["recording", "step", text(&recording), "--policy", &outside(deed), "--out", text(&out)];
+        let told = complaint(&parfocal(&arguments));
+        assert!(told.contains(words), "{deed}: {told}");
+        assert!(!out.exists());
+    }
+}
+
+#[test]
+fn a_recording_of_an_earlier_version_has_no_place_of_the_patch() {
+    let folder = TempDir::new().unwrap();
+    let recording = slope(&folder);
+    let group = recording.join("zarr.json");
+    let mut described: Value = serde_json::from_slice(&fs::read(&group).unwrap()).unwrap();
+    for column in ["patch_x", "patch_y", "patch_jumps"] {
+        described["consolidated_metadata"]["metadata"].as_object_mut().unwrap().remove(column).unwrap();
+        fs::remove_dir_all(recording.join(column)).unwrap();
+    }
+    fs::write(&group, described.to_string()).unwrap();
+
+    let rows = stepped(&folder, &recording, "fixed");
+    // The picture has 96x40 cells and shows no circle.
+    assert!(rows.iter().all(|row| (value(row, "patch_x"), value(row, "patch_y")) == (32.0, 4.0)), "{:?}", rows[0]);
 }

@@ -120,6 +120,12 @@ fn a_stack_of_raw_mosaics_is_the_stack_of_the_same_mosaics_as_pictures() {
         if !is_packed && bits > 10 {
             let told = complaint(&scan(&raw, "guessed", &[]).0);
             assert!(told.contains("but Mono10 ends at 1023; give --raw"), "{told}");
+
+            let environment = |more: &[&str]| parfocal(&[&["environment", "--scans", text(&raw)], more].concat());
+            let told = complaint(&environment(&[]));
+            assert!(told.contains("but Mono10 ends at 1023; give --raw"), "{told}");
+            let told = notes(&environment(&option));
+            assert!(told.contains(&format!("are read as {name}, as --raw says")), "{told}");
         }
         if is_packed {
             let told = complaint(&scan(&raw, "wrong", &["--raw", "Mono16"]).0);

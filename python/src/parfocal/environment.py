@@ -192,6 +192,7 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
         split: Literal["training", "validation", "test"] = "training",
         scenes: int = 32,
         footage: Sequence[str | os.PathLike[str]] = (),
+        raw: str | None = None,
         reward: Reward = minus_error,
         program: str | os.PathLike[str] | None = None,
     ) -> None:
@@ -206,6 +207,8 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
         options += ["--seed", str(np.random.SeedSequence().generate_state(1)[0])]
         for path in footage:
             options += ["--footage", str(Path(path))]
+        if raw is not None:
+            options += ["--raw", raw]
         options += ["--scans", *(os.fspath(one) for one in chosen)]
 
         self.num_envs = num_envs
@@ -314,7 +317,8 @@ class FocusEnv(gymnasium.Env[Observation, Any]):
     coarser ones around each), and the focal powers at which they were taken. ``actions``: ``"steps"``, the
     paper's three (0 down, 1 stay, 2 up), or ``"continuous"``, the focal power to move to. The reward is
     minus the error of the focal power, or ``reward(focal_power, optimum)`` over arrays. An episode is a scan
-    of ``frames`` frames; it is truncated, never terminated.
+    of ``frames`` frames; it is truncated, never terminated. ``raw``: the format of raw mosaics in focal
+    stacks where their length does not tell it, such as ``"Mono12"``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012

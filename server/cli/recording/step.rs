@@ -4,7 +4,9 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::cli::output::{Failure, print};
-use parfocal_autofocus::{Registry, scripted, shipped};
+use crate::cli::policy_process;
+use parfocal_autofocus::networks::compute_on_this_thread;
+use parfocal_autofocus::{Registry, shipped};
 use parfocal_base::files::replace;
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::calibration;
@@ -16,7 +18,8 @@ use parfocal_session::playback::stepping::Stepping;
 pub struct Arguments {
     /// Folder of the recording.
     folder: PathBuf,
-    /// The policy: a name of `parfocal policies`, or `file:PATH` of a TorchScript file.
+    /// The policy: a name of `parfocal policies`, `file:PATH` for a TorchScript file or `exec:COMMAND` for a policy in
+    /// another process.
     #[arg(long, value_name = "NAME")]
     policy: String,
     /// The table to write: a row for each frame.
@@ -42,7 +45,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let calibration = calibration::read(&recording.calibration())?;
     let name = PolicyName::new(&arguments.policy);
-    let policy = registry(arguments, &name)?.build(&name)?;
+    // It must outlive the policy: a policy in another process ends with it.
+    let registry = registry(arguments, &name, recording.rate())?;
+    let policy = registry.build(&name)?;
 
     let mut table = csv::Writer::from_writer(Vec::new());
     for step in Stepping::new(&recording, &calibration, policy) {
@@ -54,10 +59,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!("{} steps of {name} in {}\n", recording.rows().len(), arguments.out.display()))
 }
 
-fn registry(arguments: &Arguments, name: &PolicyName) -> Result<Registry, Failure> {
+/// All policies, `name` among them. A policy in another process gets frames at the recording's `rate`.
+fn registry(arguments: &Arguments, name: &PolicyName, rate: Option<f64>) -> Result<Registry, Failure> {
+    compute_on_this_thread();
     let mut registry = Registry::standard().knowing(arguments.blur);
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;
     }
-    Ok(scripted::with_file(registry, name))
+    Ok(policy_process::with_outside(registry, name, &policy_process::for_evaluation(rate)))
 }

@@ -11,7 +11,7 @@ use super::arguments::Arguments;
 use crate::cli::library::protocols;
 use crate::cli::output::Failure;
 use crate::cli::policy_process;
-use parfocal_autofocus::{Registry, exec, scripted, shipped};
+use parfocal_autofocus::{Registry, shipped};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Clock;
 use parfocal_base::files::is_new_or_empty;
@@ -157,8 +157,7 @@ fn registry(arguments: &Arguments, clock: &Arc<dyn Clock>, problems: &mut Proble
     }
 
     for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
-        registry = scripted::with_file(registry, &name);
-        registry = exec::with_command(registry, &name, &policy_process::for_serving(clock));
+        registry = policy_process::with_outside(registry, &name, &policy_process::for_serving(clock));
         problems.keep(registry.build(&name));
     }
     registry

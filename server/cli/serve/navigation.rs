@@ -3,20 +3,12 @@
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tokio::net::TcpListener;
 
 use parfocal_dashboard::openigtlink::Settings;
 use parfocal_imaging::Size;
-
-/// Size of the pictures.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PictureSize {
-    /// One pixel a mosaic cell.
-    Cell,
-    /// Two by two pixels a mosaic cell.
-    Half,
-}
 
 /// OpenIGTLink.
 #[derive(Debug, Args)]
@@ -25,15 +17,20 @@ pub struct Navigation {
     /// this machine. Whoever reaches the address sees the picture: there is no key and no encryption.
     #[arg(long, value_name = "ADDR", value_parser = address)]
     openigtlink: Option<SocketAddr>,
-    /// Size of these pictures.
-    #[arg(long, value_enum, default_value_t = PictureSize::Cell, requires = "openigtlink")]
-    openigtlink_size: PictureSize,
+    /// Size of these pictures: one pixel per mosaic cell, or two by two.
+    #[arg(long, value_name = "SIZE", default_value = "cell", requires = "openigtlink", value_parser = sizes())]
+    openigtlink_size: Size,
     /// Most of these pictures a second.
     #[arg(
         long, value_name = "N", default_value_t = 10, requires = "openigtlink",
         value_parser = clap::value_parser!(u32).range(1..=100)
     )]
     openigtlink_rate: u32,
+}
+
+/// The sizes that a stream has the bandwidth for.
+fn sizes() -> impl TypedValueParser<Value = Size> {
+    PossibleValuesParser::new(["cell", "half"]).map(|name| if name == "half" { Size::Half } else { Size::Cell })
 }
 
 /// `HOST:PORT`, or a port of this machine alone.
@@ -49,11 +46,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 impl Navigation {
     /// What clients get.
     pub fn settings(&self) -> Settings {
-        let size = match self.openigtlink_size {
-            PictureSize::Cell => Size::Cell,
-            PictureSize::Half => Size::Half,
-        };
-        Settings { size, rate: self.openigtlink_rate }
+        Settings { size: self.openigtlink_size, rate: self.openigtlink_rate }
     }
 
     /// Takes the port; `None` without OpenIGTLink.

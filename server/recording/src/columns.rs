@@ -26,6 +26,18 @@ pub struct FrameRow {
     pub measured: f64,
     /// Best focal power; NaN unless a simulation knows it.
     pub optimal: f64,
+    /// The patch; recordings of earlier versions do not have it.
+    pub patch: Option<PatchRow>,
+}
+
+/// The patch of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PatchRow {
+    /// Its left column and top row, in mosaic cells.
+    pub corner: (u64, u64),
+    /// How often the policy had been made to forget what it saw, because the patch had jumped or the focus had been held.
+    /// What was seen before a change is not comparable with what was seen after it.
+    pub jumps: u64,
 }
 
 /// Encodes and decodes the files of the columns.
@@ -61,14 +73,21 @@ impl Columns {
             Column::Asked => padded(&self.other, rows.iter().map(|row| row.asked), f64::NAN),
             Column::Measured => padded(&self.other, rows.iter().map(|row| row.measured), f64::NAN),
             Column::Optimal => padded(&self.other, rows.iter().map(|row| row.optimal), f64::NAN),
+            Column::PatchX => self.of_patch(rows, |patch| patch.corner.0),
+            Column::PatchY => self.of_patch(rows, |patch| patch.corner.1),
+            Column::PatchJumps => self.of_patch(rows, |patch| patch.jumps),
         }
     }
 
-    /// The rows of the first `frames` frames in `folder`.
+    fn of_patch(&self, rows: &[FrameRow], value: fn(PatchRow) -> u64) -> Result<Vec<u8>, RecordingError> {
+        padded(&self.number, rows.iter().map(|row| row.patch.map_or(0, value)), 0)
+    }
+
+    /// The rows of the first `frames` frames in `folder`, with their patches if the recording `has_patches`.
     ///
     /// # Errors
     /// If a file cannot be read, or is missing or damaged.
-    pub fn read(&self, folder: &Path, frames: usize) -> Result<Vec<FrameRow>, RecordingError> {
+    pub fn read(&self, folder: &Path, frames: usize, has_patches: bool) -> Result<Vec<FrameRow>, RecordingError> {
         let time: Vec<i64> = column(&self.time, folder, Column::Time, frames)?;
         let number: Vec<u64> = column(&self.number, folder, Column::Number, frames)?;
         let values = |which| column::<f64>(&self.other, folder, which, frames);
@@ -76,6 +95,7 @@ impl Columns {
         let asked = values(Column::Asked)?;
         let measured = values(Column::Measured)?;
         let optimal = values(Column::Optimal)?;
+        let patches = if has_patches { self.patches(folder, frames)? } else { vec![None; frames] };
 
         let row = |frame: usize| FrameRow {
             time: time[frame],
@@ -84,8 +104,18 @@ impl Columns {
             asked: asked[frame],
             measured: measured[frame],
             optimal: optimal[frame],
+            patch: patches[frame],
         };
         Ok((0..frames).map(row).collect())
+    }
+
+    fn patches(&self, folder: &Path, frames: usize) -> Result<Vec<Option<PatchRow>>, RecordingError> {
+        let values = |which| column::<u64>(&self.number, folder, which, frames);
+        let x = values(Column::PatchX)?;
+        let y = values(Column::PatchY)?;
+        let jumps = values(Column::PatchJumps)?;
+        let patch = |frame: usize| Some(PatchRow { corner: (x[frame], y[frame]), jumps: jumps[frame] });
+        Ok((0..frames).map(patch).collect())
     }
 }
 

@@ -31,11 +31,29 @@ pub enum Column {
     Measured,
     /// Focal power at which the patch would be sharpest.
     Optimal,
+    /// Left column of the patch, in mosaic cells.
+    PatchX,
+    /// Top row of the patch, in mosaic cells.
+    PatchY,
+    /// How often the policy had forgotten what it saw.
+    PatchJumps,
 }
 
 impl Column {
     /// All columns.
-    pub const ALL: [Self; 6] = [Self::Time, Self::Number, Self::Exposure, Self::Asked, Self::Measured, Self::Optimal];
+    pub const ALL: [Self; 9] = [
+        Self::Time,
+        Self::Number,
+        Self::Exposure,
+        Self::Asked,
+        Self::Measured,
+        Self::Optimal,
+        Self::PatchX,
+        Self::PatchY,
+        Self::PatchJumps,
+    ];
+    /// The columns of the patch, which recordings of earlier versions lack.
+    pub const OF_PATCH: [Self; 3] = [Self::PatchX, Self::PatchY, Self::PatchJumps];
 
     /// The array's name.
     pub const fn name(self) -> &'static str {
@@ -46,13 +64,16 @@ impl Column {
             Self::Asked => "focal_power_asked",
             Self::Measured => "focal_power_measured",
             Self::Optimal => "focal_power_optimal",
+            Self::PatchX => "patch_x",
+            Self::PatchY => "patch_y",
+            Self::PatchJumps => "patch_jumps",
         }
     }
 
     const fn data_type(self) -> &'static str {
         match self {
             Self::Time => "int64",
-            Self::Number => "uint64",
+            Self::Number | Self::PatchX | Self::PatchY | Self::PatchJumps => "uint64",
             Self::Exposure | Self::Asked | Self::Measured | Self::Optimal => "float64",
         }
     }
@@ -73,6 +94,11 @@ impl Column {
             Self::Optimal => {
                 json!({"long_name": "best focal power, where a simulation knows it; else NaN", "units": "1"})
             }
+            Self::PatchX => json!({"long_name": "left column of the patch in mosaic cells", "units": "1"}),
+            Self::PatchY => json!({"long_name": "top row of the patch in mosaic cells", "units": "1"}),
+            Self::PatchJumps => json!({
+                "long_name": "how often the patch had jumped or the focus had been let go; policies forget at a change",
+            }),
         }
     }
 }

@@ -15,7 +15,7 @@ mod view;
 mod view_reading;
 mod writing;
 
-pub use columns::FrameRow;
+pub use columns::{FrameRow, PatchRow};
 pub use disk::{Room, room};
 pub use error::{Damage, RecordingError};
 pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};

@@ -9,7 +9,7 @@ use std::time::Duration;
 use std::{io, thread};
 
 use super::codec::Coder;
-use super::columns::FrameRow;
+use super::columns::{FrameRow, PatchRow};
 use super::disk::{Room, room};
 use super::error::RecordingError;
 use super::header::Ended;
@@ -41,6 +41,8 @@ pub struct Shot {
     pub measured: Option<FocalPower>,
     /// Best focal power; `None` unless a simulation knows it.
     pub optimal: Option<FocalPower>,
+    /// The patch.
+    pub patch: PatchRow,
     /// Its samples.
     pub mosaic: Arc<MosaicFrame>,
 }
@@ -55,6 +57,7 @@ impl Shot {
             asked: self.asked.get(),
             measured: value(self.measured),
             optimal: value(self.optimal),
+            patch: Some(self.patch),
         }
     }
 }

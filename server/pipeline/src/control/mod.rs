@@ -96,6 +96,8 @@ pub struct ControlledFrame {
     pub content_area: Option<ContentArea>,
     /// Where people have chosen to look.
     pub aim: Aim,
+    /// How often the policy has been made to forget what it saw: because the patch jumped, or the focus was held.
+    pub jumps: u64,
     /// The record of its step.
     pub record: StepRecord,
     /// The policy's belief, if it has one.

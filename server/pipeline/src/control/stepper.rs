@@ -34,6 +34,8 @@ pub struct Stepper {
     segment: Option<SegmentId>,
     /// Where people have chosen to look.
     aim: Aim,
+    /// How often the policy has been made to forget what it saw.
+    jumps: u64,
     /// What people can point at.
     sight: Sight,
     /// The last focal power that the lens accepted.
@@ -61,6 +63,7 @@ impl Stepper {
             placed: false,
             segment: None,
             aim: Aim::default(),
+            jumps: 0,
             sight: Sight::default(),
             asked: start,
             wanted: start,
@@ -94,6 +97,7 @@ impl Stepper {
     fn take_aim(&mut self, aim: Aim) {
         if aim.place != self.aim.place || (self.aim.held && !aim.held) {
             self.pilot.forget();
+            self.jumps += 1;
         }
         self.aim = aim;
     }
@@ -151,7 +155,7 @@ impl Stepper {
         };
 
         let belief = advice.and_then(|advice| advice.belief);
-        Ok(ControlledFrame { frame, patch, content_area, aim: self.aim, record, belief })
+        Ok(ControlledFrame { frame, patch, content_area, aim: self.aim, jumps: self.jumps, record, belief })
     }
 
     /// Called while no frames come. Repeats the command to the lens, so that the slider works without a camera, and a

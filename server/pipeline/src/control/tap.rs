@@ -6,7 +6,7 @@ use arc_swap::ArcSwapOption;
 
 use super::ControlledFrame;
 use parfocal_devices::camera::FrameImage;
-use parfocal_recording::{Intake, Shot};
+use parfocal_recording::{Intake, PatchRow, Shot};
 
 /// Passes every frame of the loop to a recorder, if one is connected. The loop never waits: frames that the recorder
 /// cannot take are lost and counted there. Clones share the connection.
@@ -37,6 +37,7 @@ impl Tap {
             asked: controlled.record.asked,
             measured: controlled.record.measured,
             optimal: controlled.record.optimal,
+            patch: PatchRow { corner: (controlled.patch.x as u64, controlled.patch.y as u64), jumps: controlled.jumps },
             mosaic: Arc::clone(mosaic),
         });
     }

@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use parfocal_autofocus::{Observation, Policy};
+use parfocal_autofocus::{Fault, Observation, Policy};
 use parfocal_base::FocalPower;
 use parfocal_base::PatchPlace;
 use parfocal_devices::camera::FrameImage;
-use parfocal_imaging::{Calibration, ContentArea, GrayImage, Reconstructor, RgbImage, content_area};
-use parfocal_pipeline::control::Eye;
+use parfocal_imaging::{
+    CELL, Calibration, ContentArea, GrayImage, PATCH_SIDE, PatchArea, Reconstructor, RgbImage, content_area,
+};
+use parfocal_pipeline::control::{Eye, HoldReason};
 use parfocal_pipeline::live::{AreaWatch, DETECT_EVERY};
-use parfocal_recording::{FrameRow, Recording, RecordingError};
+use parfocal_recording::{FrameRow, PatchRow, Recording, RecordingError};
 
 /// Why a policy could not be stepped over the whole recording.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +37,26 @@ pub enum SteppingError {
         frame: usize,
         /// Value that the policy returned.
         target: f64,
+    },
+    /// A policy in another process gave no focal power.
+    #[error("at frame {frame} the policy gave no focal power: {fault}")]
+    Fault {
+        /// Index of the frame, from 0.
+        frame: usize,
+        /// Why.
+        fault: Fault,
+    },
+    /// The recording names a place for the patch that is not in the picture.
+    #[error(
+        "frame {frame} has its patch at {x}, {y}, outside the picture; the columns patch_x and patch_y are damaged"
+    )]
+    Outside {
+        /// Index of the frame, from 0.
+        frame: usize,
+        /// Left column of the patch.
+        x: u64,
+        /// Top row of the patch.
+        y: u64,
     },
 }
 
@@ -73,6 +95,7 @@ pub struct Stepping<'a> {
     area: Option<ContentArea>,
     rgb: RgbImage,
     gray: GrayImage,
+    jumps: Option<u64>,
     next: usize,
 }
 
@@ -90,30 +113,26 @@ impl<'a> Stepping<'a> {
             area: None,
             rgb: RgbImage::default(),
             gray: GrayImage::default(),
+            jumps: None,
             next: 0,
         }
     }
 
     fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, SteppingError> {
-        let mosaic = self.recording.frame(frame)?;
-
-        // Looks for the content area as often as the server does, beginning with the first frame.
-        if (frame as u64).is_multiple_of(DETECT_EVERY) {
-            self.reconstructor.reconstruct(&mosaic, &mut self.rgb, &mut self.gray);
-            if let Some(news) = self.areas.see(content_area::detect(&self.gray)) {
-                self.area = news;
-            }
-        }
-
-        let image = FrameImage::Mosaic(Arc::new(mosaic));
-        let patch = self.eye.find(&image, PatchPlace::CENTRE, self.area.as_ref());
-        let patch = patch.map_err(|reason| SteppingError::NoPatch { frame, reason: reason.message })?;
+        let image = FrameImage::Mosaic(Arc::new(self.recording.frame(frame)?));
+        let patch = match row.patch {
+            Some(patch) => self.recorded(frame, &image, patch)?,
+            None => self.central(frame, &image)?,
+        };
         let view = self.eye.look(&image, patch, self.policy.field_of_view());
 
         let focal_power = self.exposed_at(frame, row);
         let decision = self.policy.step(&Observation { view: &view, focal_power });
         let target = decision.target;
-        let target = FocalPower::new(target).map_err(|_| SteppingError::InvalidTarget { frame, target })?;
+        let target = FocalPower::new(target).map_err(|_| match self.policy.fault() {
+            Some(fault) => SteppingError::Fault { frame, fault },
+            None => SteppingError::InvalidTarget { frame, target },
+        })?;
 
         Ok(Step {
             frame,
@@ -127,6 +146,42 @@ impl<'a> Stepping<'a> {
             recorded_asked: row.asked,
             recorded_optimal: FocalPower::new(row.optimal).ok().map(FocalPower::get),
         })
+    }
+
+    /// The patch where the control loop had it. Where it jumped, the policy forgets what it saw, as it did then.
+    fn recorded(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, SteppingError> {
+        let no_patch = |reason: HoldReason| SteppingError::NoPatch { frame, reason: reason.message };
+        let central = self.eye.find(image, PatchPlace::CENTRE, None).map_err(no_patch)?;
+        if self.jumps.replace(patch.jumps).is_some_and(|jumps| jumps != patch.jumps) {
+            self.policy.forget();
+        }
+
+        let (width, height) = self.recording.size();
+        let within = |first: u64, samples: usize| {
+            let last = (samples / CELL).checked_sub(PATCH_SIDE)?;
+            usize::try_from(first).ok().filter(|first| *first <= last)
+        };
+        let (x, y) = patch.corner;
+        match (within(x, width), within(y, height)) {
+            (Some(x), Some(y)) => Ok(PatchArea { x, y, ..central }),
+            _ => Err(SteppingError::Outside { frame, x, y }),
+        }
+    }
+
+    /// The patch at the middle of the bright circle, for which it looks as often as the server does, beginning with the
+    /// first frame.
+    fn central(&mut self, frame: usize, image: &FrameImage) -> Result<PatchArea, SteppingError> {
+        if let FrameImage::Mosaic(mosaic) = image
+            && (frame as u64).is_multiple_of(DETECT_EVERY)
+        {
+            self.reconstructor.reconstruct(mosaic, &mut self.rgb, &mut self.gray);
+            if let Some(news) = self.areas.see(content_area::detect(&self.gray)) {
+                self.area = news;
+            }
+        }
+
+        let patch = self.eye.find(image, PatchPlace::CENTRE, self.area.as_ref());
+        patch.map_err(|reason| SteppingError::NoPatch { frame, reason: reason.message })
     }
 
     /// Focal power at the middle of the frame's exposure. If the lens did not report it, the focal power that was
