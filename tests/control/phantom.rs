@@ -5,14 +5,13 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use parfocal_autofocus::Registry;
-use parfocal_base::FocalPower;
-use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, ManualClock};
+use parfocal_base::{FocalPower, PatchPlace, PolicyName};
 use parfocal_devices::camera::{Frame, FrameImage, Truth};
 use parfocal_devices::lens::{Lens, SimulatedLens};
-use parfocal_devices::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal_devices::simulation::phantom::{Hand, Phantom, Pose, SENSOR_HEIGHT, SENSOR_WIDTH};
 use parfocal_imaging::{MosaicFrame, Reconstructor};
-use parfocal_pipeline::control::{Command, Drive, Eye, Stepper};
+use parfocal_pipeline::control::{Aim, Command, Drive, Eye, Following, Stepper};
 
 /// A frame every 40 ms, exposed for 10 ms. The lens comes to rest before the next exposure.
 const EXPOSURE: Duration = Duration::from_millis(10);
@@ -70,6 +69,68 @@ fn focal_error(policy: &str) -> FocalError {
     FocalError {
         mean: errors.iter().sum::<f64>() / count,
         in_focus: errors.iter().filter(|&&error| error < 0.1).count() as f64 / count,
+    }
+}
+
+/// The middle of the patch, which follows the tissue, in each frame of a camera that goes around a rectangle of 60 x 40
+/// texels: 20 frames along each side.
+fn followed(seed: u64) -> Vec<(f64, f64)> {
+    let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
+    let lens = Box::new(SimulatedLens::new(clock.clone()));
+    let mut phantom = Phantom::new(seed);
+    let patience = Duration::from_secs(20);
+    let mut stepper =
+        Stepper::new(lens, Eye::new(Reconstructor::default()), Registry::standard(), clock.clone(), patience);
+    stepper.obey(Command::ContentArea(Some(phantom.content_area())));
+    let place = PatchPlace::nearest(0.3, -0.2);
+    stepper.obey(Command::Aim(Aim { place, choices: 1, held: false, follows: true }));
+
+    let corner = |side: u32| [[-30.0, -20.0], [30.0, -20.0], [30.0, 20.0], [-30.0, 20.0]][side as usize % 4];
+    let mut middles = Vec::new();
+    for number in 0..=80u32 {
+        clock.advance(FROM_COMMAND_TO_MIDDLE + EXPOSURE / 2);
+        let (from, to) = (corner(number / 20), corner(number / 20 + 1));
+        let part = f64::from(number % 20) / 20.0;
+        let place = [0, 1].map(|axis: usize| from[axis] + part * (to[axis] - from[axis]));
+        let pose = Pose { place, roll: 0.0, tilt: [0.0; 2], focus: 0.5 };
+
+        let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
+        phantom.expose(&pose, phantom.optimal(&pose), &mut samples);
+        phantom.adjust_exposure(&samples);
+        let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
+        let image = FrameImage::Mosaic(Arc::new(mosaic));
+        let number = u64::from(number);
+        let frame = Frame { number, exposed_at: clock.now(), exposure: EXPOSURE, image, truth: None };
+        let controlled = stepper.step(frame).unwrap();
+
+        assert_eq!(stepper.following(), Following::Tissue, "frame {number}");
+        assert_eq!(controlled.jumps, 1, "only the choice is a jump");
+        let (x, y) = controlled.record.patch;
+        assert_eq!((x as usize, y as usize), (controlled.patch.x, controlled.patch.y));
+        middles.push((f64::from(x), f64::from(y)));
+    }
+    middles
+}
+
+#[test]
+fn the_patch_follows_the_phantoms_tissue_there_and_back() {
+    for seed in SEEDS {
+        let middles = followed(seed);
+        let moved = |from: usize, to: usize| (middles[to].0 - middles[from].0, middles[to].1 - middles[from].1);
+        let near = |found: (f64, f64), expected: (f64, f64)| {
+            let off = (found.0 - expected.0).abs().max((found.1 - expected.1).abs());
+            assert!(off <= 2.0, "seed {seed}: {found:?} is not {expected:?}");
+        };
+
+        // What the camera goes past moves the other way, as far along opposite sides, and two thirds as far along the
+        // shorter ones.
+        let across = moved(0, 20);
+        assert!(across.0 < -15.0, "seed {seed}: {across:?}");
+        near(across, (across.0, 0.0));
+        near(moved(0, 10), (across.0 / 2.0, 0.0));
+        near(moved(20, 40), (0.0, across.0 * 2.0 / 3.0));
+        near(moved(40, 60), (-across.0, 0.0));
+        near(moved(0, 80), (0.0, 0.0));
     }
 }
 

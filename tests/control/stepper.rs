@@ -11,7 +11,7 @@ use parfocal_base::step::{Hold, StepRecord};
 use parfocal_base::{PatchPlace, PolicyName};
 use parfocal_devices::lens::{LensDynamics, LensError};
 use parfocal_imaging::{ContentArea, Reconstructor};
-use parfocal_pipeline::control::{Aim, Command, Drive, Eye, Stepper};
+use parfocal_pipeline::control::{Aim, Command, Drive, Eye, Following, Stepper};
 use proptest::prelude::*;
 use uuid::Uuid;
 
@@ -299,7 +299,7 @@ fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first(
     assert_eq!((before.patch.x, before.patch.y, before.record.patch), (16, 16, (16, 16)));
 
     let place = PatchPlace::nearest(0.5, -0.25);
-    fixture.stepper.obey(Command::Aim(Aim { place, choices: 1, held: false }));
+    fixture.stepper.obey(Command::Aim(Aim { place, choices: 1, held: false, follows: false }));
     let after = step(&mut fixture);
     assert_eq!((after.patch.x, after.patch.y, after.record.patch), (26, 11, (26, 11)), "from the very next frame on");
     assert_eq!(after.record.asked, before.record.asked, "the lens does not move by it");
@@ -309,7 +309,7 @@ fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first(
 
     // The place is relative to the circle. A choice of the same place is none that must be forgotten for.
     fixture.stepper.obey(Command::ContentArea(Some(ContentArea { x: 30.0, radius: 24.0, ..content })));
-    fixture.stepper.obey(Command::Aim(Aim { place, choices: 2, held: false }));
+    fixture.stepper.obey(Command::Aim(Aim { place, choices: 2, held: false, follows: false }));
     let moved = step(&mut fixture);
     assert_eq!((moved.patch.x, moved.patch.y), (26, 10));
     assert_eq!(diary.lock().unwrap().last().unwrap(), "sees");
@@ -317,10 +317,44 @@ fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first(
 }
 
 #[test]
+fn tissue_that_is_lost_brings_the_patch_back_to_the_centre() {
+    let (mut fixture, diary) = diarist();
+    let content = ContentArea { x: 80.0, y: 80.0, radius: 70.0, confidence: 1.0 };
+    fixture.stepper.obey(Command::ContentArea(Some(content)));
+    let aim = |across, follows| Aim { place: PatchPlace::nearest(across, 0.0), choices: 1, held: false, follows };
+    fixture.stepper.obey(Command::Aim(aim(0.5, true)));
+    let mut step = |stepper: &mut Stepper| {
+        fixture.clock.advance(FRAME);
+        fixture.number += 1;
+        // It shows nothing.
+        stepper.step(sized_frame(fixture.number, fixture.clock.now(), 160)).unwrap()
+    };
+
+    let mut frames = 0;
+    while fixture.stepper.following() == Following::Tissue {
+        let seen = step(&mut fixture.stepper);
+        frames += 1;
+        assert!(seen.patch.x == 80 + 35 - 16 || fixture.stepper.following() == Following::Lost, "{:?}", seen.patch);
+        assert!(frames < SECOND, "it waits for half a second");
+    }
+    let after = step(&mut fixture.stepper);
+    assert_eq!((after.patch.x, after.patch.y, after.aim.place), (64, 64, PatchPlace::CENTRE));
+    assert_eq!(after.jumps, 2);
+    let told = diary.lock().unwrap().clone();
+    assert_eq!(told.iter().filter(|entry| *entry == "forgets").count(), 2, "at the choice and at the loss: {told:?}");
+
+    // Another choice follows again, or stays on the screen.
+    for (follows, expected) in [(true, Following::Tissue), (false, Following::Screen)] {
+        fixture.stepper.obey(Command::Aim(aim(-0.5, follows)));
+        assert_eq!(fixture.stepper.following(), expected);
+    }
+}
+
+#[test]
 fn a_held_focus_stays_and_the_policy_begins_anew_when_it_is_released() {
     let (mut fixture, diary) = diarist();
     let asked = fixture.step().asked;
-    let aim = |held| Command::Aim(Aim { place: PatchPlace::CENTRE, choices: 0, held });
+    let aim = |held| Command::Aim(Aim { place: PatchPlace::CENTRE, choices: 0, held, follows: false });
     fixture.stepper.obey(aim(true));
     for _ in 0..3 {
         let record = fixture.step();

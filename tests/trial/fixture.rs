@@ -267,6 +267,8 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         latency_p50_micros: 0,
         latency_p99_micros: 0,
         priority: parfocal_base::priority::Standing::Ordinary,
+        lock: parfocal_pipeline::control::FocusLock::default(),
+        following: parfocal_pipeline::control::Following::default(),
         // A circle of radius 100 in a picture of 512 x 272 cells.
         sight: Sighted {
             cells: (512, 272),

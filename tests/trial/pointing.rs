@@ -47,11 +47,11 @@ async fn inspect(trial: &mut Trial) {
 
 /// A touch of the picture, whose circle has its centre at (256, 136) and the radius 100.
 fn touch(session: impl Into<Option<SessionId>>, x: f64, y: f64) -> NewChoice {
-    NewChoice { session: session.into(), frame: 77, at: Some(Touch { x, y }) }
+    NewChoice { session: session.into(), frame: 77, at: Some(Touch { x, y }), follows: None }
 }
 
 fn centre(session: impl Into<Option<SessionId>>) -> NewChoice {
-    NewChoice { session: session.into(), frame: 78, at: None }
+    NewChoice { session: session.into(), frame: 78, at: None, follows: None }
 }
 
 fn aims(trial: &mut Trial) -> Vec<Aim> {
@@ -63,7 +63,7 @@ fn aims(trial: &mut Trial) -> Vec<Aim> {
 }
 
 const fn aim(place: PatchPlace, choices: u64) -> Aim {
-    Aim { place, choices, held: false }
+    Aim { place, choices, held: false, follows: false }
 }
 
 async fn kinds(trial: &Trial, session: SessionId) -> Vec<EventKind> {

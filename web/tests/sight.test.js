@@ -53,6 +53,8 @@ function status(tablet) {
     latency_p50_micros: null,
     latency_p99_micros: null,
     priority: { standing: "real-time", message: "ok" },
+    lock: null,
+    following: null,
     certificate_until: null,
     tablet: { presence: "present", away_seconds: null, slow: false, size: null, ...tablet },
   };

@@ -2071,6 +2071,11 @@ export interface components {
         NewChoice: {
             at?: components["schemas"]["Touch"] | null;
             /**
+             * @description Whether a place follows the tissue from now on, instead of staying on the screen; none leaves it as it is. Only
+             *     the operator decides it, and only outside sessions.
+             */
+            follows?: boolean | null;
+            /**
              * Format: int64
              * @description Number of the frame that was on screen.
              */

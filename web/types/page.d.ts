@@ -165,6 +165,9 @@ declare global {
       latency_p50_micros: number | null;
       latency_p99_micros: number | null;
       priority: { standing: string; message: string };
+      /** Null while a session is under way, as is whether the patch follows the tissue. */
+      lock: "held" | "searching" | "nothing" | null;
+      following: "screen" | "tissue" | "lost" | "left" | null;
       certificate_until: string | null;
     }
   }

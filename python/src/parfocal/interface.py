@@ -684,6 +684,10 @@ class NewChoice(TypedDict):
 
     at: NotRequired[Touch | None]
 
+    follows: NotRequired[bool | None]
+    """Whether a place follows the tissue from now on, instead of staying on the screen; none leaves it
+    as it is. Only the operator decides it, and only outside sessions."""
+
     frame: int
     """Number of the frame that was on screen."""
 
@@ -2133,10 +2137,10 @@ class OperatorRequests:
         """Adds a participant; one that exists already stays as it is. Answers with all codes."""
         return self._call("POST", "/api/operator/participants", body={"code": code})
 
-    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> None:
+    def patch(self, *, frame: int, at: Touch | None = None, follows: bool | None = None, session: SessionId | None = None) -> None:
         """Points the focus at a place in the picture, or back at the centre. In a session it is
         recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
-        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "follows": follows, "frame": frame, "session": session})
 
     def status(self) -> RecordingStatus:
         """The state of recording, and how long the disk will last."""
@@ -2327,10 +2331,10 @@ class SurgeonRequests:
         without being warned."""
         return self._call("POST", "/api/surgeon/holding", answer="nothing", body={"device": device, "holding": holding, "session": session})
 
-    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> None:
+    def patch(self, *, frame: int, at: Touch | None = None, follows: bool | None = None, session: SessionId | None = None) -> None:
         """Points the focus at a place in the picture, or back at the centre. In a session it is
         recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
-        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "follows": follows, "frame": frame, "session": session})
 
     def session(self) -> SurgeonView | None:
         """The session under way; null if there is none."""
@@ -2453,10 +2457,10 @@ class AsyncOperatorRequests:
         """Adds a participant; one that exists already stays as it is. Answers with all codes."""
         return self._call("POST", "/api/operator/participants", body={"code": code})
 
-    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> Awaitable[None]:
+    def patch(self, *, frame: int, at: Touch | None = None, follows: bool | None = None, session: SessionId | None = None) -> Awaitable[None]:
         """Points the focus at a place in the picture, or back at the centre. In a session it is
         recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
-        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+        return self._call("POST", "/api/operator/patch", answer="nothing", body={"at": at, "follows": follows, "frame": frame, "session": session})
 
     def status(self) -> Awaitable[RecordingStatus]:
         """The state of recording, and how long the disk will last."""
@@ -2647,10 +2651,10 @@ class AsyncSurgeonRequests:
         without being warned."""
         return self._call("POST", "/api/surgeon/holding", answer="nothing", body={"device": device, "holding": holding, "session": session})
 
-    def patch(self, *, frame: int, at: Touch | None = None, session: SessionId | None = None) -> Awaitable[None]:
+    def patch(self, *, frame: int, at: Touch | None = None, follows: bool | None = None, session: SessionId | None = None) -> Awaitable[None]:
         """Points the focus at a place in the picture, or back at the centre. In a session it is
         recorded, and only while a setting is inspected whose protocol lets the surgeon point."""
-        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "frame": frame, "session": session})
+        return self._call("POST", "/api/surgeon/patch", answer="nothing", body={"at": at, "follows": follows, "frame": frame, "session": session})
 
     def session(self) -> Awaitable[SurgeonView | None]:
         """The session under way; null if there is none."""

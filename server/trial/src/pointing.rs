@@ -55,6 +55,10 @@ pub struct NewChoice {
     /// Where to look; none for the centre of the bright circle.
     #[serde(default)]
     pub at: Option<Touch>,
+    /// Whether a place follows the tissue from now on, instead of staying on the screen; none leaves it as it is. Only
+    /// the operator decides it, and only outside sessions.
+    #[serde(default)]
+    pub follows: Option<bool>,
 }
 
 /// Where a picture was touched.

@@ -13,6 +13,7 @@ mod checks_card;
 mod course;
 pub mod driver;
 mod fits;
+mod focus_sign;
 mod full_disk;
 mod instruments;
 mod keyboard;

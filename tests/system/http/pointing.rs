@@ -60,6 +60,15 @@ async fn outside_sessions_both_tablets_and_the_operator_see_the_place_that_was_c
         assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
         assert!(said.contains("the place lies outside the picture"), "{said}");
     }
+    // Only the operator decides whether a place follows the tissue.
+    let follows = json!({"frame": 1, "at": {"x": centre.0 + 30.0, "y": centre.1}, "follows": true});
+    let (status, said) = point(&server, "surgeon", follows.clone()).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(said.contains("only the operator decides"), "{said}");
+    let (status, said) = point(&server, "operator", follows).await;
+    assert_eq!(status, StatusCode::NO_CONTENT, "{said}");
+    operator.watch_until(|header| header["choices"] == 4).await;
+
     let session = Session::of(&server);
     let (status, _) = session.ask("researcher", Method::POST, "/api/operator/patch", &json!({"frame": 1})).await;
     assert_eq!(status, StatusCode::FORBIDDEN);
@@ -91,6 +100,10 @@ async fn ring_and_corners_are_the_same_under_every_policy() {
         let notice = json!({"session": id, "frame": 1, "at": {"x": 250, "y": 130}});
         let (status, _) = session.ask("surgeon", Method::POST, "/api/surgeon/patch", &notice).await;
         assert_eq!(status, StatusCode::CONFLICT, "nobody points during a notice");
+        let follows = json!({"session": id, "frame": 1, "at": {"x": 250, "y": 130}, "follows": true});
+        let (status, said) = session.ask("operator", Method::POST, "/api/operator/patch", &follows).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+        assert!(said.contains("only outside sessions"), "{said}");
 
         session.surgeon("/api/surgeon/actions", act("acknowledge")).await;
         let begun = page.heard.len();

@@ -14,6 +14,7 @@ import { followChecks } from "./checks_card.js";
 import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
+import { focusSign } from "./focus_sign.js";
 import { LiveSpectra } from "./live_spectra.js";
 import { nowWords } from "./now.js";
 import { followRecording, forgetNotice } from "./recording_card.js";
@@ -47,6 +48,9 @@ const pointing = viewer.pointBy(
 );
 const focus = focusButtons(pointing, holdFocus);
 const spectra = new LiveSpectra(viewer);
+const sign = focusSign(followTissue);
+/** What came with the latest picture. @type {Stream.Header | null} */
+let latest = null;
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
@@ -86,6 +90,24 @@ async function holdFocus(hold) {
   }
 }
 
+/**
+ * Lets the place that was chosen follow the tissue, or stay on the screen.
+ *
+ * @param {boolean} follows
+ */
+async function followTissue(follows) {
+  if (!latest) return;
+  const { frame, patch, pointed } = latest;
+  const at = pointed ? { x: patch.x + patch.width / 2, y: patch.y + patch.height / 2 } : null;
+  try {
+    await post("/api/operator/patch", { frame, at, follows });
+    tellPointing(byId("pointing-trouble"), null);
+  } catch (error) {
+    if (status) sign.draw(status);
+    tellPointing(byId("pointing-trouble"), error);
+  }
+}
+
 function drawNow() {
   const facts = {
     view: session,
@@ -106,6 +128,7 @@ function followStatus(next) {
   status = next;
   if (changed) checkAgain();
   contact.certifiedUntil(status.certificate_until);
+  sign.draw(status);
   drawLamps(byId("devices"), status);
   drawDeviceWords(byId("device-words"), status);
   drawTheWarnings();
@@ -132,6 +155,7 @@ function redrawFocus() {
 
 /** @param {Stream.Frame} frame */
 function followFrame({ header, receivedAt }) {
+  latest = header;
   traces.add(header, receivedAt - header.age - header.travel);
   spectra.see(header);
   framesWithoutBelief = header.belief ? 0 : framesWithoutBelief + 1;

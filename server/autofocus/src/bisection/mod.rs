@@ -12,7 +12,7 @@
 //! second, and chooses where to go, as that of `parfocal`.
 
 mod filter;
-mod motion;
+pub(crate) mod motion;
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -15,6 +15,8 @@ use parfocal_imaging::Surroundings;
 const SIDE: usize = Surroundings::SIDE;
 /// Largest motion along each axis that is looked for, in pixels a frame.
 const FARTHEST: isize = 24;
+/// Pixels around a peak that belong to it.
+const PEAK_HALF: isize = 5;
 /// Columns of pixels that are transformed at once, two in each complex number.
 const PAIRS: usize = SIDE / 2;
 /// Frequencies down the picture that are kept, from 0 to the highest, and some zeros, so that a row of them fills whole
@@ -57,26 +59,56 @@ impl Spectrum {
     /// amplitude of each frequency and leaves its phase.
     #[must_use]
     pub fn motion_to(&self, now: &Self) -> (isize, isize) {
-        let map = correlation(&self.0, &now.0, &TABLES);
-        let value = |right: isize, down: isize| {
-            let row = down.rem_euclid(SIDE as isize) as usize;
-            if right < 0 { map.re[row][(right + REACH as isize) as usize] } else { map.im[row][right as usize] }
-        };
+        peak(&correlation(&self.0, &now.0, &TABLES))
+    }
 
-        let mut best = value(0, 0);
-        let mut motion = (0, 0);
-        for down in -FARTHEST..=FARTHEST {
-            for right in -FARTHEST..=FARTHEST {
-                let value = value(right, down);
-                if value > best {
-                    best = value;
-                    motion = (right, down);
-                }
-            }
+    /// The same motion, and how far its peak stands out: its height above the mean of the other motions, in their
+    /// standard deviations (the peak-to-sidelobe ratio, Bolme et al. 2010). 0 if nothing is seen.
+    #[must_use]
+    pub fn registered_to(&self, now: &Self) -> ((isize, isize), f32) {
+        let map = correlation(&self.0, &now.0, &TABLES);
+        let motion = peak(&map);
+
+        let mut sums = [0.0f64; 3];
+        for (right, down) in motions()
+            .filter(|(right, down)| (right - motion.0).abs() > PEAK_HALF || (down - motion.1).abs() > PEAK_HALF)
+        {
+            let value = f64::from(at(&map, right, down));
+            sums[0] += 1.0;
+            sums[1] += value;
+            sums[2] += value * value;
         }
 
-        motion
+        let mean = sums[1] / sums[0];
+        let deviation = (sums[2] / sums[0] - mean * mean).max(0.0).sqrt();
+        let height = f64::from(at(&map, motion.0, motion.1)) - mean;
+        (motion, if deviation > 0.0 { (height / deviation) as f32 } else { 0.0 })
     }
+}
+
+/// All motions that are looked for (right, down), row by row.
+fn motions() -> impl Iterator<Item = (isize, isize)> {
+    (-FARTHEST..=FARTHEST).flat_map(|down| (-FARTHEST..=FARTHEST).map(move |right| (right, down)))
+}
+
+/// The value of a correlation for a motion.
+fn at(map: &Rows<REACH>, right: isize, down: isize) -> f32 {
+    let row = down.rem_euclid(SIDE as isize) as usize;
+    if right < 0 { map.re[row][(right + REACH as isize) as usize] } else { map.im[row][right as usize] }
+}
+
+/// The motion with the highest value; none where all are equal.
+fn peak(map: &Rows<REACH>) -> (isize, isize) {
+    let mut best = at(map, 0, 0);
+    let mut motion = (0, 0);
+    for (right, down) in motions() {
+        let value = at(map, right, down);
+        if value > best {
+            best = value;
+            motion = (right, down);
+        }
+    }
+    motion
 }
 
 struct Tables {

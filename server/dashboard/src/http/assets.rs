@@ -94,6 +94,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "operator/device_words.js",
         "operator/devices.js",
         "operator/focus_card.js",
+        "operator/focus_sign.js",
         "operator/live_spectra.js",
         "operator/now.js",
         "operator/orders.js",

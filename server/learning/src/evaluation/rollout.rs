@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::scans::FocalTimeScan;
-use parfocal_autofocus::belief::best;
+use parfocal_autofocus::belief::{SURE, best, probability_near};
 use parfocal_autofocus::networks::BINS;
 use parfocal_autofocus::{Fault, Observation, Policy, STEP, mgm};
 use parfocal_base::FocalPower;
@@ -36,9 +36,6 @@ pub struct Claim {
     pub probability: f64,
 }
 
-/// A policy that claims at least this probability is sure.
-pub const SURE: f64 = 0.85;
-
 impl Claim {
     /// The claim of `belief`; `None` if it does not have [`BINS`] bins.
     fn of(belief: &[f32]) -> Option<Self> {
@@ -47,9 +44,7 @@ impl Claim {
         }
 
         let place = best(belief);
-        let is_near = |bin: usize| (bin as f64 / (BINS - 1) as f64 - place).abs() < IN_FOCUS;
-        let near = belief.iter().enumerate().filter(|(bin, _)| is_near(*bin));
-        Some(Self { place, probability: near.map(|(_, share)| f64::from(*share)).sum() })
+        Some(Self { place, probability: probability_near(belief, place) })
     }
 }
 

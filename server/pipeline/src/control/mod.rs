@@ -4,6 +4,7 @@
 mod advice;
 mod attribution;
 mod eye;
+mod lock;
 mod pilot;
 mod runner;
 mod slot;
@@ -14,6 +15,7 @@ mod tap;
 mod window;
 
 pub use eye::Eye;
+pub use lock::{FocusLock, LockWatch};
 pub use pilot::HoldReason;
 pub use runner::keep_policies_quiet;
 pub use slot::LatestSlot;
@@ -26,6 +28,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use parfocal_base::ids::SegmentId;
+use serde::Serialize;
 use tokio::sync::{mpsc, watch};
 
 use parfocal_base::FocalPower;
@@ -83,6 +86,8 @@ pub struct Aim {
     pub choices: u64,
     /// Whether the focus is held: the policy is not asked, and the lens stays where it is.
     pub held: bool,
+    /// Whether a place other than the centre follows the tissue. Never during a session.
+    pub follows: bool,
 }
 
 /// A frame with all results of its step. Goes to the imaging thread.
@@ -94,7 +99,7 @@ pub struct ControlledFrame {
     pub patch: PatchArea,
     /// Content area by which the patch was placed, if known.
     pub content_area: Option<ContentArea>,
-    /// Where people have chosen to look.
+    /// Where people have chosen to look; where the patch follows the tissue, its present place.
     pub aim: Aim,
     /// How often the policy has been made to forget what it saw: because the patch jumped, or the focus was held.
     pub jumps: u64,
@@ -140,6 +145,25 @@ pub struct ControlStatus {
     pub priority: Standing,
     /// What people can point at.
     pub sight: Sight,
+    /// What the policy's belief says of the focus.
+    pub lock: FocusLock,
+    /// Whether the patch follows the tissue.
+    pub following: Following,
+}
+
+/// Whether the patch stays on the screen or follows the tissue.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Following {
+    /// It stays where it is in the bright circle.
+    #[default]
+    Screen,
+    /// It is carried along with the tissue, as soon as people have pointed.
+    Tissue,
+    /// The tissue could not be recognised any more. The patch is at the centre.
+    Lost,
+    /// The tissue has left the bright circle. The patch is at the centre.
+    Left,
 }
 
 /// What a place in the picture means: the size of the picture, and the bright circle in it.

@@ -9,13 +9,14 @@ use std::{io, thread};
 use tokio::sync::{mpsc, watch};
 
 use super::eye::Eye;
+use super::lock::{FocusLock, LockWatch};
 use super::pilot::HoldReason;
 use super::runner::guarded;
 use super::source::Source;
 use super::stepper::Stepper;
 use super::tap::Tap;
 use super::window::LatencyWindow;
-use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot, Sight};
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Following, LatestSlot, Sight};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::priority::{self, Place, Standing};
@@ -140,6 +141,8 @@ struct Worker {
     /// Whether the policy caused the present hold, and since when the lens has been held for such a cause.
     held_since: Option<(bool, Moment)>,
     window: LatencyWindow,
+    locks: LockWatch,
+    lock: FocusLock,
     steps: u64,
     telemetry_dropped: u64,
     /// Scheduling priority of the loop's thread.
@@ -172,6 +175,8 @@ impl Worker {
             latency_p99_micros: 0,
             priority: Standing::Ordinary,
             sight: Sight::default(),
+            lock: FocusLock::default(),
+            following: Following::default(),
         };
 
         Self {
@@ -186,6 +191,8 @@ impl Worker {
             camera_fault: None,
             held_since: None,
             window: LatencyWindow::default(),
+            locks: LockWatch::default(),
+            lock: FocusLock::default(),
             steps: 0,
             telemetry_dropped: 0,
             priority: Standing::Ordinary,
@@ -230,6 +237,8 @@ impl Worker {
                 self.camera_fault = None;
                 self.steps += 1;
                 self.window.add(self.last_frame_at, controlled.record.latency_micros);
+                let power = controlled.record.measured.unwrap_or(controlled.record.asked);
+                self.lock = self.locks.see(controlled.belief.as_deref(), power, self.last_frame_at);
 
                 if self.outlets.telemetry.try_send(controlled.record.clone()).is_err() {
                     self.telemetry_dropped += 1;
@@ -244,6 +253,7 @@ impl Worker {
     fn wait_on(&mut self) {
         self.stepper.idle();
         if self.clock.now().since(self.last_frame_at) >= NO_FRAME {
+            self.lock = self.locks.see(None, self.stepper.focal_power(), self.clock.now());
             let message = format!("no frame comes from the camera; the lens is held: {}", self.source.health().message);
             self.camera_fault = Some(HoldReason::new(Hold::CameraFailed, &message));
         }
@@ -266,6 +276,8 @@ impl Worker {
                 || last.message != message
                 || last.policy.as_ref() != self.stepper.policy()
                 || last.sight != self.stepper.sight()
+                || last.lock != self.lock
+                || last.following != self.stepper.following()
         };
         if !changed && now.since(self.published_at) < STATUS_INTERVAL {
             return;
@@ -293,6 +305,8 @@ impl Worker {
             latency_p99_micros: figures.p99,
             priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
             sight: self.stepper.sight(),
+            lock: self.lock,
+            following: self.stepper.following(),
         }));
     }
 }

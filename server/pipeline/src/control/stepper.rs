@@ -8,17 +8,18 @@ use super::attribution::Attribution;
 use super::eye::{Eye, cells};
 use super::pilot::{HoldReason, Pilot};
 use super::runner::guarded;
-use super::{Aim, Command, ControlledFrame, Drive, Sight};
-use parfocal_autofocus::{Observation, Registry};
-use parfocal_base::FocalPower;
+use super::{Aim, Command, ControlledFrame, Drive, Following, Sight};
+use parfocal_autofocus::tracking::{Tracked, Tracker};
+use parfocal_autofocus::{FieldOfView, Observation, Registry};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
-use parfocal_devices::camera::Frame;
+use parfocal_base::{FocalPower, PatchPlace};
+use parfocal_devices::camera::{Frame, FrameImage};
 use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth};
-use parfocal_imaging::PatchArea;
+use parfocal_imaging::{PatchArea, place_of};
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation that runs faster than
 /// real time.
@@ -34,6 +35,9 @@ pub struct Stepper {
     segment: Option<SegmentId>,
     /// Where people have chosen to look.
     aim: Aim,
+    /// Carries the patch along with the tissue, while it does.
+    tracker: Option<Tracker>,
+    following: Following,
     /// How often the policy has been made to forget what it saw.
     jumps: u64,
     /// What people can point at.
@@ -63,6 +67,8 @@ impl Stepper {
             placed: false,
             segment: None,
             aim: Aim::default(),
+            tracker: None,
+            following: Following::Screen,
             jumps: 0,
             sight: Sight::default(),
             asked: start,
@@ -96,10 +102,51 @@ impl Stepper {
     /// compared with what it sees from now on.
     fn take_aim(&mut self, aim: Aim) {
         if aim.place != self.aim.place || (self.aim.held && !aim.held) {
-            self.pilot.forget();
-            self.jumps += 1;
+            self.forget();
         }
+
+        let follows = aim.follows && aim.place != PatchPlace::CENTRE;
+        self.tracker = follows.then(Tracker::default);
+        self.following = if aim.follows { Following::Tissue } else { Following::Screen };
         self.aim = aim;
+    }
+
+    fn forget(&mut self) {
+        self.pilot.forget();
+        self.jumps += 1;
+    }
+
+    /// Where the patch is that was at `patch` in the frame before, if it follows the tissue. It is the same tissue, so the
+    /// policy forgets nothing. Where the tissue is lost, the patch goes back to the centre.
+    fn follow(&mut self, image: &FrameImage, patch: PatchArea) -> Result<PatchArea, HoldReason> {
+        let Some(tracker) = &mut self.tracker else { return Ok(patch) };
+        let around = self.eye.look(image, patch, FieldOfView::Surroundings).surroundings;
+        let found = around.map_or(Tracked::Lost, |around| tracker.see(&around, (patch.x, patch.y)));
+
+        let content = self.sight.content_area;
+        let why = match found {
+            Tracked::Unsure => return Ok(patch),
+            Tracked::Lost => Following::Lost,
+            Tracked::At((x, y)) => {
+                let middle = (x as f64 + patch.width as f64 / 2.0, y as f64 + patch.height as f64 / 2.0);
+                if let Some(place) = place_of(middle, self.sight.cells, content.as_ref()) {
+                    let moved = self.eye.find(image, place, content.as_ref())?;
+                    // Outside the circle or at the picture's edge the patch would be moved.
+                    if (moved.x.cast_signed(), moved.y.cast_signed()) == (x, y) {
+                        self.aim.place = place;
+                        return Ok(moved);
+                    }
+                }
+                Following::Left
+            }
+        };
+
+        tracing::info!(?why, "the patch does not follow the tissue any more; it is back at the centre");
+        self.tracker = None;
+        self.following = why;
+        self.aim.place = PatchPlace::CENTRE;
+        self.forget();
+        self.eye.find(image, PatchPlace::CENTRE, content.as_ref())
     }
 
     fn change_driver(&mut self, drive: Drive) {
@@ -129,6 +176,7 @@ impl Stepper {
         self.sight.cells = cells(&frame.image);
         let content_area = self.sight.content_area;
         let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;
+        let patch = self.follow(&frame.image, patch)?;
 
         let asks = self.asks_policy(&frame);
         let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
@@ -251,6 +299,12 @@ impl Stepper {
     #[must_use]
     pub const fn sight(&self) -> Sight {
         self.sight
+    }
+
+    /// Whether the patch follows the tissue.
+    #[must_use]
+    pub const fn following(&self) -> Following {
+        self.following
     }
 
     /// The policy that drives the lens, if any.

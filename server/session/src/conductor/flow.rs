@@ -347,7 +347,7 @@ impl Shared {
 
         live.aimed_by_session = wanted.is_some();
         let (place, held) = wanted.unwrap_or_default();
-        self.look(live, Aim { place, held, ..live.aim });
+        self.look(live, Aim { place, held, follows: false, ..live.aim });
     }
 
     /// Sends `aim` to the control loop if it is another one.

@@ -10,6 +10,7 @@ use parfocal_pipeline::control::Aim;
 use parfocal_trial::account::Actor;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::pointing::{Choice, NewChoice, Touch};
+use parfocal_trial::role::Role;
 
 impl Conductor {
     /// Makes the policy look where `by` has chosen. In a session this is recorded, if its protocol allows it. The lens
@@ -19,12 +20,15 @@ impl Conductor {
     /// If `by` may not do this now, or the place lies outside the picture.
     pub async fn choose(&self, by: impl Into<Actor>, new: NewChoice) -> Result<(), ConductError> {
         let by = by.into();
+        if new.follows.is_some() {
+            may_follow(&by, new)?;
+        }
         let choice = self.shared.choice(new)?;
         match new.session {
             Some(session) => {
                 self.to_the_end(move |shared| async move { shared.choose(&by, session, choice).await }).await
             }
-            None => self.shared.choose_outside(&by, choice),
+            None => self.shared.choose_outside(&by, choice, new.follows),
         }
     }
 }
@@ -52,7 +56,7 @@ impl Shared {
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
             course.choose(by.clone(), choice, at, wall)?;
             let (place, held) = course.aim().unwrap_or_default();
-            let aim = Aim { place, held, choices: live.aim.choices + 1 };
+            let aim = Aim { place, held, choices: live.aim.choices + 1, follows: false };
             self.look(&mut live, aim);
         }
 
@@ -62,14 +66,28 @@ impl Shared {
         Ok(())
     }
 
-    fn choose_outside(&self, by: &Actor, choice: Choice) -> Result<(), ConductError> {
+    fn choose_outside(&self, by: &Actor, choice: Choice, follows: Option<bool>) -> Result<(), ConductError> {
         // Hold the lock until the command is sent. A session that begins in the meantime then sends its own after it.
         let mut live = self.live();
         permission::check(by.role, Request::PlacePatch, CurrentSession::of(live.shown_phase()))?;
-        let aim = Aim { place: choice.place, choices: live.aim.choices + 1, held: false };
+        let follows = follows.unwrap_or(live.aim.follows);
+        let aim = Aim { place: choice.place, choices: live.aim.choices + 1, held: false, follows };
         self.look(&mut live, aim);
         Ok(())
     }
+}
+
+/// Whether `by` may decide that the patch follows the tissue.
+fn may_follow(by: &Actor, new: NewChoice) -> Result<(), ConductError> {
+    if new.session.is_some() {
+        let why = "the patch follows the tissue only outside sessions: when it is lost depends on how sharp the picture \
+                   is, which would tell the policies apart";
+        return Err(ConductError::Invalid(why.to_owned()));
+    }
+    if by.role != Role::Operator {
+        return Err(ConductError::Invalid("only the operator decides whether the patch follows the tissue".to_owned()));
+    }
+    Ok(())
 }
 
 /// A length in cells, as it is recorded.

@@ -87,6 +87,7 @@ struct File {
     patch: Option<Spanned<String>>,
     #[serde(default)]
     patch_stays: Option<Spanned<bool>>,
+    patch_follows: Option<Spanned<String>>,
     #[serde(default)]
     hold: bool,
     #[serde(default)]
@@ -257,6 +258,21 @@ fn patch_rule(file: &File) -> Result<PatchRule, Fault> {
             }
         },
     };
+
+    if let Some(follows) = &file.patch_follows {
+        let message = match follows.get_ref().as_str() {
+            "screen" => None,
+            "tissue" => Some(
+                "cannot be \"tissue\": sessions are blinded, and when the tissue is lost depends on how sharp the \
+                 picture is, which would tell the policies apart; outside sessions the operator may choose it"
+                    .to_owned(),
+            ),
+            other => Some(format!("must be \"screen\", not \"{other}\"")),
+        };
+        if let Some(message) = message {
+            return Err(Fault::new(follows.span(), "patch_follows", message));
+        }
+    }
 
     match &file.patch_stays {
         Some(stays) if !free => Err(Fault::new(stays.span(), "patch_stays", "needs 'patch = \"surgeon\"'")),

@@ -230,6 +230,13 @@ mod tests {
         assert!(unknown.contains("key 'patch': must be \"centre\" or \"surgeon\", not \"center\""), "{unknown}");
         let alone = rule("patch_stays = true").unwrap_err();
         assert!(alone.contains("key 'patch_stays': needs 'patch = \"surgeon\"'"), "{alone}");
+
+        let surgeon = |follows: &str| rule(&format!("patch = \"surgeon\"\npatch_follows = \"{follows}\""));
+        assert_eq!(surgeon("screen"), rule("patch = \"surgeon\""));
+        let blinded = surgeon("tissue").unwrap_err();
+        assert!(blinded.contains("key 'patch_follows': cannot be \"tissue\": sessions are blinded"), "{blinded}");
+        let unknown = surgeon("vessel").unwrap_err();
+        assert!(unknown.contains("key 'patch_follows': must be \"screen\", not \"vessel\""), "{unknown}");
     }
 
     #[test]

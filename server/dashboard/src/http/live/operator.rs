@@ -1,7 +1,7 @@
 //! What the operator's and the researcher's pages get on `/live`: what the surgeon's page gets, and what the loop
 //! does. While a session is under way, even they do not get the policy, nor anything that gives it away: how the
 //! focal power moves (`fixed` never, hill-climbers by 0.05 each frame), how long a step takes, the metric (by its
-//! scale), and the belief, which few policies have.
+//! scale), the belief, which few policies have, and whether by it the patch is held in focus.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,7 +20,7 @@ use parfocal_base::priority::Standing;
 use parfocal_base::step::Hold;
 use parfocal_devices::camera::{CameraHealth, CameraOffer};
 use parfocal_devices::lens::LensHealth;
-use parfocal_pipeline::control::ControlStatus;
+use parfocal_pipeline::control::{ControlStatus, FocusLock, Following};
 use parfocal_pipeline::live::{EncodedFrame, Insight};
 use parfocal_trial::permission::{self, HoldTold};
 use parfocal_trial::view::OperatorView;
@@ -88,6 +88,10 @@ pub(super) struct OperatorStatus {
     latency_p99_micros: Option<u32>,
     /// Priority of the loop compared with other programs on the machine.
     priority: Priority,
+    /// What the policy's belief says of the focus; not while a session is under way.
+    lock: Option<FocusLock>,
+    /// Whether the patch follows the tissue; not while a session is under way.
+    following: Option<Following>,
     /// When the server's certificate expires. The page cannot reach the server after that.
     certificate_until: Option<Timestamp>,
     /// The surgeon's tablet.
@@ -122,6 +126,8 @@ impl OperatorStatus {
             latency_p50_micros: (!blinded).then_some(status.latency_p50_micros),
             latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
             priority: Priority { standing: status.priority, message: status.priority.words() },
+            lock: (!blinded).then_some(status.lock),
+            following: (!blinded).then_some(status.following),
             certificate_until,
             tablet,
         }
