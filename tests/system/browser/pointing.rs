@@ -54,7 +54,7 @@ async fn shows(browser: &Browser, mark: bool) {
 }
 
 /// Taps the surgeon's view until a ring stands there: on a busy machine the picture may be too old to be pointed at.
-async fn point(browser: &Browser) {
+pub async fn point(browser: &Browser) {
     is_live(browser).await;
     tap(browser).await;
     until("a ring", || async {

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 use fantoccini::key::Key;
+use parfocal_devices::camera::calibration;
+use parfocal_imaging::{BANDS, Calibration, Reference};
 use parfocal_recording::Recording;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -13,9 +15,11 @@ use super::accessible;
 use super::blinding;
 use super::driver::{Browser, Driver};
 use super::playback::{drawn, press, unblind, until_drawn};
+use super::pointing;
 use super::screenshots::{resize, shoot};
-use super::theatre::{Theatre, database};
+use super::theatre::{Theatre, database, operator};
 use super::wait::until;
+use crate::support::Server;
 
 /// A row of the table that the page copies; empty cells are none.
 type Row = BTreeMap<String, Option<f64>>;
@@ -127,9 +131,8 @@ async fn tab_to(page: &Browser, css: &str) {
 async fn recorded(theatre: &Theatre) {
     theatre.begin("S-46", "filmed").await;
     theatre.tap_notice(1).await;
-    until("a live picture", || async { theatre.surgeon.is(".viewer-stale", "hidden").await }).await;
+    pointing::point(&theatre.surgeon).await;
     until("the place", || async {
-        point(&theatre.surgeon, "#view", (0.6, 0.42), true).await;
         let pool = database(theatre.server.data.path()).await;
         let sql = "SELECT count(*) FROM events WHERE kind = 'patch-placed'";
         let placed: i64 = sqlx::query_scalar(sql).fetch_one(&pool).await.unwrap();
@@ -285,11 +288,12 @@ async fn by_keyboard(page: &Browser) {
 
 /// The corners stand where the telemetry says that the patch was.
 async fn corners(theatre: &Theatre, page: &Browser, recording: &Recording) {
-    let last = recording.rows().len() - 1;
+    // A step back from the end, where nothing may have been recorded any more.
     page.drag_slider("#player-scrub", &[1e9]).await;
-    let frames = i64::try_from(last).unwrap();
-    until_drawn(page, frames).await;
-    // The comment took its time after the place was chosen, and the last frames may be of after the abort.
+    page.click("#player-back").await;
+    let frames = i64::try_from(recording.rows().len()).unwrap();
+    until("the last frames", || async { drawn(page).await >= frames - 2 }).await;
+    // They may be of after the abort.
     while pixels(page, "#player-marks", CORNERS).await == 0 {
         let at = drawn(page).await;
         assert!(at > 0, "no frame has corners");
@@ -422,4 +426,51 @@ async fn live_by_keyboard(page: &Browser) {
     page.press(Key::Enter.into()).await;
     assert_eq!(page.attribute("#point-focus", "aria-pressed").await.as_deref(), Some("true"));
     assert_eq!(page.count("#spectra-places li").await, 1, "the places stay");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn with_a_white_reference_and_text_of_twice_the_size_reflectance_can_be_read() {
+    let folder = TempDir::new().unwrap();
+    let white = Calibration {
+        dark: Reference::PerBand([20.0; BANDS]),
+        white: Reference::PerBand([900.0; BANDS]),
+        ..Calibration::default()
+    };
+    calibration::save(folder.path(), &white, &[]).unwrap();
+    let file = folder.path().join("calibration.toml");
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "5", "--calibration", file.to_str().unwrap()]);
+
+    let driver = Driver::start();
+    let page = driver.browser_with_large_text().await;
+    page.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+    page.click("#point-spectrum").await;
+    for (index, place) in PLACES.into_iter().take(2).enumerate() {
+        point(&page, "#view", place, true).await;
+        measured(&page, index + 1).await;
+    }
+    page.sees("#spectra-unit", "Reflectance: 0 is as dark as the dark reference, 1 as bright as the white one.").await;
+    for row in copied(&page).await {
+        let expected = (row["counts"].unwrap() - 20.0) / 880.0;
+        assert!((row["reflectance"].unwrap() - expected).abs() < 1e-5, "{row:?}");
+    }
+    for (width, height) in TABLET {
+        resize(&page, width, height).await;
+        accessible::check_reach(&page, &format!("live spectra in large text at {width}x{height}")).await;
+    }
+    page.show("#spectra-plot").await;
+    shoot(&page, "spectra-6-large-text").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_camera_without_bands_offers_no_spectra() {
+    let folder = TempDir::new().unwrap();
+    let still = folder.path().join("still.png");
+    image::GrayImage::from_pixel(640, 480, image::Luma([90])).save(&still).unwrap();
+    let camera = format!("footage:{}", still.display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "5", "--camera", &camera]);
+    let driver = Driver::start();
+    let page = operator(&driver, &server).await;
+    until("a live picture", || async { page.is(".viewer-stale", "hidden").await }).await;
+    page.sees_no("#point-modes").await;
+    page.sees_no("#spectra").await;
 }

@@ -97,3 +97,15 @@ async fn places_that_cannot_be_measured_are_refused_in_words() {
         assert_eq!((status, &said["error"]), (StatusCode::UNPROCESSABLE_ENTITY, &words.into()));
     }
 }
+
+#[tokio::test]
+async fn colour_pictures_have_no_spectra() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = folder.path().join("still.png");
+    image::GrayImage::from_pixel(640, 480, image::Luma([90])).save(&still).unwrap();
+    let camera = format!("footage:{}", still.display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--camera", &camera]);
+    let (status, said) = post(&server, PATH, json!({"places": [{"x": 9, "y": 9}]})).await;
+    assert_eq!(status, StatusCode::CONFLICT);
+    assert_eq!(said["error"], "The camera delivers colour pictures, which have no spectra.");
+}

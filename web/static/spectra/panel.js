@@ -15,9 +15,14 @@ import { measuredWords, numberOf, unitWords, valueText, whereWords } from "./wor
 /** @typedef {import("./places.js").Place} Place */
 /** @typedef {import("./table.js").Measured} Measured */
 
-/** Height of the plot on the page, and the size of a saved one, in pixels. */
+/** Height and least width of the plot on the page, in pixels, with text of the usual size. */
 const HEIGHT = 300;
 const NARROWEST = 280;
+
+/** The size of a page's text unless its reader has chosen another, in pixels. */
+const USUAL_TEXT = 16;
+
+/** The size of a saved plot, in pixels. */
 const SAVED = { width: 720, height: 460 };
 
 export class Panel {
@@ -140,6 +145,7 @@ export class Panel {
     setText(byId("spectra-radius-value"), `${this.places.radius} samples`);
     setText(byId("spectra-unit"), measured.length > 0 ? unitWords(unit) : "");
     setText(byId("spectra-frame"), measured.length > 0 ? `frame ${this.#shown?.frame}` : "");
+    this.#plot.hidden = measured.length === 0;
     this.#drawPlot();
     this.#list(measured);
     this.#tabulate(measured);
@@ -152,9 +158,11 @@ export class Panel {
 
   #drawPlot() {
     const measured = this.#measured;
+    const enlarged = Number.parseFloat(getComputedStyle(document.documentElement).fontSize) / USUAL_TEXT;
     const width = Math.max(this.#plot.clientWidth, NARROWEST);
+    const height = HEIGHT * Math.sqrt(enlarged);
     this.#plot.replaceChildren(
-      drawPlot(measured, unitOf(measured), { width, height: HEIGHT, paper: PAPERS.page }),
+      drawPlot(measured, unitOf(measured), { width, height, enlarged, paper: PAPERS.page }),
     );
   }
 

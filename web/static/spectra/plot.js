@@ -10,7 +10,10 @@ import { numberOf, plotWords, whereWords } from "./words.js";
 /** @typedef {import("./table.js").Measured} Measured */
 /** @typedef {import("./table.js").Unit} Unit */
 
-/** Space for the texts around the plot, in pixels. */
+/** The text's size, in pixels. Where it is enlarged, everything in the plot is. */
+const TEXT = 13;
+
+/** Space for the texts around the plot. */
 const EDGE = { left: 58, right: 14, top: 30, bottom: 46 };
 
 /** The height of a line of the key. */
@@ -41,9 +44,12 @@ export const PAPERS = {
  * @param {number} options.width pixels
  * @param {number} options.height pixels
  * @param {Paper} options.paper
+ * @param {number} [options.enlarged] how many times larger than usual the text is
  * @param {string} [options.caption] with a caption, the plot has a key that names the places
  */
-export function drawPlot(measured, unit, { width, height, paper, caption }) {
+export function drawPlot(measured, unit, { width: full, height: whole, paper, enlarged = 1, caption }) {
+  const width = full / enlarged;
+  const height = whole / enlarged;
   const keyHeight = caption === undefined ? 0 : (measured.length + 1) * KEY_LINE + 8;
   const box = {
     left: EDGE.left,
@@ -56,12 +62,12 @@ export function drawPlot(measured, unit, { width, height, paper, caption }) {
   const svg = shape("svg", {
     xmlns: "http://www.w3.org/2000/svg",
     viewBox: `0 0 ${width} ${height}`,
-    width,
-    height,
+    width: full,
+    height: whole,
     role: "img",
     "aria-label": plotWords(measured, unit),
     "font-family": "system-ui, sans-serif",
-    "font-size": 13,
+    "font-size": TEXT,
   });
   if (paper.ground !== "none") svg.append(shape("rect", { width, height, fill: paper.ground }));
   svg.append(
@@ -112,7 +118,7 @@ function axes(scale, unit, { left, right, top, bottom }, { text, grid }) {
  */
 function spreadArea({ place, spectrum }, unit, scale, paper) {
   const fill = LOOKS[place.look]?.[paper.look] ?? paper.text;
-  return shape("path", { class: "spread", d: scale.area(spectrum, unit), fill, "fill-opacity": 0.2 });
+  return shape("path", { class: "spread", d: scale.area(spectrum, unit), fill, "fill-opacity": 0.15 });
 }
 
 /**
