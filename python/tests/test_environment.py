@@ -163,6 +163,8 @@ def test_a_program_that_ends_is_told_with_a_sentence(env: FocusEnv) -> None:
 def test_what_the_program_refuses_is_its_own_sentence(tmp_path: Path) -> None:
     with pytest.raises(parfocal.NoProgram, match=r"did not start: .*there is no folder"):
         FocusEnv(tmp_path / "nowhere")
+    with pytest.raises(parfocal.NoProgram, match=r"did not start: .*Mono9"):
+        FocusEnv(raw="Mono9")
     stranger = tmp_path / "parfocal"
     stranger.write_text("#!/bin/sh\necho hello\n")
     stranger.chmod(0o755)
