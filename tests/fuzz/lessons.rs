@@ -37,7 +37,6 @@ thread_local! {
 pub fn network_weights(bytes: &[u8]) {
     NETWORK.with(|network| {
         let _ = weights::load(network, bytes);
-        let _ = weights::load_widening(network, bytes, "layer.weight", &[2]);
     });
 }
 

@@ -82,7 +82,7 @@ class MetricLearned(nn.Module):
 
 class Belief(nn.Module):
     """Inputs `[N, T, 177]`, as `server/autofocus/src/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
-    optimum's bins. Older weights took the first 175 or 87 of them alone.
+    optimum's bins.
     """
 
     def __init__(self, inputs, units, bins):

@@ -306,16 +306,6 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
 
-/// Fills `store`, which holds a belief network, from safetensors `bytes`. Also accepts weights of a network that saw
-/// only the patch, or that did not get the blur rate. Its new inputs get the weight 0, so the network computes the same
-/// as before.
-///
-/// # Errors
-/// If the bytes are damaged or belong to another network.
-pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
-    weights::load_widening(store, bytes, "memory.weight_ih_l0", &[NEAR_INPUT, SEEN_INPUT])
-}
-
 /// The belief tracker as a policy. Use one instance per scan.
 pub struct BeliefTracker {
     network: BeliefNetwork,
@@ -333,7 +323,7 @@ impl BeliefTracker {
     pub fn new(bytes: &[u8]) -> Result<Self, WeightsError> {
         let store = nn::VarStore::new(Device::Cpu);
         let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
-        load(&store, bytes)?;
+        weights::load(&store, bytes)?;
         let memory = network.blank(1, Device::Cpu);
         Ok(Self { network, memory, trace: Trace::default(), _store: store })
     }
@@ -484,25 +474,6 @@ mod tests {
         assert_eq!(known[..SEEN_INPUT], unknown[..SEEN_INPUT]);
         assert!((known[SEEN_INPUT] - 1.0).abs() < f32::EPSILON);
         assert!((known[SEEN_INPUT + 1] - std::f32::consts::LN_2).abs() < 1e-6);
-    }
-
-    #[test]
-    fn weights_that_were_given_less_compute_what_they_did() {
-        for width in [NEAR_INPUT, SEEN_INPUT] {
-            let [old, new] = [width, BELIEF_INPUT].map(|inputs| {
-                let store = nn::VarStore::new(Device::Cpu);
-                let network = BeliefNetwork::new(&store.root(), inputs);
-                (store, network)
-            });
-            load(&new.0, &weights::save(&old.0, "a test").unwrap()).unwrap();
-
-            let inputs = Tensor::randn([1, 4, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
-            let narrow = inputs.narrow(2, 0, width as i64);
-            let blank = old.1.blank(1, Device::Cpu);
-            let expected = old.1.forward(&narrow, &blank).0;
-            let found = new.1.forward(&inputs, &blank).0;
-            assert!(found.allclose(&expected, 1e-5, 1e-6, false));
-        }
     }
 
     #[test]

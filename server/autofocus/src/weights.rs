@@ -21,15 +21,6 @@ pub enum WeightsError {
 /// # Errors
 /// If the bytes are damaged, or hold a different set of tensors than the network has.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
-    load_widening(store, bytes, "", &[])
-}
-
-/// Like [`load`], for a network that has more inputs now than when its weights were trained. If the matrix `widened`
-/// has one of `widths` columns in the file, they become the network's first columns, and its other columns become 0.
-///
-/// # Errors
-/// If [`load`] would fail, except for such a width.
-pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: &[usize]) -> Result<(), WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
 
     let variables = store.variables();
@@ -42,9 +33,7 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: 
 
         let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
         let size = variable.size();
-        let known = |width: &usize| shape == [size[0], i64::try_from(*width).unwrap_or(0)];
-        let narrow = name == widened && size.len() == 2 && widths.iter().any(known);
-        if view.dtype() != Dtype::F32 || (shape != size && !narrow) {
+        if view.dtype() != Dtype::F32 || shape != size {
             return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {size:?}")));
         }
 
@@ -54,14 +43,7 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: 
             return Err(WeightsError::Damaged(format!("tensor '{name}' contains values that are not finite")));
         }
 
-        tch::no_grad(|| {
-            if narrow {
-                let _ = variable.zero_();
-                variable.narrow(1, 0, shape[1]).copy_(&tensor);
-            } else {
-                variable.copy_(&tensor);
-            }
-        });
+        tch::no_grad(|| variable.copy_(&tensor));
     }
 
     Ok(())
@@ -119,23 +101,6 @@ mod tests {
         let to = store(3);
         load(&to, &save(&from, "a test").unwrap()).unwrap();
         assert_eq!(from.variables()["layer.weight"], to.variables()["layer.weight"]);
-    }
-
-    #[test]
-    fn narrow_weights_become_the_first_columns_of_wide_ones() {
-        let narrow = store(3);
-        let wide = store(5);
-        let bytes = save(&narrow, "a test").unwrap();
-
-        load_widening(&wide, &bytes, "layer.weight", &[3]).unwrap();
-        let [from, to] = [&narrow, &wide].map(|store| store.variables()["layer.weight"].shallow_clone());
-        assert_eq!(to.narrow(1, 0, 3), from);
-        assert_eq!(floats(&to.narrow(1, 3, 2)), [0.0; 4]);
-        // Weights of another width, or of another matrix, do not fit.
-        for (name, columns) in [("layer.weight", 4), ("layer.bias", 3)] {
-            let refused = load_widening(&store(5), &bytes, name, &[columns]).unwrap_err();
-            assert!(matches!(refused, WeightsError::Mismatch(_)), "{refused}");
-        }
     }
 
     #[test]

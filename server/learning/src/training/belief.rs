@@ -13,9 +13,9 @@ use super::run::checkpoint::{Checkpoint, CheckpointError};
 use super::trainer::Trainer;
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
-use parfocal_autofocus::belief::{self, Trace, spread_over_bins};
+use parfocal_autofocus::belief::{Trace, spread_over_bins};
 use parfocal_autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
-use parfocal_autofocus::weights::WeightsError;
+use parfocal_autofocus::weights::{self, WeightsError};
 use parfocal_base::BlurRate;
 use parfocal_devices::simulation::normal::standard_normal;
 use parfocal_imaging::{View, WIDER};
@@ -156,7 +156,7 @@ impl Trainer for BeliefTrainer {
     }
 
     fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
-        belief::load(&self.store, bytes)
+        weights::load(&self.store, bytes)
     }
 
     fn update(&mut self) -> f64 {
