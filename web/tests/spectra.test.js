@@ -116,13 +116,8 @@ test("one request at a time; what is wanted sooner is asked sooner", async () =>
   /** @type {number[]} */
   const asked = [];
   let answer = () => {};
-  const asking = new Asking({
-    ask: () => {
-      asked.push(now);
-      return new Promise((done) => {
-        answer = () => done();
-      });
-    },
+  /** @type {import("../static/spectra/asking.js").Time} */
+  const time = {
     later: (run, ms) => {
       const timer = { at: now + ms, run };
       timers.push(timer);
@@ -131,7 +126,13 @@ test("one request at a time; what is wanted sooner is asked sooner", async () =>
       };
     },
     now: () => now,
-  });
+  };
+  const asking = new Asking(() => {
+    asked.push(now);
+    return new Promise((done) => {
+      answer = () => done();
+    });
+  }, time);
   const pass = (/** @type {number} */ ms) => {
     now += ms;
     const due = timers.filter(({ at }) => at <= now);

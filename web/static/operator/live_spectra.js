@@ -18,14 +18,7 @@ export class LiveSpectra {
   #panel = new Panel(() => this.#change());
   #cross = new Cross();
   #redraw;
-  #asking = new Asking({
-    ask: () => this.#ask(),
-    later: (run, ms) => {
-      const timer = setTimeout(run, ms);
-      return () => clearTimeout(timer);
-    },
-    now: () => performance.now(),
-  });
+  #asking = new Asking(() => this.#ask());
   /** Whether spectra may be seen: outside sessions. */
   #allowed = false;
   /** Whether taps set places. */

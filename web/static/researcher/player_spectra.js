@@ -43,14 +43,7 @@ export class PlayerSpectra {
   #marks = contextOf(byId("player-marks", HTMLCanvasElement));
   #cross = new Cross();
   #panel = new Panel(() => this.#change());
-  #asking = new Asking({
-    ask: () => this.#ask(),
-    later: (run, ms) => {
-      const timer = setTimeout(run, ms);
-      return () => clearTimeout(timer);
-    },
-    now: () => performance.now(),
-  });
+  #asking = new Asking(() => this.#ask());
   /** @type {Shown | null} */
   #shown = null;
 

@@ -1,22 +1,35 @@
 // Asks for something again and again, one request at a time. Without the DOM.
 
 /**
- * @typedef {object} Parts
- * @property {() => Promise<void>} ask asks, and deals with the answer; never rejects
+ * @typedef {object} Time
  * @property {(run: () => void, ms: number) => () => void} later runs `run` after a while, unless the result is called
  * @property {() => number} now milliseconds
  */
 
+/** The browser's own time. @type {Time} */
+const TIME = {
+  later: (run, ms) => {
+    const timer = setTimeout(run, ms);
+    return () => clearTimeout(timer);
+  },
+  now: () => performance.now(),
+};
+
 export class Asking {
-  #parts;
+  #what;
+  #time;
   #asking = false;
   /** When to ask next; null if there is nothing to ask. @type {number | null} */
   #due = null;
   #forget = () => {};
 
-  /** @param {Parts} parts */
-  constructor(parts) {
-    this.#parts = parts;
+  /**
+   * @param {() => Promise<void>} what asks, and deals with the answer; never rejects
+   * @param {Time} [time]
+   */
+  constructor(what, time = TIME) {
+    this.#what = what;
+    this.#time = time;
   }
 
   /**
@@ -25,7 +38,7 @@ export class Asking {
    * @param {number} [ms]
    */
   want(ms = 0) {
-    const due = this.#parts.now() + ms;
+    const due = this.#time.now() + ms;
     if (this.#due !== null && this.#due <= due) return;
     this.#due = due;
     if (!this.#asking) this.#wait();
@@ -40,15 +53,15 @@ export class Asking {
   #wait() {
     this.#forget();
     if (this.#due === null) return;
-    const ms = this.#due - this.#parts.now();
+    const ms = this.#due - this.#time.now();
     if (ms <= 0) this.#ask();
-    else this.#forget = this.#parts.later(() => this.#ask(), ms);
+    else this.#forget = this.#time.later(() => this.#ask(), ms);
   }
 
   async #ask() {
     this.#due = null;
     this.#asking = true;
-    await this.#parts.ask();
+    await this.#what();
     this.#asking = false;
     this.#wait();
   }
