@@ -555,9 +555,6 @@ class Interval(TypedDict):
 Kind = Literal["mosaic", "view"]
 """What a recording is made of."""
 
-Language = Literal["en", "de", "fr", "es"]
-"""A language that surgeons can read."""
-
 class LivePlace(TypedDict):
     """A circle in the camera's mosaic."""
 
@@ -779,9 +776,6 @@ class OperatorView(TypedDict):
 
     holding: bool
     """Whether the protocol lets the surgeon hold the focus."""
-
-    language: Language
-    """Language of all that the surgeon reads."""
 
     may_pause: bool
     """Whether the surgeon may pause the session."""
@@ -1740,9 +1734,6 @@ class SurgeonView(TypedDict):
 
     holding: bool
     """Whether the protocol lets the surgeon hold the focus."""
-
-    language: Language
-    """Language of all that the surgeon reads."""
 
     may_pause: bool
     """Whether the surgeon may pause the session."""

@@ -4,11 +4,10 @@
 use super::answers;
 use super::protocol::Protocol;
 use super::question::AnswerValue;
-use super::refusal::{Refusal, RefusalKind};
+use super::refusal::Refusal;
 use super::remark::{CommentContent, NewAnswer};
 use super::session::SessionState;
 use parfocal_base::ids::SegmentId;
-use parfocal_language::Message;
 
 /// Checks the content of a comment.
 ///
@@ -17,7 +16,7 @@ use parfocal_language::Message;
 pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
     let (CommentContent::Text(text) | CommentContent::Quick(text)) = said else { return Ok(()) };
     if text.trim().is_empty() {
-        return Err(Refusal::Said(RefusalKind::Invalid, Message::new("refused-empty")));
+        return Err(Refusal::Invalid("the comment is empty".to_owned()));
     }
     check_length(text)
 }
@@ -29,7 +28,7 @@ pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
 /// If the comment is spoken and the session does not ask for voice.
 pub fn check_spoken(said: &CommentContent, voice: bool) -> Result<(), Refusal> {
     if *said == CommentContent::Voice && !voice {
-        return Err(Refusal::not_now("refused-no-voice"));
+        return Err(Refusal::conflict("this trial does not record voice; type the comment"));
     }
     Ok(())
 }
@@ -42,13 +41,13 @@ pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) 
     let plan = state.plan();
     let has_segment = new.segment.is_none_or(|segment| plan.position(segment).is_some());
     let question = protocol.question(&new.question, new.segment.is_some()).filter(|_| has_segment);
-    let question = question.ok_or(Refusal::unknown_question())?;
+    let question = question.ok_or(Refusal::UnknownQuestion)?;
 
     if !state.takes_answers(new.segment) {
-        return Err(Refusal::not_now("refused-question-not-asked"));
+        return Err(Refusal::conflict("this question has not been asked yet"));
     }
     let fits = answers::check(question, &new.value, plan.segments.len());
-    fits.map_err(Refusal::from)
+    fits.map_err(|misfit| Refusal::Invalid(misfit.to_string()))
 }
 
 /// Checks the answer `new` in a session of `segments` whose questions are unknown, because this version cannot read the
@@ -61,13 +60,13 @@ pub fn check_unasked(new: &NewAnswer, segments: &[SegmentId]) -> Result<(), Refu
         check_length(text)?;
     }
     match new.segment {
-        Some(segment) if !segments.contains(&segment) => Err(Refusal::unknown_segment()),
+        Some(segment) if !segments.contains(&segment) => Err(Refusal::UnknownSegment),
         _ => Ok(()),
     }
 }
 
 fn check_length(text: &str) -> Result<(), Refusal> {
-    answers::check_length(text).map_err(Refusal::from)
+    answers::check_length(text).map_err(|misfit| Refusal::Invalid(misfit.to_string()))
 }
 
 #[cfg(test)]
@@ -78,14 +77,14 @@ mod tests {
     fn voice_is_taken_only_where_the_protocol_asks_for_it() {
         assert_eq!(check_spoken(&CommentContent::Voice, true), Ok(()));
         assert_eq!(check_spoken(&CommentContent::Mark, false), Ok(()));
-        assert!(matches!(check_spoken(&CommentContent::Voice, false), Err(Refusal::Said(RefusalKind::Conflict, _))));
+        assert!(matches!(check_spoken(&CommentContent::Voice, false), Err(Refusal::Conflict(_))));
     }
 
     #[test]
     fn a_comment_must_say_something_and_no_more_than_fits() {
         assert_eq!(check_comment(&CommentContent::Text("sharp".to_owned())), Ok(()));
         let refused = |text: &str| check_comment(&CommentContent::Text(text.to_owned())).unwrap_err();
-        assert_eq!(refused(" \n").to_string(), "the comment is empty");
-        assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Said(RefusalKind::Invalid, _)));
+        assert_eq!(refused(" \n"), Refusal::Invalid("the comment is empty".to_owned()));
+        assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Invalid(_)));
     }
 }

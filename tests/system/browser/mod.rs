@@ -18,7 +18,6 @@ mod full_disk;
 mod instruments;
 mod keyboard;
 mod killed;
-mod languages;
 mod large_text;
 mod lens_troubles;
 mod offline;

@@ -1,7 +1,5 @@
 // Records from the microphone. The message of each error says what to do.
 
-import { say } from "../shared/language.js";
-
 /** Formats of the recording, in order of preference. The server accepts no others. */
 const TYPES = ["audio/webm;codecs=opus", "audio/mp4", "audio/ogg;codecs=opus"];
 
@@ -21,12 +19,12 @@ export class MicrophoneTrouble extends Error {}
  */
 export function whyNoMicrophone(allowed) {
   if (!globalThis.isSecureContext) {
-    return say("microphone-unencrypted");
+    return "Voice needs an encrypted connection (https), which this page does not have. Type your comments.";
   }
   if (!navigator.mediaDevices?.getUserMedia || typeof MediaRecorder === "undefined" || !recordedType()) {
-    return say("microphone-unable");
+    return "This browser cannot record voice. Type your comments.";
   }
-  return allowed ? "" : say("microphone-reload");
+  return allowed ? "" : "Load this page again to use the microphone. Until then, type your comments.";
 }
 
 function recordedType() {
@@ -124,7 +122,7 @@ export async function record(heard) {
     };
   } catch {
     closeMicrophone();
-    throw new MicrophoneTrouble(say("microphone-no-start"));
+    throw new MicrophoneTrouble("This browser could not begin to record. Type your comment.");
   }
 }
 
@@ -145,15 +143,15 @@ export function refusalWords(name) {
   switch (name) {
     case "NotAllowedError":
     case "SecurityError":
-      return say("microphone-blocked");
+      return "The microphone is blocked for this page. Allow it in the browser’s settings, or type your comment.";
     case "NotFoundError":
     case "OverconstrainedError":
-      return say("microphone-none");
+      return "This device has no microphone. Connect one, or type your comment.";
     case "NotReadableError":
     case "AbortError":
-      return say("microphone-busy");
+      return "Another program uses the microphone. Close it, or type your comment.";
     default:
-      return say("microphone-failed-type");
+      return "The microphone could not be opened. Type your comment.";
   }
 }
 

@@ -1,7 +1,6 @@
 // The form of a ranking: each setting can be dragged, moved by arrows, or put on top by one tap.
 
 import { make, setText } from "../shared/dom.js";
-import { say } from "../shared/language.js";
 import { ordinal } from "./questions.js";
 
 /** @typedef {import("./question_form.js").Drawn} Drawn */
@@ -31,8 +30,12 @@ export function placeAt(middles, from, y) {
 export function drawRanking(answer, heading, changed) {
   const list = make("ol", { className: "ranking" });
   const heard = make("p", { className: "visually-hidden", "aria-live": "polite" });
-  const confirm = make("button", { type: "button", className: "confirm primary" }, say("order-right"));
-  const about = make("p", { className: "about" }, say("order-help"));
+  const confirm = make("button", { type: "button", className: "confirm primary" }, "This order is right");
+  const about = make(
+    "p",
+    { className: "about" },
+    "Drag a setting by its handle, or use the arrows; ⤒ puts it first. The order below is drawn by lot.",
+  );
   confirm.onclick = () => {
     answer.confirm();
     changed();
@@ -46,7 +49,7 @@ export function drawRanking(answer, heading, changed) {
   function move(from, to) {
     const setting = answer.move(from, to);
     changed();
-    setText(heard, say("order-moved", { setting, place: to + 1, places: answer.order.length }));
+    setText(heard, `Setting ${setting} is now in place ${to + 1} of ${answer.order.length}`);
   }
 
   /**
@@ -92,8 +95,7 @@ export function drawRanking(answer, heading, changed) {
    * @param {number} index
    */
   function line(setting, index) {
-    const number = ordinal(index + 1);
-    const place = index === 0 ? say("place-best", { place: number }) : number;
+    const place = `${ordinal(index + 1)}${index === 0 ? ", best" : ""}`;
     const handle = make(
       "span",
       { className: "place" },
@@ -108,12 +110,12 @@ export function drawRanking(answer, heading, changed) {
       make(
         "span",
         { className: "what" },
-        say("setting-number", { setting }),
-        words !== "" && make("span", { className: "said", dir: "auto" }, words),
+        `Setting ${setting}`,
+        words !== "" && make("span", { className: "said" }, words),
       ),
-      mover("up", say("move-up", { setting }), "↑", index, index - 1),
-      mover("down", say("move-down", { setting }), "↓", index, index + 1),
-      mover("top", say("move-first", { setting }), "⤒", index, 0),
+      mover("up", `Move setting ${setting} up`, "↑", index, index - 1),
+      mover("down", `Move setting ${setting} down`, "↓", index, index + 1),
+      mover("top", `Put setting ${setting} first`, "⤒", index, 0),
     );
     drag(item, handle, index);
     return item;

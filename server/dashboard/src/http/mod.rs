@@ -46,7 +46,6 @@ mod surgeon;
 mod tablet_trial;
 mod tablet_trials;
 mod tablets;
-mod tongue;
 mod trust;
 mod voice;
 

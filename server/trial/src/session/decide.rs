@@ -11,13 +11,12 @@ use crate::phase::Phase;
 use crate::pointing::{Choice, Touch};
 use crate::question::Question;
 use crate::reason;
-use crate::refusal::{Refusal, RefusalKind};
+use crate::refusal::Refusal;
 use crate::role::Role;
 use crate::tablet::{Presence, WhenAway};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 use parfocal_base::{FocalPower, PatchPlace};
-use parfocal_language::Message;
 
 /// The events that `action` by `by` causes at `now`. Empty if the action was done before (a double click, a stale tab).
 ///
@@ -82,11 +81,11 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
         return Err(Refusal::only("the surgeon or the operator"));
     }
     if !state.plan.patch.is_free() {
-        return Err(Refusal::not_now("refused-centre"));
+        return Err(Refusal::conflict("the protocol keeps the focus on the centre of the view"));
     }
 
     let segment = state.segment().filter(|_| state.running());
-    let segment = segment.ok_or_else(|| not_inspecting(state, "refused-point-not-looking"))?;
+    let segment = segment.ok_or_else(|| not_inspecting(state, "the focus is pointed"))?;
     Ok(match choice.at {
         Some(Touch { x, y }) => {
             vec![EventKind::PatchPlaced { segment, frame: choice.frame, x, y, place: choice.place }]
@@ -96,9 +95,13 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
     })
 }
 
-/// The refusal of something that is done only while a setting is inspected. `said` names its message.
-fn not_inspecting(state: &SessionState, said: &'static str) -> Refusal {
-    if state.paused.is_some() { Refusal::not_now("refused-paused") } else { Refusal::not_now(said) }
+/// The refusal of something that is done only while a setting is inspected.
+fn not_inspecting(state: &SessionState, what: &str) -> Refusal {
+    if state.paused.is_some() {
+        Refusal::conflict("the session is paused")
+    } else {
+        Refusal::Conflict(format!("{what} only while a setting is inspected"))
+    }
 }
 
 /// The events that are caused by what the surgeon's tablets report: that none shows the page any longer, or one does
@@ -171,15 +174,15 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
 /// # Errors
 /// If the session has no such segment or has not reached it, or was aborted.
 fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
-    let position = state.plan.position(segment).ok_or(Refusal::unknown_segment())?;
+    let position = state.plan.position(segment).ok_or(Refusal::UnknownSegment)?;
     if position < state.done {
         return Ok(None);
     }
     if state.phase == Phase::Aborted {
-        return Err(Refusal::not_now("refused-aborted"));
+        return Err(Refusal::conflict("the session was aborted"));
     }
     if position > state.done || state.segment().is_none() {
-        return Err(Refusal::not_now("refused-not-reached"));
+        return Err(Refusal::conflict("this setting has not been reached"));
     }
     Ok(Some(state.phase))
 }
@@ -208,7 +211,7 @@ fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind
 
 fn finish_segment(state: &SessionState, segment: SegmentId, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match current(state, segment)? {
-        Some(Phase::Notice) => Err(Refusal::not_now("refused-not-begun")),
+        Some(Phase::Notice) => Err(Refusal::conflict("this setting has not begun")),
         Some(Phase::Inspecting) => {
             going_on(state)?;
             Ok(finish(state, segment, state.inspected(now)))
@@ -224,7 +227,7 @@ fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<Even
             answered(state, Some(segment), &state.plan.after_segment)?;
             Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
         }
-        Some(_) => Err(Refusal::not_now("refused-not-asked")),
+        Some(_) => Err(Refusal::conflict("the questions on this setting have not been asked")),
         None => Ok(Vec::new()),
     }
 }
@@ -237,7 +240,7 @@ fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
             answered(state, None, &state.plan.closing)?;
             Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
         }
-        _ => Err(Refusal::not_now("refused-closing-not-asked")),
+        _ => Err(Refusal::conflict("the closing questions have not been asked")),
     }
 }
 
@@ -256,8 +259,8 @@ fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
 
 fn pause(state: &SessionState, by: Role, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match state.phase {
-        Phase::Ready => return Err(Refusal::not_now("refused-not-started")),
-        Phase::Completed | Phase::Aborted => return Err(Refusal::not_now("refused-ended")),
+        Phase::Ready => return Err(Refusal::conflict("the session has not started")),
+        Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
         _ => {}
     }
 
@@ -283,13 +286,13 @@ fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<Eve
 
 fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
     if !state.plan.hold {
-        return Err(Refusal::not_now("refused-no-hold"));
+        return Err(Refusal::conflict("the protocol does not let anybody hold the focus"));
     }
     match current(state, segment)? {
         Some(_) if state.running() => {
             Ok(if state.pointed.held { Vec::new() } else { vec![EventKind::FocusHeld { segment }] })
         }
-        Some(_) => Err(not_inspecting(state, "refused-hold-not-looking")),
+        Some(_) => Err(not_inspecting(state, "the focus is held")),
         None => Ok(Vec::new()),
     }
 }
@@ -332,14 +335,11 @@ fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal
 fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Question]) -> Result<(), Refusal> {
     let whole = |question: &Question| state.answer(segment, &question.id).is_some_and(is_whole);
     let open = questions.iter().find(|question| !question.optional && !whole(question));
-    open.map_or(Ok(()), |question| {
-        let said = Message::new("refused-still-open").words("question", &question.text);
-        Err(Refusal::Said(RefusalKind::Conflict, said))
-    })
+    open.map_or(Ok(()), |question| Err(Refusal::Conflict(format!("still to be answered: {}", question.text))))
 }
 
 fn going_on(state: &SessionState) -> Result<(), Refusal> {
-    if state.paused.is_some() { Err(Refusal::not_now("refused-paused")) } else { Ok(()) }
+    if state.paused.is_some() { Err(Refusal::conflict("the session is paused")) } else { Ok(()) }
 }
 
 fn milliseconds(duration: Duration) -> u64 {
