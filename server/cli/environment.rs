@@ -71,7 +71,10 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "training")]
     split: Purpose,
     /// Scenes of each kind to draw.
-    #[arg(long, value_name = "N", default_value = "32", value_parser = RangedU64ValueParser::<u64>::new().range(1..=10_000))]
+    #[arg(
+        long, value_name = "N", default_value = "32",
+        value_parser = RangedU64ValueParser::<u64>::new().range(1..=10_000)
+    )]
     scenes: u64,
     /// Share of the scans that vary in speed, blur, noise, exposure, lens and what else is in view, 0 to 1. At 0 they
     /// are those of the reference benchmark.
@@ -81,7 +84,10 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "patch")]
     observation: Observation,
     /// Environments side by side.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = RangedU64ValueParser::<usize>::new().range(1..=4096))]
+    #[arg(
+        long, value_name = "N", default_value = "1",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=4096)
+    )]
     count: usize,
     /// Frames of a scan.
     #[arg(long, value_name = "N", default_value_t = FRAMES as u32, value_parser = clap::value_parser!(u32).range(1..))]

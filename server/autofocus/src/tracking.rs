@@ -7,8 +7,8 @@ use parfocal_imaging::Surroundings;
 const FAINT: f32 = 7.0;
 /// So many frames without a peak are waited for, since the picture may be blurred for a moment.
 const PATIENCE: u32 = 25;
-/// A frame is compared with the same earlier one for so long, which drifts less than comparing each with the one before.
-/// Then the tissue may look different, since it was tilted or deformed.
+/// A frame is compared with the same earlier one for so long, which drifts less than comparing each with the one
+/// before. Then the tissue may look different, since it was tilted or deformed.
 const RENEWED_AFTER: u32 = 25;
 /// The earlier one is also renewed once its surroundings show the tissue so many pixels away, as at the picture's edge,
 /// where they cannot go with it.
@@ -48,8 +48,8 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Looks for the tissue in a frame. `around` are the surroundings of the place where it was last, whose patch has its
-    /// `corner` there.
+    /// Looks for the tissue in a frame. `around` are the surroundings of the place where it was last, whose patch has
+    /// its `corner` there.
     pub fn see(&mut self, around: &Surroundings, corner: (usize, usize)) -> Tracked {
         let patch = signed(corner);
         let window = minus(patch, signed(around.patch));

@@ -12,20 +12,12 @@ const TOLD_MS = 2000;
  * @param {HTMLElement} source
  */
 export function copyOnPress(button, source) {
-  const label = button.textContent ?? "";
-  button.onclick = async () => {
-    const text = source instanceof HTMLInputElement ? source.value : (source.textContent ?? "");
-    try {
-      await navigator.clipboard.writeText(text);
-    } catch {
-      // The clipboard interface is missing on plain http.
-      if (source instanceof HTMLInputElement) source.select();
-      else getSelection()?.selectAllChildren(source);
-      document.execCommand("copy");
-    }
-    setText(button, "Copied");
-    setTimeout(() => setText(button, label), TOLD_MS);
-  };
+  const text = () => (source instanceof HTMLInputElement ? source.value : (source.textContent ?? ""));
+  copyWhenPressed(button, text, () => {
+    if (source instanceof HTMLInputElement) source.select();
+    else getSelection()?.selectAllChildren(source);
+    document.execCommand("copy");
+  });
 }
 
 /**
@@ -35,12 +27,21 @@ export function copyOnPress(button, source) {
  * @param {() => string} text
  */
 export function copyText(button, text) {
+  copyWhenPressed(button, text, () => copySelected(text(), button));
+}
+
+/**
+ * @param {HTMLButtonElement} button
+ * @param {() => string} text
+ * @param {() => void} otherwise copies without the clipboard interface, which is missing on plain http
+ */
+function copyWhenPressed(button, text, otherwise) {
   const label = button.textContent ?? "";
   button.onclick = async () => {
     try {
       await navigator.clipboard.writeText(text());
     } catch {
-      copySelected(text(), button);
+      otherwise();
     }
     setText(button, "Copied");
     setTimeout(() => setText(button, label), TOLD_MS);
@@ -48,7 +49,7 @@ export function copyText(button, text) {
 }
 
 /**
- * Copies `text` without the clipboard interface, which is missing on plain http.
+ * Copies `text` by selecting it in a field that nobody sees.
  *
  * @param {string} text
  * @param {HTMLElement} beside has the focus before and after

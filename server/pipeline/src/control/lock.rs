@@ -60,6 +60,12 @@ impl LockWatch {
         self.told
     }
 
+    /// What was told last.
+    #[must_use]
+    pub const fn told(&self) -> FocusLock {
+        self.told
+    }
+
     fn judge(&self, belief: Option<&[f32]>, focal_power: f64) -> FocusLock {
         let Some(belief) = belief.filter(|belief| belief.len() > 1) else { return FocusLock::Nothing };
         let needed = if self.told == FocusLock::Held { LET_GO } else { SURE };

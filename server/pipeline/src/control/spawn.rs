@@ -141,8 +141,7 @@ struct Worker {
     /// Whether the policy caused the present hold, and since when the lens has been held for such a cause.
     held_since: Option<(bool, Moment)>,
     window: LatencyWindow,
-    locks: LockWatch,
-    lock: FocusLock,
+    lock: LockWatch,
     steps: u64,
     telemetry_dropped: u64,
     /// Scheduling priority of the loop's thread.
@@ -191,8 +190,7 @@ impl Worker {
             camera_fault: None,
             held_since: None,
             window: LatencyWindow::default(),
-            locks: LockWatch::default(),
-            lock: FocusLock::default(),
+            lock: LockWatch::default(),
             steps: 0,
             telemetry_dropped: 0,
             priority: Standing::Ordinary,
@@ -238,7 +236,7 @@ impl Worker {
                 self.steps += 1;
                 self.window.add(self.last_frame_at, controlled.record.latency_micros);
                 let power = controlled.record.measured.unwrap_or(controlled.record.asked);
-                self.lock = self.locks.see(controlled.belief.as_deref(), power, self.last_frame_at);
+                self.lock.see(controlled.belief.as_deref(), power, self.last_frame_at);
 
                 if self.outlets.telemetry.try_send(controlled.record.clone()).is_err() {
                     self.telemetry_dropped += 1;
@@ -253,7 +251,7 @@ impl Worker {
     fn wait_on(&mut self) {
         self.stepper.idle();
         if self.clock.now().since(self.last_frame_at) >= NO_FRAME {
-            self.lock = self.locks.see(None, self.stepper.focal_power(), self.clock.now());
+            self.lock.see(None, self.stepper.focal_power(), self.clock.now());
             let message = format!("no frame comes from the camera; the lens is held: {}", self.source.health().message);
             self.camera_fault = Some(HoldReason::new(Hold::CameraFailed, &message));
         }
@@ -276,7 +274,7 @@ impl Worker {
                 || last.message != message
                 || last.policy.as_ref() != self.stepper.policy()
                 || last.sight != self.stepper.sight()
-                || last.lock != self.lock
+                || last.lock != self.lock.told()
                 || last.following != self.stepper.following()
         };
         if !changed && now.since(self.published_at) < STATUS_INTERVAL {
@@ -305,7 +303,7 @@ impl Worker {
             latency_p99_micros: figures.p99,
             priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
             sight: self.stepper.sight(),
-            lock: self.lock,
+            lock: self.lock.told(),
             following: self.stepper.following(),
         }));
     }
