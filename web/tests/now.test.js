@@ -90,7 +90,7 @@ test("a tablet that holds something is not given back", () => {
 
 test("a server that does not answer is reported, with the time since when", () => {
   const lost = { ...SURGEON, missed: true };
-  assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. You can continue to comment/);
+  assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. Comments are saved here/);
   assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
   assert.match(surgeonWords({ ...lost, heardAt: null, view: null }), /^The server cannot be reached\./);
   assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);

@@ -178,6 +178,7 @@ async fn fourth_setting_too_long_a_comment(theatre: &Theatre) {
 async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     theatre.tap_notice(5).await;
     theatre.say("Saved before the crash", 7).await;
+    let picture = theatre.picture().await;
 
     kill(&mut theatre.server);
     theatre.write("Said while it was away").await;
@@ -192,6 +193,8 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     .await;
 
     theatre.surgeon.sees("#view .viewer-stale", "Not live").await;
+    theatre.surgeon.sees("#now", "No server since").await;
+    assert_eq!(theatre.picture().await, picture, "what the page says of the connection does not move the picture");
 
     let edge = theatre.surgeon.area("#quick").await;
     let cut = theatre.surgeon.areas("#quick button").await.into_iter();

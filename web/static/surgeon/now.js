@@ -75,5 +75,5 @@ function unreachableWords(view, heardAt, refused) {
   const why = refused ? `${since} Its certificate has ended: tell the operator.` : since;
   return view === null
     ? `${why} This page keeps trying.`
-    : `${why} You can continue to comment. Comments are saved here and sent later.`;
+    : `${why} Comments are saved here and sent later.`;
 }
