@@ -3,11 +3,12 @@
 //! without.
 //!
 //! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` (or `recorded`) for the rows of that name.
-//! Prints one table. Compare only figures of the same run. Ages are exact: the server's record of each frame's exposure
+//! `-- tap` measures instead how long a tap takes to move the patch. Prints one table. Compare only figures of the same run. Ages are exact: the server's record of each frame's exposure
 //! and the viewers' clock are the same monotonic clock.
 
 mod link;
 mod process;
+mod tap;
 mod viewer;
 
 use std::collections::HashMap;
@@ -202,6 +203,12 @@ async fn main() {
         return;
     }
 
+    let asks_for = |word: &str| std::env::args().any(|argument| argument == word);
+    if asks_for("tap") {
+        tap::report().await;
+        return;
+    }
+
     println!(
         "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
         "camera", "viewers", "fps", "KB", "age ms", "latency ms", "% of a core", "RSS", "answer"
@@ -211,7 +218,6 @@ async fn main() {
         "", "", "", "", "p50 / p99", "p50 / p99", "loop / imaging / serving", "MB", "ms"
     );
 
-    let asks_for = |word: &str| std::env::args().any(|argument| argument == word);
     let wanted = |beside: Beside| match beside {
         Beside::Nothing => !asks_for("busy") && !asks_for("recorded"),
         Beside::Recording => !asks_for("busy"),

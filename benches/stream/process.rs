@@ -86,7 +86,8 @@ impl Server {
         self.order("recording", &serde_json::json!({ "record": record })).await;
     }
 
-    async fn order(&self, path: &str, order: &serde_json::Value) {
+    /// Posts `order` to the operator's `path`.
+    pub async fn order(&self, path: &str, order: &serde_json::Value) {
         let client = reqwest::Client::builder().no_proxy().build().expect("a client");
         let request = client.post(format!("http://{}/api/operator/{path}", self.address));
         let answer = request.bearer_auth(&self.key).json(order).send().await;
