@@ -158,18 +158,12 @@ fn a_process_that_fails_leaves_no_table_and_says_why() {
 }
 
 #[test]
-fn a_recording_of_an_earlier_version_has_no_place_of_the_patch() {
+fn a_recording_that_lacks_the_places_of_the_patch_is_damaged() {
     let folder = TempDir::new().unwrap();
     let recording = slope(&folder);
-    let group = recording.join("zarr.json");
-    let mut described: Value = serde_json::from_slice(&fs::read(&group).unwrap()).unwrap();
-    for column in ["patch_x", "patch_y", "patch_jumps"] {
-        described["consolidated_metadata"]["metadata"].as_object_mut().unwrap().remove(column).unwrap();
-        fs::remove_dir_all(recording.join(column)).unwrap();
-    }
-    fs::write(&group, described.to_string()).unwrap();
+    fs::remove_dir_all(recording.join("patch_y")).unwrap();
 
-    let rows = stepped(&folder, &recording, "fixed");
-    // The picture has 96x40 cells and shows no circle.
-    assert!(rows.iter().all(|row| (value(row, "patch_x"), value(row, "patch_y")) == (32.0, 4.0)), "{:?}", rows[0]);
+    let out = folder.path().join("steps.csv");
+    let told = complaint(&parfocal(&["recording", "step", text(&recording), "--policy", "fixed", "--out", text(&out)]));
+    assert!(told.contains("the values of `patch_y` are missing or do not match their checksum"), "{told}");
 }

@@ -62,11 +62,6 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
 
     def rgb(self, frame: int) -> npt.NDArray[np.uint8]:
         """Return one frame's picture in sRGB, one pixel a mosaic cell: height, width, 3."""
-        if any(colour not in self.variables for colour in ("red", "green", "blue")):
-            raise BadRecording(
-                "This recording was made by a version that did not keep the weights of its colours. "
-                "Get pictures with: parfocal recording video DIR --out FOLDER."
-            )
         weights = np.stack([self[colour].to_numpy() for colour in ("red", "green", "blue")], axis=-1)
         linear = np.clip(self._balanced(frame).to_numpy() @ weights.astype(np.float32), 0.0, 1.0)
         encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
@@ -147,7 +142,7 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
             f"{folder} was made by {attributes.get('software', 'another version')} in version {version} of the "
             f"layout; this package reads up to {_NEWEST_VERSION}. Update it: pip install --upgrade parfocal."
         )
-    missing = {"mosaic", "wavelength", "cell_row", "cell_column"} - set(dataset.variables)
+    missing = {"mosaic", "wavelength", "cell_row", "cell_column", "red", "green", "blue"} - set(dataset.variables)
     if missing:
         raise BadRecording(f"{folder} lacks its array '{min(missing)}'. Copy the recording again.")
 

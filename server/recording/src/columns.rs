@@ -26,8 +26,8 @@ pub struct FrameRow {
     pub measured: f64,
     /// Best focal power; NaN unless a simulation knows it.
     pub optimal: f64,
-    /// The patch; recordings of earlier versions do not have it.
-    pub patch: Option<PatchRow>,
+    /// The patch.
+    pub patch: PatchRow,
 }
 
 /// The patch of a frame.
@@ -80,22 +80,26 @@ impl Columns {
     }
 
     fn of_patch(&self, rows: &[FrameRow], value: fn(PatchRow) -> u64) -> Result<Vec<u8>, RecordingError> {
-        padded(&self.number, rows.iter().map(|row| row.patch.map_or(0, value)), 0)
+        padded(&self.number, rows.iter().map(|row| value(row.patch)), 0)
     }
 
-    /// The rows of the first `frames` frames in `folder`, with their patches if the recording `has_patches`.
+    /// The rows of the first `frames` frames in `folder`.
     ///
     /// # Errors
     /// If a file cannot be read, or is missing or damaged.
-    pub fn read(&self, folder: &Path, frames: usize, has_patches: bool) -> Result<Vec<FrameRow>, RecordingError> {
+    pub fn read(&self, folder: &Path, frames: usize) -> Result<Vec<FrameRow>, RecordingError> {
         let time: Vec<i64> = column(&self.time, folder, Column::Time, frames)?;
         let number: Vec<u64> = column(&self.number, folder, Column::Number, frames)?;
         let values = |which| column::<f64>(&self.other, folder, which, frames);
+        let places = |which| column::<u64>(&self.number, folder, which, frames);
+
         let exposure = values(Column::Exposure)?;
         let asked = values(Column::Asked)?;
         let measured = values(Column::Measured)?;
         let optimal = values(Column::Optimal)?;
-        let patches = if has_patches { self.patches(folder, frames)? } else { vec![None; frames] };
+        let x = places(Column::PatchX)?;
+        let y = places(Column::PatchY)?;
+        let jumps = places(Column::PatchJumps)?;
 
         let row = |frame: usize| FrameRow {
             time: time[frame],
@@ -104,18 +108,9 @@ impl Columns {
             asked: asked[frame],
             measured: measured[frame],
             optimal: optimal[frame],
-            patch: patches[frame],
+            patch: PatchRow { corner: (x[frame], y[frame]), jumps: jumps[frame] },
         };
         Ok((0..frames).map(row).collect())
-    }
-
-    fn patches(&self, folder: &Path, frames: usize) -> Result<Vec<Option<PatchRow>>, RecordingError> {
-        let values = |which| column::<u64>(&self.number, folder, which, frames);
-        let x = values(Column::PatchX)?;
-        let y = values(Column::PatchY)?;
-        let jumps = values(Column::PatchJumps)?;
-        let patch = |frame: usize| Some(PatchRow { corner: (x[frame], y[frame]), jumps: jumps[frame] });
-        Ok((0..frames).map(patch).collect())
     }
 }
 

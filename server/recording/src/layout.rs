@@ -52,8 +52,6 @@ impl Column {
         Self::PatchY,
         Self::PatchJumps,
     ];
-    /// The columns of the patch, which recordings of earlier versions lack.
-    pub const OF_PATCH: [Self; 3] = [Self::PatchX, Self::PatchY, Self::PatchJumps];
 
     /// The array's name.
     pub const fn name(self) -> &'static str {

@@ -11,7 +11,7 @@ use super::codec::Coder;
 use super::columns::{Columns, FrameRow};
 use super::error::{Damage, RecordingError};
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
-use super::layout::{Column, DESCRIPTION, MOSAIC, SHARD_FRAMES};
+use super::layout::{DESCRIPTION, MOSAIC, SHARD_FRAMES};
 use super::shard::Index;
 use super::view;
 use parfocal_imaging::{CELL, MosaicFrame};
@@ -59,9 +59,7 @@ impl Recording {
             serde_json::from_value(attributes.clone()).map_err(|e| RecordingError::nonsense(&path, e))?;
         let (frames, size) = extent(&described).map_err(|reason| RecordingError::nonsense(&path, reason))?;
 
-        let arrays = &described["consolidated_metadata"]["metadata"];
-        let has_patches = Column::OF_PATCH.iter().all(|column| arrays[column.name()].is_object());
-        let rows = Columns::new()?.read(folder, frames, has_patches)?;
+        let rows = Columns::new()?.read(folder, frames)?;
         let coder = Coder::of_frames(size.0, size.1)?;
         Ok(Self { folder: folder.to_owned(), header, size, rows, coder, index: Index::new(SHARD_FRAMES)? })
     }

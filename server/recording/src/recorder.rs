@@ -57,7 +57,7 @@ impl Shot {
             asked: self.asked.get(),
             measured: value(self.measured),
             optimal: value(self.optimal),
-            patch: Some(self.patch),
+            patch: self.patch,
         }
     }
 }

@@ -20,10 +20,8 @@ pub struct Path {
     /// Optimal focal power of each frame.
     pub optimum: Vec<f64>,
     /// Mean gradient magnitude of each frame's patch, divided by that at the optimum; empty if nobody looked.
-    #[serde(default)]
     pub sharpness_kept: Vec<f64>,
     /// What the policy claimed about the frame after each frame; empty if it has no belief.
-    #[serde(default)]
     pub claims: Vec<Claim>,
 }
 

@@ -11,11 +11,11 @@ mod picture;
 mod studio;
 mod thread;
 
-pub use area::AreaWatch;
+use area::AreaWatch;
 pub use counts::Counts;
 pub use follow::Follower;
 pub use picture::{EncodedFrame, Insight, Picture};
-pub use thread::{DETECT_EVERY, start};
+pub use thread::start;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

@@ -18,7 +18,7 @@ use parfocal_base::clock::Clock;
 use parfocal_imaging::{Developer, Size, content_area};
 
 /// Frames from one search for the content area to the next. The area moves slowly, as the eyepiece slips in a hand.
-pub const DETECT_EVERY: u64 = 10;
+const DETECT_EVERY: u64 = 10;
 
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);

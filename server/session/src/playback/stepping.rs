@@ -9,11 +9,8 @@ use parfocal_autofocus::{Fault, Observation, Policy};
 use parfocal_base::FocalPower;
 use parfocal_base::PatchPlace;
 use parfocal_devices::camera::FrameImage;
-use parfocal_imaging::{
-    CELL, Calibration, ContentArea, GrayImage, PATCH_SIDE, PatchArea, Reconstructor, RgbImage, content_area,
-};
+use parfocal_imaging::{CELL, Calibration, PATCH_SIDE, PatchArea, Reconstructor};
 use parfocal_pipeline::control::{Eye, HoldReason};
-use parfocal_pipeline::live::{AreaWatch, DETECT_EVERY};
 use parfocal_recording::{FrameRow, PatchRow, Recording, RecordingError};
 
 /// Why a policy could not be stepped over the whole recording.
@@ -89,12 +86,7 @@ pub struct Step {
 pub struct Stepping<'a> {
     recording: &'a Recording,
     policy: Box<dyn Policy>,
-    reconstructor: Reconstructor,
     eye: Eye,
-    areas: AreaWatch,
-    area: Option<ContentArea>,
-    rgb: RgbImage,
-    gray: GrayImage,
     jumps: Option<u64>,
     next: usize,
 }
@@ -103,27 +95,13 @@ impl<'a> Stepping<'a> {
     /// Prepares `policy` for the first frame of `recording`, which was made with `calibration`.
     #[must_use]
     pub fn new(recording: &'a Recording, calibration: &Calibration, policy: Box<dyn Policy>) -> Self {
-        let reconstructor = Reconstructor::new(calibration);
-        Self {
-            recording,
-            policy,
-            eye: Eye::new(reconstructor.clone()),
-            reconstructor,
-            areas: AreaWatch::default(),
-            area: None,
-            rgb: RgbImage::default(),
-            gray: GrayImage::default(),
-            jumps: None,
-            next: 0,
-        }
+        let eye = Eye::new(Reconstructor::new(calibration));
+        Self { recording, policy, eye, jumps: None, next: 0 }
     }
 
     fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, SteppingError> {
         let image = FrameImage::Mosaic(Arc::new(self.recording.frame(frame)?));
-        let patch = match row.patch {
-            Some(patch) => self.recorded(frame, &image, patch)?,
-            None => self.central(frame, &image)?,
-        };
+        let patch = self.patch(frame, &image, row.patch)?;
         let view = self.eye.look(&image, patch, self.policy.field_of_view());
 
         let focal_power = self.exposed_at(frame, row);
@@ -149,7 +127,7 @@ impl<'a> Stepping<'a> {
     }
 
     /// The patch where the control loop had it. Where it jumped, the policy forgets what it saw, as it did then.
-    fn recorded(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, SteppingError> {
+    fn patch(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, SteppingError> {
         let no_patch = |reason: HoldReason| SteppingError::NoPatch { frame, reason: reason.message };
         let central = self.eye.find(image, PatchPlace::CENTRE, None).map_err(no_patch)?;
         if self.jumps.replace(patch.jumps).is_some_and(|jumps| jumps != patch.jumps) {
@@ -166,22 +144,6 @@ impl<'a> Stepping<'a> {
             (Some(x), Some(y)) => Ok(PatchArea { x, y, ..central }),
             _ => Err(SteppingError::Outside { frame, x, y }),
         }
-    }
-
-    /// The patch at the middle of the bright circle, for which it looks as often as the server does, beginning with the
-    /// first frame.
-    fn central(&mut self, frame: usize, image: &FrameImage) -> Result<PatchArea, SteppingError> {
-        if let FrameImage::Mosaic(mosaic) = image
-            && (frame as u64).is_multiple_of(DETECT_EVERY)
-        {
-            self.reconstructor.reconstruct(mosaic, &mut self.rgb, &mut self.gray);
-            if let Some(news) = self.areas.see(content_area::detect(&self.gray)) {
-                self.area = news;
-            }
-        }
-
-        let patch = self.eye.find(image, PatchPlace::CENTRE, self.area.as_ref());
-        patch.map_err(|reason| SteppingError::NoPatch { frame, reason: reason.message })
     }
 
     /// Focal power at the middle of the frame's exposure. If the lens did not report it, the focal power that was
