@@ -90,6 +90,24 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
     }
 }
 
+/// Why the patch follows the tissue only outside sessions.
+const OUTSIDE_SESSIONS: &str = "the patch follows the tissue only outside sessions: when it is lost depends on how sharp \
+                                the picture is, which would tell the policies apart";
+
+/// Checks whether `by` may decide that the patch follows the tissue, in a session if `in_session` is set.
+///
+/// # Errors
+/// If `by` is not the operator, or it would happen in a session.
+pub fn check_following(by: Role, in_session: bool) -> Result<(), Refusal> {
+    if in_session {
+        return Err(Refusal::Invalid(OUTSIDE_SESSIONS.to_owned()));
+    }
+    if by != Role::Operator {
+        return Err(Refusal::Invalid("only the operator decides whether the patch follows the tissue".to_owned()));
+    }
+    Ok(())
+}
+
 /// Checks whether `action` is possible on a session that is closed.
 ///
 /// # Errors

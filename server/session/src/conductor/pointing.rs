@@ -10,7 +10,6 @@ use parfocal_pipeline::control::Aim;
 use parfocal_trial::account::Actor;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::pointing::{Choice, NewChoice, Touch};
-use parfocal_trial::role::Role;
 
 impl Conductor {
     /// Makes the policy look where `by` has chosen. In a session this is recorded, if its protocol allows it. The lens
@@ -21,7 +20,7 @@ impl Conductor {
     pub async fn choose(&self, by: impl Into<Actor>, new: NewChoice) -> Result<(), ConductError> {
         let by = by.into();
         if new.follows.is_some() {
-            may_follow(&by, new)?;
+            permission::check_following(by.role, new.session.is_some())?;
         }
         let choice = self.shared.choice(new)?;
         match new.session {
@@ -75,19 +74,6 @@ impl Shared {
         self.look(&mut live, aim);
         Ok(())
     }
-}
-
-/// Whether `by` may decide that the patch follows the tissue.
-fn may_follow(by: &Actor, new: NewChoice) -> Result<(), ConductError> {
-    if new.session.is_some() {
-        let why = "the patch follows the tissue only outside sessions: when it is lost depends on how sharp the picture \
-                   is, which would tell the policies apart";
-        return Err(ConductError::Invalid(why.to_owned()));
-    }
-    if by.role != Role::Operator {
-        return Err(ConductError::Invalid("only the operator decides whether the patch follows the tissue".to_owned()));
-    }
-    Ok(())
 }
 
 /// A length in cells, as it is recorded.
