@@ -42,22 +42,23 @@ async fn bench(sessions: usize, steps: usize) {
     let made = study::make(data.path(), sessions, steps).await;
     println!("made in {:.0} s, {:.0} MB", SystemClock.now().since(begun).as_secs_f64(), size_mb(data.path()));
 
-    let conductor = &made.trial.conductor;
+    let reports = &made.trial.reports;
+    let reader = made.trial.store.reader();
     println!("\n| what | goal | took | memory, peak |\n|---|---:|---:|---:|");
 
-    let list = measured(async || conductor.sessions(false).await.expect("the database can be read").len()).await;
+    let list = measured(async || reader.sessions(false).await.expect("the database can be read").len()).await;
     row("list of sessions", "0.2 s", &list);
     assert_eq!(list.value, sessions);
 
     let longest = made.sessions[sessions / 2];
-    let timeline = measured(async || conductor.timeline(Role::Researcher, longest, POINTS).await).await;
+    let timeline = measured(async || reports.timeline(Role::Researcher, longest, POINTS).await).await;
     row("a session's timeline", "1 s", &timeline);
     assert!(!timeline.value.expect("the session is there").points.is_empty());
 
-    let analysis = measured(async || analyse(conductor.reader(), STUDY).await).await;
+    let analysis = measured(async || analyse(reader, STUDY).await).await;
     row("analysis", "20 s", &analysis);
     assert!(!analysis.value.expect("the study is unblinded").protocols.is_empty());
-    let again = measured(async || analyse(conductor.reader(), STUDY).await).await;
+    let again = measured(async || analyse(reader, STUDY).await).await;
     row("analysis, again", "1 s", &again);
 
     for unblinded in [false, true] {

@@ -17,6 +17,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
+use tokio_rustls::rustls::ServerConfig;
 use tracing_subscriber::EnvFilter;
 
 pub use self::arguments::Arguments;
@@ -30,7 +31,7 @@ use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
 use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
 use parfocal_dashboard::openigtlink;
-use parfocal_dashboard::tls::{Certificates, keep_current};
+use parfocal_dashboard::tls::{Certificates, TlsError, keep_current};
 use parfocal_imaging::{Calibration, Developer, Size};
 use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Settings};
 use parfocal_pipeline::live;
@@ -41,6 +42,7 @@ use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::{Conductor, Parts};
 use parfocal_session::playback::Player;
 use parfocal_session::recorder::{self, Recordings};
+use parfocal_session::reports::Reports;
 
 /// Telemetry records that may wait for the disk: 15 s at 50 frames per second.
 const TELEMETRY_CAPACITY: usize = 750;
@@ -110,11 +112,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     let registry = rig.registry.clone();
     let store = open_store(arguments, folder, &calibration, &registry, clock.as_ref()).await?;
-    tracing::info!("the chain of records is at {}", store.reader().head().await?);
-    let settings = certificates.as_ref().map(Certificates::settings).transpose()?;
-    if let Some(certificates) = &certificates {
-        tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(&clock)));
-    }
+    let settings = certificates.as_ref().map(|certificates| encryption(certificates, &clock)).transpose()?;
 
     let mosaics = rig.camera.mosaic_size();
     let frame_period = Duration::from_secs(1) / arguments.fps;
@@ -132,7 +130,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let conductor = Conductor::open(Parts {
         store: store.clone(),
         control: control.clone(),
-        library,
+        library: library.clone(),
         registry: registry.clone(),
         clock: Arc::clone(&clock),
         random: ChaCha12Rng::try_from_rng(&mut SysRng)?,
@@ -141,7 +139,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     .await?;
 
     let folder = arguments.data_dir.join(recording::FOLDER);
-    let player = Player::new(conductor.clone(), folder.clone())?;
+    let reports = Reports::open(&store, Arc::clone(&clock)).await?;
+    let player = Player::new(reports.clone(), folder.clone())?;
     let recordings = Recordings::new(recorder::Parts {
         clock: Arc::clone(&clock),
         run: store.run(),
@@ -177,6 +176,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,
+        reports,
+        library,
         registry,
         keys: keys.clone(),
         reach: reach.clone(),
@@ -295,7 +296,15 @@ async fn open_store(
         seed: arguments.seed,
     };
 
-    Ok(Store::open_locked(folder, &run).await?)
+    let store = Store::open_locked(folder, &run).await?;
+    tracing::info!("the chain of records is at {}", store.reader().head().await?);
+    Ok(store)
+}
+
+/// The settings of TLS with `certificates`, which are renewed from now on.
+fn encryption(certificates: &Arc<Certificates>, clock: &Arc<dyn Clock>) -> Result<Arc<ServerConfig>, TlsError> {
+    tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(clock)));
+    certificates.settings()
 }
 
 /// A random source that may be predictable; real sessions draw nothing from it.

@@ -20,7 +20,8 @@ use parfocal_autofocus::Registry;
 use parfocal_base::clock::SystemClock;
 use parfocal_records::store::{Reader, StoreError, StoredStudy};
 use parfocal_results::package::{self, Source};
-use parfocal_session::conductor::{Studies, StudyDetail};
+use parfocal_session::conductor::Studies;
+use parfocal_session::reports::StudyDetail;
 use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::state::Change;
 
@@ -193,7 +194,7 @@ impl Signed {
 
 /// Prints the state of `study` after a change, and the chain's head.
 async fn tell(studies: &Studies, study: &str) -> Result<(), Failure> {
-    let detail = studies.detail(study).await?;
+    let detail = StudyDetail::read(studies, study).await?;
     let head = studies.reader().head().await?;
     studies.close().await;
     print(&format!("{}chain {head}\n", in_short(&detail)))

@@ -434,7 +434,7 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
             conductor.operator_view(),
             trial.store.clone(),
         ),
-        player: Player::new(conductor.clone(), recordings.clone()).unwrap(),
+        player: Player::new(trial.reports.clone(), recordings.clone()).unwrap(),
         recordings: Recordings::new(Parts {
             clock: Arc::clone(&clock),
             run: trial.store.run(),
@@ -450,6 +450,8 @@ fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,
+        reports: trial.reports.clone(),
+        library: trial.library.clone(),
         registry: parfocal_autofocus::Registry::standard(),
         keys: Keys::load_or_create(folder.path()).unwrap(),
         reach,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use parfocal_records::accounts::{AccountError, Cost, Passphrase, Token};
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
-use parfocal_records::store::verify_database;
+use parfocal_records::store::{Access, Recorder, verify_database};
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole, Actor};
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
@@ -159,7 +159,8 @@ async fn a_session(trial: &mut Trial) -> parfocal_base::ids::SessionId {
     // An abort stops the lens first, and is recorded after that.
     let abort = Action::Abort { reason: "the light failed".to_owned() };
     trial.conductor.act(operator, session, abort).await.unwrap();
-    trial.conductor.recorder(researcher).record(&parfocal_records::store::Access::PathViewed(session)).await.unwrap();
+    let recorder = Recorder::of_server(&trial.store, researcher, trial.clock.clone());
+    recorder.record(&Access::PathViewed(session)).await.unwrap();
     session
 }
 
@@ -169,7 +170,7 @@ async fn records_name_the_account_that_made_them_in_the_log_and_in_exports() {
     let mut trial = Trial::start(folder.path()).await;
     let session = a_session(&mut trial).await;
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     let by = |text: &str| detail.log.iter().find(|line| line.text.starts_with(text)).unwrap().account.clone();
     assert_eq!(by("Session made").as_deref(), Some("operator"));
     assert_eq!(by("Session aborted").as_deref(), Some("operator"));

@@ -12,7 +12,6 @@ use parfocal_records::store::export::verify::{Check, Verdict, verify};
 use parfocal_records::store::{
     Access, DeviceEvent, Head, MIGRATOR, Reader, Store, StoreError, database_state, verify_database,
 };
-use parfocal_trial::role::Role;
 use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
@@ -485,7 +484,7 @@ async fn a_database_is_looked_at_whatever_its_version() {
 async fn who_looks_is_recorded_and_stands_in_the_export() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(folder.path()).await;
-    trial.conductor.recorder(Role::Researcher).record(&Access::PathViewed(session)).await.unwrap();
+    trial.recorder().record(&Access::PathViewed(session)).await.unwrap();
     let out = folder.path().join("export");
     export(&trial.recorder(), session, &out, false).await.unwrap();
     let rows = crate::exports::rows(&out, "accesses");

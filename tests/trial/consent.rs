@@ -82,7 +82,7 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_listed_and_the_cha
         assert!(!out.exists());
     }
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert!(detail.line.withdrawn);
     assert_eq!(detail.withdrawal.unwrap().reason, "wants no part in it any more");
     let withdrawals = detail.log.iter().filter(|line| line.text.starts_with("Withdrawn: ")).count();
@@ -118,7 +118,7 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
     let (trial, session) = with_session(folder.path()).await;
     trial.unblind(session).await;
     trial.conductor.add_participant(Role::Researcher, "S-02").await.unwrap();
-    let before = trial.conductor.session_detail(session).await.unwrap();
+    let before = trial.reports.session_detail(session).await.unwrap();
     let answer = before.answers.iter().find(|answer| answer.question == "sharpness").unwrap();
     let note = |text: &str| FieldChange::Note { record: answer.key, old: String::new(), new: text.to_owned() };
     let correct = async |change: FieldChange| {
@@ -130,7 +130,7 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
     correct(participant).await.unwrap();
 
     trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
-    let after = trial.conductor.session_detail(session).await.unwrap();
+    let after = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(after.answers, []);
     let told: Vec<&str> = after.corrections.iter().map(|correction| correction.about.as_str()).collect();
     assert_eq!(told, ["Participant"], "whose session it was, and no note");
@@ -149,9 +149,9 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
     }
     assert_eq!(after.log.len(), before.log.len() + 3, "a note, a correction, the withdrawal");
 
-    let refused = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap_err();
+    let refused = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
-    let refused = trial.conductor.to_play(Role::Researcher, session).await.unwrap_err();
+    let refused = trial.reports.to_play(Role::Researcher, session).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
     let refused = correct(note("another")).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");

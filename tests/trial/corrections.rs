@@ -22,7 +22,7 @@ async fn correct(trial: &Trial, session: SessionId, change: FieldChange) -> Resu
 
 /// The answer to `question` that counts, after setting 1 or at the end: its key and its value.
 async fn answer(trial: &Trial, session: SessionId, question: &str) -> (IdempotencyKey, AnswerValue) {
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     let line = detail.answers.into_iter().find(|line| line.question == question && line.setting.unwrap_or(1) == 1);
     let line = line.unwrap();
     (line.key, line.value)
@@ -72,7 +72,7 @@ async fn a_correction_stands_beside_the_original_on_the_page_and_in_the_export()
     correct(&trial, session, note(comment, "", "said of the monitor")).await.unwrap();
 
     assert_eq!(originals(&trial, session).await, before, "what was recorded stays");
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.line.participant, PARTICIPANT);
     assert_eq!(detail.line.corrected_participant.as_deref(), Some("S-02"));
     let told: Vec<_> = detail.corrections.iter().map(|line| (line.old.as_str(), line.new.as_str())).collect();
@@ -81,7 +81,7 @@ async fn a_correction_stands_beside_the_original_on_the_page_and_in_the_export()
     assert!(detail.corrections[1].about.starts_with("Answer on setting 1: With this setting"), "{detail:?}");
     let sus = detail.answers.iter().find(|line| line.key == usability).unwrap();
     assert_eq!((sus.sus_score, sus.scores[0].value), (Some(67.5), Some(100.0)), "as given, and as corrected");
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     assert_eq!(timeline.comments[1].note.as_deref(), Some("said of the monitor"));
     assert!(detail.log.iter().any(|line| line.text == "Answer corrected: the surgeon said so on the phone"));
 

@@ -99,10 +99,10 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     }
 
     // The records stay, with their times and authors.
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let erased: Vec<_> = timeline.comments.iter().filter(|comment| comment.erased.is_some()).collect();
     assert_eq!((timeline.comments.len(), erased.len(), erased[0].key), (61, 1, comment.key));
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert!(detail.log.iter().any(|line| line.text == "Words of a comment erased: names a patient"));
 
     let out = folder.path().join("export");
@@ -141,7 +141,7 @@ async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     trial.conductor.act(Role::Researcher, session, withdraw).await.unwrap();
     assert!(matches!(all(Role::Operator).await, Err(ConductError::Forbidden(_))));
 
-    let left = async || trial.conductor.session_detail(session).await.unwrap().withdrawal.unwrap().words_left;
+    let left = async || trial.reports.session_detail(session).await.unwrap().withdrawal.unwrap().words_left;
     assert_eq!(left().await, 60 + 1, "what was erased before is not counted again");
     all(Role::Researcher).await.unwrap();
     assert_eq!(left().await, 0);
@@ -157,7 +157,7 @@ async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     // A comment that a tablet still held is kept, and can be erased as well.
     let late = NewComment { key: trial.key(), ..comment };
     trial.conductor.comment(late).await.unwrap();
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.withdrawal.unwrap().words_left, 1);
     trial.conductor.erase_all_words(Role::Researcher, session, "as before".to_owned()).await.unwrap();
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
@@ -177,7 +177,7 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     trial.conductor.unblind_in_emergency(Role::Researcher, session, signature, true).await.unwrap();
 
     let reasons = async || -> Vec<u32> {
-        let detail = trial.conductor.session_detail(session).await.unwrap();
+        let detail = trial.reports.session_detail(session).await.unwrap();
         detail.log.iter().filter_map(|line| line.erasable_event).collect()
     };
     let told = reasons().await;
@@ -196,7 +196,7 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     }
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
     assert_eq!(reasons().await, [0; 0]);
-    let log = trial.conductor.session_detail(session).await.unwrap().log;
+    let log = trial.reports.session_detail(session).await.unwrap().log;
     assert!(log.iter().any(|line| line.text == "Session aborted"), "{log:?}");
     assert!(log.iter().any(|line| line.text == "Reason of an event erased: names a patient"), "{log:?}");
 
@@ -213,7 +213,7 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     let trial = Trial::start_with(&data, Some(&data), 5).await;
     let checks = verify_database(&data, None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
-    assert!(trial.conductor.session_detail(session).await.unwrap().unblinding.is_some());
+    assert!(trial.reports.session_detail(session).await.unwrap().unblinding.is_some());
     trial.store.close().await;
 
     let pool = crate::storage::raw(&data).await;

@@ -319,7 +319,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     trial.conductor.act(Role::Operator, session, abort).await.unwrap();
     befalls(false, "unplugged when all was over").await;
 
-    let log = trial.conductor.session_detail(session).await.unwrap().log;
+    let log = trial.reports.session_detail(session).await.unwrap().log;
     let log: Vec<&str> = log.iter().map(|line| line.text.as_str()).collect();
     let expected = [
         "Session made",

@@ -16,6 +16,7 @@ use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSl
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
 use parfocal_records::store::{Recorder, Run, Store};
 use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
+use parfocal_session::reports::Reports;
 use parfocal_trial::account::{Account, AccountName, AccountRole};
 use parfocal_trial::action::Action;
 use parfocal_trial::phase::Phase;
@@ -40,6 +41,8 @@ pub const CHEAP: Cost = Cost { memory_kib: 64, passes: 1 };
 pub struct Trial {
     pub store: Store,
     pub conductor: Conductor,
+    pub reports: Reports,
+    pub library: Library,
     pub clock: Arc<ManualClock>,
     #[allow(dead_code, reason = "the fuzz targets serve its pages")]
     pub control: ControlHandle,
@@ -81,10 +84,11 @@ impl Trial {
         let clock = Arc::new(a_clock());
         let store = Store::open(folder, &a_run(&clock)).await.unwrap();
         let (control, commands) = listener();
+        let library = Library::load(protocols, &known()).unwrap();
         let conductor = Conductor::open(Parts {
             store: store.clone(),
             control: control.clone(),
-            library: Library::load(protocols, &known()).unwrap(),
+            library: library.clone(),
             registry: Registry::standard(),
             clock: clock.clone(),
             random: ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000),
@@ -95,7 +99,8 @@ impl Trial {
 
         conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
         let keys = ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000);
-        Self { store, conductor, clock, control, commands, keys }
+        let reports = Reports::open(&store, clock.clone()).await.unwrap();
+        Self { store, conductor, reports, library, clock, control, commands, keys }
     }
 
     pub fn key(&mut self) -> IdempotencyKey {
@@ -115,7 +120,7 @@ impl Trial {
 
     /// The recorder with which the researcher's page exports.
     pub fn recorder(&self) -> Recorder {
-        self.conductor.recorder(Role::Researcher)
+        Recorder::of_server(&self.store, Role::Researcher.into(), self.clock.clone())
     }
 
     pub fn view(&self) -> SurgeonView {

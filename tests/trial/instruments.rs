@@ -136,7 +136,7 @@ async fn every_instrument_is_answered_and_scored() {
         ("1.5".to_owned(), "1.5".to_owned())
     );
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     let words = |question: &str, setting: Option<usize>| {
         let line = detail.answers.iter().find(|line| line.question == question && line.setting == setting).unwrap();
         line.words.clone()

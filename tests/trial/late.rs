@@ -80,10 +80,10 @@ async fn the_latest_answer_counts_and_devices_that_disagree_are_reported() {
     let trial = Trial::start(folder.path()).await;
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5), "over a restart too");
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!((&detail.answers[0].value, detail.answers[0].devices_disagree), (&AnswerValue::Point(5), true));
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!(
         (&aside.value, &aside.counted, aside.late),
@@ -121,8 +121,8 @@ async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_cloc
     trial.conductor.answer(three).await.unwrap();
 
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5));
-    assert_eq!(trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap().set_aside, []);
-    assert!(!trial.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
+    assert_eq!(trial.reports.timeline(Role::Researcher, session, 10).await.unwrap().set_aside, []);
+    assert!(!trial.reports.session_detail(session).await.unwrap().answers[0].devices_disagree);
 }
 
 #[tokio::test]
@@ -166,9 +166,9 @@ async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arr
     comments[1].segment = None;
     trial.conductor.comment(comments[1].clone()).await.unwrap();
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(5)]);
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!((&aside.value, aside.late, timeline.set_aside.len()), (&AnswerValue::Point(1), true, 1));
     assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);
@@ -213,7 +213,7 @@ async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_cou
     abort(&trial, session).await;
     let refused = unblind(&trial, session, false).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("counts until")), "{refused}");
-    assert!(!trial.conductor.session_detail(session).await.unwrap().line.unblinded);
+    assert!(!trial.reports.session_detail(session).await.unwrap().line.unblinded);
 
     unblind(&trial, session, true).await.unwrap();
     trial.conductor.answer(late.clone()).await.unwrap();
@@ -221,7 +221,7 @@ async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_cou
     trial.conductor.dismiss(Role::Operator, session).unwrap();
     late.key = trial.key();
     trial.conductor.answer(late).await.unwrap();
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(6)]);
     let kept = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true, true]);

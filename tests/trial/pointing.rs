@@ -107,7 +107,7 @@ async fn a_touch_moves_the_patch_at_once_and_is_recorded_with_place_and_frame() 
     assert_eq!((of("patch_across"), of("patch_down")), ("0.4425", "-0.46"));
     assert!(!of("wall").is_empty() && !of("monotonic_ns").is_empty());
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 100).await.unwrap();
     let choices: Vec<_> = timeline.choices.iter().map(|choice| (choice.frame, choice.x, choice.y)).collect();
     assert_eq!(choices, [(77, Some(300.25), Some(90.0)), (78, None, None), (77, Some(500.0), Some(136.0))]);
 }
@@ -231,7 +231,7 @@ async fn the_focus_is_held_until_it_is_released_or_the_clock_stops() {
 
     let names: Vec<_> = kinds(&trial, session).await.split_off(3).iter().map(EventKind::name).collect();
     assert_eq!(names, ["focus-held", "focus-released", "focus-held", "paused", "resumed"]);
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 100).await.unwrap();
     let lasted: Vec<_> = timeline.holds.iter().map(|hold| hold.to.map(|to| to - hold.from)).collect();
     assert_eq!(lasted, [Some(2.0), Some(0.0)]);
 }

@@ -37,7 +37,7 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     comment.run = Some(99);
     trial.conductor.comment(comment).await.unwrap();
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
     // In the order in which they were said: nobody knows how long the other waited.
     assert!((timeline.comments[1].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments);
@@ -68,7 +68,7 @@ async fn answers_come_back_after_a_restart_and_a_changed_answer_keeps_the_old_on
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(6));
     assert_eq!(trial.store.reader().answers(session).await.unwrap().len(), 2);
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.len(), 1);
     assert!(detail.answers[0].changed);
 }
@@ -112,7 +112,7 @@ async fn a_comment_that_is_taken_back_stays_in_the_record_and_counts_no_more() {
     let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(kept[0].1.said, CommentContent::Text("a slip".to_owned()));
     assert_eq!(kept[2].1.said, CommentContent::Withdrawal(slip.key));
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let withdrawn: Vec<bool> = timeline.comments.iter().map(|comment| comment.withdrawn).collect();
     assert_eq!(withdrawn, [true, false]);
     drop(trial);
@@ -134,7 +134,7 @@ async fn what_was_said_without_a_network_stands_where_it_was_said() {
     waited.origin.waited_by = Some(WaitClock::PageClock);
     trial.conductor.comment(waited).await.unwrap();
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let said: Vec<_> = timeline.comments.iter().map(|comment| comment.seconds.round()).collect();
     assert_eq!(said, [30.0, 60.0]);
     let shown: Vec<_> = trial.operator_view().latest_comments.into_iter().map(|line| line.said).collect();
@@ -209,7 +209,7 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
     let kept = trial.store.reader().answers(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
 
-    let told = trial.conductor.session_detail(first).await.unwrap_err().to_string();
+    let told = trial.reports.session_detail(first).await.unwrap_err().to_string();
     assert!(told.contains(&first.to_string()) && told.contains("use the version that made it"), "{told}");
 }
 
@@ -283,7 +283,7 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
     trial.answer(&sus, item(9, 2)).await.unwrap();
     trial.surgeon(done).await;
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     let kept = detail.answers.iter().find(|answer| answer.question == sus).unwrap();
     assert_eq!(kept.value, AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
     assert_eq!(kept.sus_score, Some(67.5));

@@ -20,19 +20,19 @@ async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.whole_session("paper").await;
 
-    let lines = trial.conductor.sessions(false).await.unwrap();
+    let lines = trial.store.reader().sessions(false).await.unwrap();
     assert_eq!(lines.len(), 1);
     assert_eq!((lines[0].session, lines[0].status), (session, SessionStatus::Completed));
     assert_eq!((lines[0].settings, lines[0].finished_settings, lines[0].comments), (6, 6, 6));
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     // Four questions after each of six settings, three at the end.
     assert_eq!(detail.answers.len(), 6 * 4 + 3);
     assert!(detail.settings_detail.iter().all(|setting| setting.inspected_seconds == Some(20.0)));
     let sus = detail.answers.iter().find(|answer| answer.question == "usability").unwrap();
     assert_eq!(sus.sus_score, Some(67.5));
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 100).await.unwrap();
     let seconds: Vec<f64> = timeline.comments.iter().map(|comment| comment.seconds).collect();
     assert_eq!(seconds, [20.0, 40.0, 60.0, 80.0, 100.0, 120.0], "only inspection takes time on this trial");
     assert_eq!(timeline.comments[2].setting, Some(3));
@@ -57,8 +57,8 @@ async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
     // An emergency unblinding by the researcher does not change that.
     trial.unblind(session).await;
     seen += &serde_json::to_string(&trial.operator_view()).unwrap();
-    seen += &serde_json::to_string(&trial.conductor.sessions(true).await.unwrap()).unwrap();
-    seen += &serde_json::to_string(&trial.conductor.protocols()).unwrap();
+    seen += &serde_json::to_string(&trial.store.reader().sessions(true).await.unwrap()).unwrap();
+    seen += &serde_json::to_string(&trial.library.summaries()).unwrap();
     for tell in ["mgm", "mlr", "cnn", "CNN", "hill-climb", "\"fixed", "seed", "policy"] {
         assert!(!seen.contains(tell), "'{tell}' was sent");
     }
@@ -70,12 +70,12 @@ async fn the_researcher_learns_the_policies_at_unblinding_and_not_before() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.whole_session("paper").await;
-    let before = trial.conductor.session_detail(session).await.unwrap();
+    let before = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(before.unblinding, None);
     assert!(!serde_json::to_string(&before).unwrap().contains("mgm-"));
 
     trial.unblind(session).await;
-    let told = trial.conductor.session_detail(session).await.unwrap().unblinding.unwrap();
+    let told = trial.reports.session_detail(session).await.unwrap().unblinding.unwrap();
     assert!(!told.emergency);
     let mut policies: Vec<&str> = told.policies.iter().map(PolicyName::as_str).collect();
     policies.sort_unstable();
@@ -89,7 +89,7 @@ async fn the_control_loop_gets_each_policy_from_the_same_start_and_holds_in_betw
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.whole_session("paper").await;
     trial.unblind(session).await;
-    let told = trial.conductor.session_detail(session).await.unwrap();
+    let told = trial.reports.session_detail(session).await.unwrap();
     let policies = told.unblinding.unwrap().policies;
 
     let mut expected = Vec::new();
@@ -162,7 +162,7 @@ async fn a_restarted_server_continues_at_the_same_place_and_loses_at_most_a_seco
         }
     }
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     assert_eq!(detail.settings_detail[1].inspected_seconds, Some(120.0));
     drop(trial);
     let trial = Trial::start(folder.path()).await;
@@ -197,9 +197,9 @@ async fn practice_never_mixes_with_real_sessions() {
     let real = trial.whole_session("paper").await;
     let listed =
         |lines: Vec<parfocal_records::store::SessionLine>| lines.iter().map(|line| line.session).collect::<Vec<_>>();
-    assert_eq!(listed(trial.conductor.sessions(false).await.unwrap()), [real]);
-    assert_eq!(listed(trial.conductor.sessions(true).await.unwrap()), [real, practice]);
-    assert_eq!(trial.conductor.participants().await.unwrap()[0].sessions, 1);
+    assert_eq!(listed(trial.store.reader().sessions(false).await.unwrap()), [real]);
+    assert_eq!(listed(trial.store.reader().sessions(true).await.unwrap()), [real, practice]);
+    assert_eq!(trial.store.reader().participants().await.unwrap()[0].sessions, 1);
 }
 
 #[tokio::test]

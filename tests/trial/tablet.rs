@@ -75,7 +75,7 @@ async fn a_tablet_that_goes_away_pauses_the_setting_where_the_protocol_says_so()
     let left = trial.view().remaining_seconds.unwrap();
     assert!((left - 109.75).abs() < 0.01, "ten seconds were seen, and a quarter until it was noticed: {left}");
 
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let [absence] = &timeline.absences[..] else { panic!("{:?}", timeline.absences) };
     assert!((absence.to.unwrap() - absence.from - 5.0).abs() < 0.3, "{absence:?}");
     let [sight] = &timeline.sights[..] else { panic!("{:?}", timeline.sights) };
@@ -213,6 +213,6 @@ async fn an_export_tells_what_size_of_picture_the_surgeon_saw_and_how_many() {
     assert!((setting["pictures_per_second"].parse::<f64>().unwrap() - rate).abs() < 1e-6);
 
     assert_eq!(rows(&out, "telemetry")[0]["picture_width"], "512");
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     assert_eq!(timeline.comments[0].picture_width, Some(512));
 }

@@ -96,7 +96,7 @@ async fn pieces_are_kept_once_in_whatever_order_they_come_and_after_the_end_and_
     keep(&trial, 1).await.unwrap();
     keep(&trial, 3).await.unwrap();
     assert_eq!(kept_pieces(&trial, session, comment).await, [1, 3]);
-    let told = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap().comments.remove(0).voice.unwrap();
+    let told = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap().comments.remove(0).voice.unwrap();
     assert_eq!((told.missing, told.ended), (1, None), "a gap, and no end yet");
 
     end(&trial, session).await;
@@ -108,17 +108,17 @@ async fn pieces_are_kept_once_in_whatever_order_they_come_and_after_the_end_and_
     trial.conductor.voice_piece(last).await.unwrap();
     assert_eq!(kept_pieces(&trial, session, comment).await, [1, 2, 3, 4]);
 
-    let (media_type, audio) = trial.conductor.voice_audio(session, comment).await.unwrap();
+    let (media_type, audio) = trial.reports.voice_audio(session, comment).await.unwrap();
     assert_eq!(media_type.name(), "audio/webm;codecs=opus");
     assert!(audio == [sound(1), sound(2), sound(3), sound(4)].concat(), "in order, each once");
-    let told = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap().comments.remove(0).voice.unwrap();
+    let told = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap().comments.remove(0).voice.unwrap();
     assert_eq!((told.missing, told.ended, told.seconds), (0, Some(Ending::Released), 4.0));
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
 
     let withdraw = Action::Withdraw { reason: "wants no part in it".to_owned() };
     trial.conductor.act(Role::Researcher, session, withdraw).await.unwrap();
-    let refused = trial.conductor.voice_audio(session, comment).await.unwrap_err();
+    let refused = trial.reports.voice_audio(session, comment).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("withdrew")), "{refused}");
 }
 
@@ -321,7 +321,7 @@ async fn an_erased_recording_is_nowhere_in_the_files_and_its_hashes_stay() {
         NewErasure { subject: Erasable::Comment, record: comment.to_string(), reason: "names a patient".to_owned() };
     trial.conductor.erase(Role::Researcher, session, erasure).await.unwrap();
     assert_eq!(holds(&data), 0);
-    assert!(matches!(trial.conductor.voice_audio(session, comment).await, Err(ConductError::NotFound(_))));
+    assert!(matches!(trial.reports.voice_audio(session, comment).await, Err(ConductError::NotFound(_))));
 
     // A tablet sends one piece again, and one that it still held. Neither brings the sound back.
     trial.conductor.voice_piece(piece(session, comment, 2)).await.unwrap();
@@ -364,14 +364,14 @@ async fn voice_is_erased_by_itself_once_the_protocols_time_is_over_and_not_durin
     assert_eq!(trial.conductor.erase_expired_voice().await.unwrap(), 1);
     assert_eq!(trial.conductor.erase_expired_voice().await.unwrap(), 0, "once");
 
-    assert!(matches!(trial.conductor.voice_audio(session, comment).await, Err(ConductError::NotFound(_))));
-    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
+    assert!(matches!(trial.reports.voice_audio(session, comment).await, Err(ConductError::NotFound(_))));
+    let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let spoken = timeline.comments.iter().find(|line| line.key == comment).unwrap();
     assert!(spoken.erased.is_some());
     assert_eq!(spoken.note.as_deref(), Some("it wanders"), "what was typed out stays");
     assert!(timeline.comments.iter().any(|line| line.said == CommentContent::Text("typed".to_owned())));
 
-    let detail = trial.conductor.session_detail(session).await.unwrap();
+    let detail = trial.reports.session_detail(session).await.unwrap();
     let line = detail.log.iter().find(|line| line.text.contains("erased")).unwrap();
     assert_eq!((line.by, line.at), (Role::System, trial.clock.wall()));
     assert_eq!(line.text, "Words of a comment erased: the protocol keeps voice for 30 days");

@@ -61,7 +61,7 @@ async fn a_session_under_way_is_unblinded_in_an_emergency_and_continues() {
         trial.whole_setting().await;
     }
     assert_eq!(detail(&trial).await.log.len(), 3);
-    let line = &trial.conductor.sessions(false).await.unwrap()[0];
+    let line = &trial.store.reader().sessions(false).await.unwrap()[0];
     assert!(line.unblinded && line.emergency);
 }
 

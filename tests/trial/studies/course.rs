@@ -6,6 +6,7 @@ use std::time::Duration;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::export::{ExportError, export};
 use parfocal_session::conductor::{ConductError, Studies, StudySite};
+use parfocal_session::reports::StudyDetail;
 use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
 use parfocal_trial::remark::{CommentContent, NewComment, Origin, Sight};
@@ -60,7 +61,7 @@ async fn a_study_goes_from_plan_to_unblinding_and_each_step_is_an_event_with_a_r
     assert_eq!(study.line.stage, Stage::Unblinded);
 
     for session in [first, second] {
-        let detail = trial.conductor.session_detail(session).await.unwrap();
+        let detail = trial.reports.session_detail(session).await.unwrap();
         assert_eq!(detail.line.study.as_deref(), Some(STUDY));
         assert_eq!(detail.unblinding.map(|unblinding| unblinding.emergency), Some(false));
     }
@@ -299,7 +300,7 @@ async fn a_command_changes_studies_while_no_server_runs() {
     for change in [Change::Close, LOCK] {
         studies.change(Channel::CommandLine, STUDY, change, signed("no server"), None, &mut random).await.unwrap();
     }
-    let study = studies.detail(STUDY).await.unwrap();
+    let study = StudyDetail::read(&studies, STUDY).await.unwrap();
     assert_eq!((study.line.stage, study.log[3].by), (Stage::Locked, "command-line"));
     studies.close().await;
 

@@ -12,7 +12,8 @@ mod places;
 use std::path::Path;
 
 use parfocal_base::ids::SessionId;
-use parfocal_session::conductor::{ConductError, StudyDetail, StudySite};
+use parfocal_session::conductor::{ConductError, StudySite};
+use parfocal_session::reports::StudyDetail;
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
 use parfocal_trial::protocol::Protocol;
@@ -118,7 +119,7 @@ pub async fn opened(folder: &Path) -> Trial {
 }
 
 pub async fn detail(trial: &Trial) -> StudyDetail {
-    trial.conductor.studies().detail(STUDY).await.unwrap()
+    StudyDetail::read(trial.conductor.studies(), STUDY).await.unwrap()
 }
 
 /// Prepares a session of `participant` in the study at `site`.

@@ -20,7 +20,7 @@ use parfocal_results::analysis::{
     Analysis, AnalysisError, Comparison, PolicySummary, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords,
     analyse, check, decimals, p_words,
 };
-use parfocal_session::conductor::ConductError;
+use parfocal_session::reports::StudyDetail;
 
 impl From<AnalysisError> for Error {
     fn from(error: AnalysisError) -> Self {
@@ -40,11 +40,11 @@ impl From<AnalysisError> for Error {
 /// Records that the analysis of `study` is viewed, then returns it.
 async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analysis, Error> {
     by.personally()?;
-    let reader = app.conductor.reader();
+    let reader = app.store.reader();
     // A refused request is not recorded.
     check(reader, study).await?;
     let access = Access::AnalysisViewed { study: study.to_owned() };
-    app.conductor.recorder(by.actor()).record(&access).await.map_err(ConductError::from)?;
+    app.recorder(by.actor()).record(&access).await?;
     Ok(analyse(reader, study).await?)
 }
 
@@ -125,7 +125,7 @@ async fn analysis_page(
     let analysis = looked_at(&app, &by, &study).await?;
     let made = app.clock.wall();
     let chain = super::researcher::chain_words(&app).await;
-    let commitment = app.conductor.studies().detail(&study).await?.commitment_line;
+    let commitment = StudyDetail::read(app.conductor.studies(), &study).await?.commitment_line;
     let version = env!("CARGO_PKG_VERSION");
     AnalysisPage { analysis, made, chain, version, commitment }.render().map(Html).map_err(|_| Error::Internal)
 }

@@ -20,7 +20,6 @@ use super::json::JsonBody;
 use super::people::{Acting, PeerAddress, confirmed_lead, lead};
 use super::roles::Researcher;
 use parfocal_records::store::{BackupState, FinishedBackup};
-use parfocal_session::conductor::ConductError;
 
 /// Bytes of a backup that are read and sent at a time.
 const BLOCK: usize = 256 * 1024;
@@ -46,7 +45,7 @@ async fn start_backup(
     JsonBody(wanted): JsonBody<MakeBackup>,
 ) -> Result<Json<BackupState>, Error> {
     let lead = confirmed_lead(&app, &by, Some(&wanted.passphrase), peer).await?;
-    Ok(Json(app.backups.start(app.conductor.recorder(by.actor()), lead.account.clone())))
+    Ok(Json(app.backups.start(app.recorder(by.actor()), lead.account.clone())))
 }
 
 /// The state of the latest backup that the lead who is signed in asked for. It is kept for 15 minutes, unless words are
@@ -56,8 +55,8 @@ async fn start_backup(
     (status = 403, description = "No lead is signed in", body = ErrorBody)))]
 async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Json<BackupState>, Error> {
     let lead = lead(&by)?;
-    let state = app.backups.state(app.conductor.reader(), &lead.account).await;
-    Ok(Json(state.map_err(ConductError::from)?))
+    let state = app.backups.state(app.store.reader(), &lead.account).await;
+    Ok(Json(state?))
 }
 
 /// The backup as a file for `parfocal restore`.
@@ -67,7 +66,7 @@ async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Jso
     (status = 404, description = "The lead has no backup that is ready", body = ErrorBody)))]
 async fn backup_file(by: Researcher, State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let lead = lead(&by)?;
-    let made = app.backups.made(app.conductor.reader(), &lead.account).await.map_err(ConductError::from)?;
+    let made = app.backups.made(app.store.reader(), &lead.account).await?;
     let made = made.ok_or_else(|| Error::NotFound("No backup is ready. Make one on the page People.".to_owned()))?;
 
     let name = format!("parfocal-{}.db", app.clock.wall().strftime("%Y%m%dT%H%M%SZ"));

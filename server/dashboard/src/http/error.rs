@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use super::credentials::{ACCOUNT_COOKIE, cookie};
 use parfocal_records::accounts::AccountError;
+use parfocal_records::store::StoreError;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::role::Role;
 
@@ -141,6 +142,12 @@ impl From<ConductError> for Error {
             ConductError::Storage(text) => Self::Storage(text),
             unreadable @ ConductError::Unreadable { .. } => Self::Unreadable(unreadable.to_string()),
         }
+    }
+}
+
+impl From<StoreError> for Error {
+    fn from(error: StoreError) -> Self {
+        Self::Storage(error.to_string())
     }
 }
 

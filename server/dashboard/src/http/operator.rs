@@ -20,7 +20,8 @@ use super::surgeon::Act;
 use super::{App, AppState};
 use parfocal_autofocus::PolicyEntry;
 use parfocal_base::ids::SessionId;
-use parfocal_session::conductor::{OpenStudy, ProtocolSummary, StudySite};
+use parfocal_session::conductor::{ProtocolSummary, StudySite};
+use parfocal_session::reports::OpenStudy;
 use parfocal_trial::account::Account;
 use parfocal_trial::action::Focus;
 use parfocal_trial::consent::NewConsent;
@@ -146,14 +147,14 @@ struct Choices {
 async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
     Ok(Json(Choices {
         participants: codes(&app).await?,
-        protocols: app.conductor.protocols(),
-        studies: app.conductor.open_studies().await?,
+        protocols: app.library.summaries(),
+        studies: OpenStudy::all(app.conductor.studies()).await?,
         policies: app.registry.entries(),
     }))
 }
 
 async fn codes(app: &App) -> Result<Vec<String>, Error> {
-    let participants = app.conductor.participants().await?;
+    let participants = app.store.reader().participants().await?;
     Ok(participants.into_iter().map(|participant| participant.code).collect())
 }
 

@@ -15,7 +15,6 @@ use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::{Circle, Size};
 use parfocal_records::store::Access;
-use parfocal_session::conductor::ConductError;
 use parfocal_session::playback::{PlaceSpectrum, PlaybackError, SessionRecordings};
 use parfocal_trial::role::Role;
 
@@ -45,8 +44,8 @@ async fn recordings(
     let by = by.for_session(&app, session).await?;
     let found = app.player.recordings(Role::Researcher, session).await?;
     if !found.recordings.is_empty() {
-        let recorder = app.conductor.recorder(by);
-        recorder.record(&Access::RecordingViewed(session)).await.map_err(ConductError::from)?;
+        let recorder = app.recorder(by);
+        recorder.record(&Access::RecordingViewed(session)).await?;
     }
     Ok(Json(found))
 }

@@ -22,7 +22,8 @@ use super::{AppState, now};
 use parfocal_base::PolicyName;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::{Access, SessionLine};
-use parfocal_session::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
+use parfocal_session::conductor::ConductError;
+use parfocal_session::reports::{AnswerLine, SessionDetail, Timeline};
 use parfocal_trial::account::Account;
 use parfocal_trial::action::Action;
 use parfocal_trial::instruments::Measure;
@@ -84,7 +85,7 @@ async fn list_page(
     Nonce(nonce): Nonce,
     State(app): State<AppState>,
 ) -> Result<Html<String>, Error> {
-    let lines = app.conductor.sessions(true).await?;
+    let lines = app.store.reader().sessions(true).await?;
     let (practice, sessions) = lines.into_iter().partition(|line| line.practice);
     let chain = chain_words(&app).await;
     let person = person.map(|person| person.account);
@@ -214,12 +215,12 @@ async fn session_page(
     Path(id): Path<SessionId>,
 ) -> Result<Html<String>, Error> {
     by.for_session(&app, id).await?;
-    let detail = app.conductor.session_detail(id).await.map_err(|error| match error {
+    let detail = app.reports.session_detail(id).await.map_err(|error| match error {
         ConductError::NotFound(_) => Error::NotFound("There is no such session here.".to_owned()),
         error => error.into(),
     })?;
 
-    let participants = app.conductor.participants().await?;
+    let participants = app.store.reader().participants().await?;
     let participants = participants.into_iter().map(|participant| participant.code).collect();
     let chain = chain_words(&app).await;
     let person = person.map(|person| person.account);
@@ -230,7 +231,7 @@ async fn session_page(
 #[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher",
     responses((status = 200, body = Vec<SessionLine>)))]
 async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
-    Ok(Json(app.conductor.sessions(true).await?))
+    Ok(Json(app.store.reader().sessions(true).await?))
 }
 
 /// One session in detail; with its policies once it is unblinded.
@@ -243,7 +244,7 @@ async fn session(
     Path(id): Path<SessionId>,
 ) -> Result<Json<SessionDetail>, Error> {
     by.for_session(&app, id).await?;
-    Ok(Json(app.conductor.session_detail(id).await?))
+    Ok(Json(app.reports.session_detail(id).await?))
 }
 
 /// One session over time, without its focal path.
@@ -257,7 +258,7 @@ async fn course(
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
     let by = by.for_session(&app, id).await?;
-    let timeline = app.conductor.timeline(by.role, id, POINTS).await?;
+    let timeline = app.reports.timeline(by.role, id, POINTS).await?;
     Ok(Json(Timeline { points: Vec::new(), ..timeline }))
 }
 
@@ -272,8 +273,8 @@ async fn timeline(
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
     let by = by.for_session(&app, id).await?;
-    let timeline = app.conductor.timeline(Role::Researcher, id, POINTS).await?;
-    app.conductor.recorder(by).record(&Access::PathViewed(id)).await.map_err(ConductError::from)?;
+    let timeline = app.reports.timeline(Role::Researcher, id, POINTS).await?;
+    app.recorder(by).record(&Access::PathViewed(id)).await?;
     Ok(Json(timeline))
 }
 
@@ -294,13 +295,13 @@ struct ChainHead {
     (status = 403, description = "For operator and researcher", body = ErrorBody)))]
 async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {
     roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
-    let head = app.conductor.reader().head().await.map_err(ConductError::from)?;
+    let head = app.store.reader().head().await?;
     Ok(Json(ChainHead { number: head.number, head: head.to_string(), hash: head.hash }))
 }
 
 /// The chain's head as the pages show it, or the error in words: a page also opens if the head cannot be read.
 pub(super) async fn chain_words(app: &AppState) -> String {
-    app.conductor.reader().head().await.map_or_else(|error| format!("cannot be read: {error}"), |head| head.to_string())
+    app.store.reader().head().await.map_or_else(|error| format!("cannot be read: {error}"), |head| head.to_string())
 }
 
 /// A request to unblind a session.

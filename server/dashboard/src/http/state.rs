@@ -18,11 +18,13 @@ use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::ControlObserver;
 use parfocal_pipeline::live::LiveHandle;
 use parfocal_records::accounts::Accounts;
-use parfocal_records::store::{Backups, Store};
+use parfocal_records::store::{Backups, Recorder, Store};
 use parfocal_results::study_export::StudyExports;
-use parfocal_session::conductor::Conductor;
+use parfocal_session::conductor::{Conductor, Library};
 use parfocal_session::playback::Player;
 use parfocal_session::recorder::Recordings;
+use parfocal_session::reports::Reports;
+use parfocal_trial::account::Actor;
 use parfocal_trial::permission::{CurrentSession, may_see_focal_power};
 use parfocal_trial::role::Role;
 use parfocal_trial::view::{OperatorView, SurgeonView};
@@ -41,6 +43,10 @@ pub struct App {
     pub health: HealthWatch,
     /// Conductor of the trial sessions.
     pub conductor: Conductor,
+    /// Reports on sessions.
+    pub reports: Reports,
+    /// The available protocols.
+    pub library: Library,
     /// The recorder.
     pub recordings: Recordings,
     /// Playback of recordings.
@@ -86,6 +92,12 @@ pub struct Metrics {
 pub type AppState = Arc<App>;
 
 impl App {
+    /// Records what `by` looks at.
+    #[must_use]
+    pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
+        Recorder::of_server(&self.store, by.into(), Arc::clone(&self.clock))
+    }
+
     /// The session on the screens, if it belongs to a study.
     pub(super) fn study_session(&self) -> Option<SessionId> {
         let view = self.operator_view.borrow();

@@ -14,7 +14,8 @@ use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::Researcher;
 use super::security::Nonce;
 use super::{AppState, now};
-use parfocal_session::conductor::{ConductError, StudyDetail, StudyLine, StudySession};
+use parfocal_session::conductor::ConductError;
+use parfocal_session::reports::{StudyDetail, StudyLine, StudySession};
 use parfocal_trial::account::Account;
 use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
@@ -56,11 +57,11 @@ async fn studies_page(
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
 ) -> Result<Html<String>, Error> {
-    let studies = app.conductor.studies().lines().await?;
+    let studies = StudyLine::all(app.conductor.studies()).await?;
     let person = person.map(|person| person.account);
     let has_accounts = !app.accounts.all().await?.is_empty();
     let lead = person.as_ref().map_or("Dr Lead", |account| account.display.as_str());
-    let template = app.conductor.study_template(lead);
+    let template = app.library.study_template(lead);
     ListPage { nonce, person, has_accounts, studies, template }.render().map(Html).map_err(|_| Error::Internal)
 }
 
@@ -171,7 +172,7 @@ async fn study_page(
 ) -> Result<Html<String>, Error> {
     by.personally()?;
     let person = person.map(|person| person.account);
-    let detail = app.conductor.studies().detail(&name).await?;
+    let detail = StudyDetail::read(app.conductor.studies(), &name).await?;
     let chain = super::researcher::chain_words(&app).await;
     StudyPage { nonce, person, chain, detail }.render().map(Html).map_err(|_| Error::Internal)
 }
@@ -180,7 +181,7 @@ async fn study_page(
 #[utoipa::path(get, path = "/api/researcher/studies", tag = "researcher",
     responses((status = 200, body = Vec<StudyLine>)))]
 async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<StudyLine>>, Error> {
-    Ok(Json(app.conductor.studies().lines().await?))
+    Ok(Json(StudyLine::all(app.conductor.studies()).await?))
 }
 
 /// One study in detail, without the orders.
@@ -193,7 +194,7 @@ async fn study(
     Path(name): Path<String>,
 ) -> Result<Json<StudyDetail>, Error> {
     by.personally()?;
-    Ok(Json(app.conductor.studies().detail(&name).await?))
+    Ok(Json(StudyDetail::read(app.conductor.studies(), &name).await?))
 }
 
 /// A study to plan.
@@ -222,7 +223,7 @@ async fn plan_study(
     let PlanStudy { definition, sites, reason } = plan;
     let signature = signed(by.personally()?, &reason)?;
     let name = app.conductor.plan_study(Role::Researcher, definition, sites, signature).await?;
-    Ok(Json(app.conductor.studies().detail(name.as_str()).await?))
+    Ok(Json(StudyDetail::read(app.conductor.studies(), name.as_str()).await?))
 }
 
 /// A signed change of a study.
@@ -264,7 +265,7 @@ async fn change_study(
     };
     let signature = signed(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;
-    Ok(Json(app.conductor.studies().detail(&name).await?))
+    Ok(Json(StudyDetail::read(app.conductor.studies(), &name).await?))
 }
 
 /// The signature of a change by the person of `account`.

@@ -17,7 +17,6 @@ use super::people::Acting;
 use super::roles::{ResearchReader, Researcher};
 use parfocal_records::store::export::ZipStream;
 use parfocal_results::study_export::{StudyExportError, StudyExportState, check};
-use parfocal_session::conductor::ConductError;
 
 impl From<StudyExportError> for Error {
     fn from(error: StudyExportError) -> Self {
@@ -57,8 +56,8 @@ async fn start_study_export(
     JsonBody(wanted): JsonBody<ExportStudy>,
 ) -> Result<Json<StudyExportState>, Error> {
     by.personally()?;
-    check(app.conductor.reader(), &study, wanted.unblinded).await?;
-    Ok(Json(app.study_exports.start(app.conductor.recorder(by.actor()), &study, wanted.unblinded)))
+    check(app.store.reader(), &study, wanted.unblinded).await?;
+    Ok(Json(app.study_exports.start(app.recorder(by.actor()), &study, wanted.unblinded)))
 }
 
 /// The state of the latest export of a study. A finished export is kept for an hour, unless a surgeon withdraws or
@@ -71,8 +70,8 @@ async fn study_export(
     Path(study): Path<String>,
 ) -> Result<Json<StudyExportState>, Error> {
     by.personally()?;
-    let state = app.study_exports.state(app.conductor.reader(), &study).await;
-    Ok(Json(state.map_err(ConductError::from)?))
+    let state = app.study_exports.state(app.store.reader(), &study).await;
+    Ok(Json(state?))
 }
 
 /// The finished export of a study as one ZIP file: the same as `parfocal export --study` writes.
@@ -87,7 +86,7 @@ async fn study_export_zip(
 ) -> Result<impl IntoResponse, Error> {
     by.personally()?;
     let missing = || Error::NotFound("No export of this study is ready. Start one on the study's page.".to_owned());
-    let made = app.study_exports.made(app.conductor.reader(), &study).await.map_err(ConductError::from)?;
+    let made = app.study_exports.made(app.store.reader(), &study).await?;
     let made = made.ok_or_else(missing)?;
 
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });

@@ -81,7 +81,7 @@ async fn recording(
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     by.for_session(&app, session).await?;
-    let (media_type, audio) = app.conductor.voice_audio(session, comment).await?;
+    let (media_type, audio) = app.reports.voice_audio(session, comment).await?;
     let mut response = ranges::answer(&headers, with_duration(media_type, audio));
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(media_type.name()));
     Ok(response)

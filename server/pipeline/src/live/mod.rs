@@ -11,7 +11,6 @@ mod picture;
 mod studio;
 mod thread;
 
-use area::AreaWatch;
 pub use counts::Counts;
 pub use follow::Follower;
 pub use picture::{EncodedFrame, Insight, Picture};

@@ -1,11 +1,11 @@
 //! Gathers from the database what the rules of unblinding need to know.
 
-use super::course::Course;
+use super::course::{Course, outstanding};
 use super::{ConductError, Pen, Shared};
 use parfocal_base::ids::SessionId;
 use parfocal_trial::action::Action;
 use parfocal_trial::allocation::Seed;
-use parfocal_trial::grace::{Grace, Outstanding};
+use parfocal_trial::grace::Grace;
 use parfocal_trial::study::signature::Signature;
 use parfocal_trial::study::stage::Stage;
 use parfocal_trial::unblinding::{BlindedStudy, Circumstances};
@@ -41,7 +41,9 @@ impl Shared {
         // The database must know whether the session in memory has ended, because it may belong to the same set.
         self.record_stops(pen).await?;
         let set = self.store.reader().balanced_set(subject.seed).await?;
-        let outstanding = self.outstanding(subject.session, subject.grace).await?;
+        let now = self.run_clock.time(self.clock.now());
+        let reader = self.store.reader();
+        let outstanding = outstanding(reader, &self.run_clock.clocks, subject.session, subject.grace, now).await?;
         let study = self.blinded_study(subject.session, signature.is_some()).await?;
         Ok(Circumstances { set: Some(set), outstanding, study })
     }
@@ -57,19 +59,5 @@ impl Shared {
 
         let policies = study.definition.protocols.iter().flat_map(|protocol| protocol.policies.clone()).collect();
         Ok(Some(BlindedStudy { name: study.definition.name, policies, signed }))
-    }
-
-    /// What may still arrive for `session`, which has the grace period `grace`, and would not count after unblinding.
-    pub(super) async fn outstanding(
-        &self,
-        session: SessionId,
-        grace: Grace,
-    ) -> Result<Option<Outstanding>, ConductError> {
-        let devices = self.store.reader().surgeon_devices(session).await?;
-        let clocks = &self.run_clock.clocks;
-        let reports = devices.iter().map(|device| device.told_on(clocks));
-
-        let now = self.run_clock.time(self.clock.now());
-        Ok(grace.outstanding(now, reports))
     }
 }

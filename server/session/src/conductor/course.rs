@@ -14,12 +14,12 @@ use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_pipeline::control::{Command, Drive};
-use parfocal_records::store::{Comment, NewSession, Reader, RunClocks};
+use parfocal_records::store::{Comment, NewSession, Reader, RunClocks, Store, StoreError};
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::consent::Consent;
 use parfocal_trial::event::{Event, EventKind};
-use parfocal_trial::grace::Grace;
+use parfocal_trial::grace::{Grace, Outstanding};
 use parfocal_trial::phase::Phase;
 use parfocal_trial::pointing::Choice;
 use parfocal_trial::protocol::Protocol;
@@ -37,7 +37,7 @@ use parfocal_trial::view::CommentLine;
 pub(super) const LATEST: usize = 30;
 
 /// A session in memory.
-pub(super) struct Course {
+pub(crate) struct Course {
     pub made: NewSession,
     pub protocol: Protocol,
     /// The session's state, including the stops that are not on disk yet.
@@ -107,12 +107,17 @@ const AT_REST: Duration = Duration::from_secs(1);
 
 /// The number of this run of the server, and the clocks of all runs up to it.
 #[derive(Debug, Clone)]
-pub(super) struct RunClock {
+pub(crate) struct RunClock {
     pub clocks: Arc<RunClocks>,
     pub run: i64,
 }
 
 impl RunClock {
+    /// The clocks of the server that has `store` open.
+    pub async fn of(store: &Store) -> Result<Self, StoreError> {
+        Ok(Self { clocks: Arc::new(store.reader().run_clocks().await?), run: store.run() })
+    }
+
     /// Converts `at`, a moment of this run, to the time that continues over the server's restarts.
     pub fn time(&self, at: Moment) -> Timestamp {
         self.clocks.wall(self.run, at)
@@ -590,4 +595,17 @@ impl Course {
         let next = self.protocol.next_prompt_change(inspected).map_or(limit, |change| change.min(limit));
         next.saturating_sub(inspected).max(Duration::from_millis(1))
     }
+}
+
+/// What may still arrive for `session`, which has the grace period `grace`, and would not count if it were unblinded at
+/// `now`.
+pub(crate) async fn outstanding(
+    reader: &Reader,
+    clocks: &RunClocks,
+    session: SessionId,
+    grace: Grace,
+    now: Timestamp,
+) -> Result<Option<Outstanding>, StoreError> {
+    let devices = reader.surgeon_devices(session).await?;
+    Ok(grace.outstanding(now, devices.iter().map(|device| device.told_on(clocks))))
 }

@@ -3,7 +3,7 @@
 use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Answer, Comment, Erased, Erasure, StoredCorrection};
+use parfocal_records::store::{Answer, Comment, Erased, Erasure, Reader, StoreError, StoredCorrection};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -50,31 +50,11 @@ impl Shared {
             return Err(Refusal::conflict(refusal).into());
         }
 
-        let records = self.words_left(session).await?;
+        let records = words_left(self.store.reader(), session).await?;
         if records.is_empty() {
             return Err(Refusal::conflict("no words of this session are left to erase").into());
         }
         self.erase_records(by, session, records, &reason).await
-    }
-
-    /// The records of `session` whose words nobody has erased: comments, answers in words, notes.
-    pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
-        let reader = self.store.reader();
-        let comments = reader.comments(session).await?.into_iter();
-        let wordless = |said: &CommentContent| !said.has_words() && *said != CommentContent::Voice;
-        let comments = comments.filter(|(_, comment)| !wordless(&comment.said));
-        let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
-        let answers = reader.answers(session).await?.into_iter();
-        let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
-        let answers = answers.map(|(_, answer)| (Erasable::Answer, answer.key.to_string()));
-        let notes = reader.corrections(session).await?.into_iter();
-        let notes = notes.filter(|stored| stored.correction.field == Field::Note);
-        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
-
-        let erased = Erased::by(&reader.erasures(session).await?);
-        let is_left = |(subject, record): &(Erasable, String)| erased.at(*subject, record).is_none();
-        let left = comments.chain(answers).chain(notes).filter(is_left);
-        Ok(left.collect())
     }
 
     /// Checks that words of `session` may be erased now. Returns the reason without surrounding white space.
@@ -220,4 +200,23 @@ fn is_note(corrections: &[StoredCorrection], record: &str) -> Result<(), Conduct
             Err(Refusal::conflict("only a note can be erased; this correction is a value").into())
         }
     }
+}
+
+/// The records of `session` whose words nobody has erased: comments, answers in words, notes.
+pub(crate) async fn words_left(reader: &Reader, session: SessionId) -> Result<Vec<(Erasable, String)>, StoreError> {
+    let comments = reader.comments(session).await?.into_iter();
+    let wordless = |said: &CommentContent| !said.has_words() && *said != CommentContent::Voice;
+    let comments = comments.filter(|(_, comment)| !wordless(&comment.said));
+    let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
+    let answers = reader.answers(session).await?.into_iter();
+    let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
+    let answers = answers.map(|(_, answer)| (Erasable::Answer, answer.key.to_string()));
+    let notes = reader.corrections(session).await?.into_iter();
+    let notes = notes.filter(|stored| stored.correction.field == Field::Note);
+    let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
+
+    let erased = Erased::by(&reader.erasures(session).await?);
+    let is_left = |(subject, record): &(Erasable, String)| erased.at(*subject, record).is_none();
+    let left = comments.chain(answers).chain(notes).filter(is_left);
+    Ok(left.collect())
 }

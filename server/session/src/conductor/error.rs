@@ -37,7 +37,7 @@ pub enum ConductError {
 }
 
 impl ConductError {
-    pub(super) fn no_session() -> Self {
+    pub(crate) fn no_session() -> Self {
         Self::NotFound("there is no such session; reload the page".to_owned())
     }
 }

@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use parfocal_base::PolicyName;
 use parfocal_base::files::is_systems_own;
 use parfocal_trial::protocol::{Protocol, ProtocolError};
+use parfocal_trial::study::definition::Definition;
 
 /// Protocols that ship, by file name.
 const SHIPPED: [(&str, &str); 3] = [
@@ -65,6 +66,14 @@ pub enum LibraryError {
 }
 
 impl Library {
+    /// The text of a study's definition to start from, for a study that `lead` unblinds; `None` if no protocol is for
+    /// studies.
+    #[must_use]
+    pub fn study_template(&self, lead: &str) -> Option<String> {
+        let protocol = self.protocols.values().find(|protocol| !protocol.practice)?;
+        Some(Definition::template(protocol, lead))
+    }
+
     /// Loads the protocols that ship and the `.toml` files of `folder`, if given; `known` are the available policies.
     ///
     /// # Errors
@@ -107,7 +116,7 @@ impl Library {
 }
 
 impl ProtocolSummary {
-    pub(super) fn of(protocol: &Protocol) -> Self {
+    pub(crate) fn of(protocol: &Protocol) -> Self {
         Self {
             name: protocol.name.clone(),
             title: protocol.title.clone(),

@@ -6,7 +6,6 @@
 //! them as not recorded yet.
 
 mod allocate;
-mod beside;
 mod circumstances;
 mod consents;
 mod corrections;
@@ -19,11 +18,8 @@ mod lens;
 mod library;
 mod pointing;
 mod remarks;
-mod reports;
 mod studies;
 mod study_changes;
-mod study_reports;
-mod timeline;
 mod views;
 mod voice;
 
@@ -32,17 +28,12 @@ use std::sync::Arc;
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{Mutex, Notify, watch};
 
-pub use beside::{ConsentLine, CorrectionLine, WithdrawalLine};
+pub(crate) use course::{Course, RunClock, outstanding};
+pub(crate) use erasures::words_left;
 pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
-pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
 pub use studies::Studies;
-pub use study_reports::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol, StudySession};
-pub use timeline::{
-    PauseSpan, Played, SetAside, SettingSpan, SightSpan, Timeline, TimelineComment, TimelinePoint, TimelineVoice,
-};
 
-use course::{Course, RunClock};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SessionId;
@@ -50,6 +41,7 @@ use parfocal_pipeline::control::{Aim, Command, ControlHandle};
 use parfocal_records::store::Store;
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
+use parfocal_trial::participant::ParticipantCode;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::phase::Phase;
 use parfocal_trial::protocol::Record;
@@ -166,7 +158,7 @@ impl Conductor {
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
         let Parts { store, control, library, registry, clock, random, mut practice_random } = parts;
         practice_random.set_stream(u64::try_from(store.run()).unwrap_or_default());
-        let run_clock = RunClock { clocks: Arc::new(store.reader().run_clocks().await?), run: store.run() };
+        let run_clock = RunClock::of(&store).await?;
 
         let course = match store.reader().session_under_way().await? {
             Some(session) => Course::load(store.reader(), &run_clock, session).await?,
@@ -230,6 +222,16 @@ impl Conductor {
         let phase = course.state.phase();
         let runs = phase != Phase::Ready && !phase.has_ended();
         (runs && course.protocol.record != Record::None).then(|| (course.session(), course.protocol.record))
+    }
+
+    /// Adds a participant; an existing one stays.
+    ///
+    /// # Errors
+    /// If `code` is not a valid code, `by` may not add participants, or the disk failed.
+    pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
+        permission::check(by, Request::AddParticipant, CurrentSession::None)?;
+        let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
+        Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
     }
 
     /// Makes a session for `participant` by `protocol` and draws its allocation. The session waits for

@@ -180,7 +180,7 @@ impl Studies {
     }
 
     /// The study called `name`.
-    pub(super) async fn stored(&self, name: &str) -> Result<StoredStudy, ConductError> {
+    pub(crate) async fn stored(&self, name: &str) -> Result<StoredStudy, ConductError> {
         if let Some(study) = self.reader().study(name).await? {
             return Ok(study);
         }
@@ -191,7 +191,7 @@ impl Studies {
     }
 
     /// The studies that accept new sessions now.
-    pub(super) async fn taking_sessions(&self) -> Result<Vec<StoredStudy>, ConductError> {
+    pub(crate) async fn taking_sessions(&self) -> Result<Vec<StoredStudy>, ConductError> {
         let mut open = Vec::new();
         for name in self.reader().study_names().await? {
             let study = self.stored(&name).await?;
@@ -218,7 +218,7 @@ impl Studies {
     }
 
     /// Number of sessions of `study` for which a surgeon's device may still hold something that counts.
-    pub(super) async fn outstanding(&self, study: &StoredStudy) -> Result<usize, ConductError> {
+    pub(crate) async fn outstanding(&self, study: &StoredStudy) -> Result<usize, ConductError> {
         let reader = self.reader();
         let clocks = reader.run_clocks().await?;
         let now = self.now(&clocks);
@@ -226,9 +226,9 @@ impl Studies {
         let mut outstanding = 0;
         for enrolled in &study.sessions {
             let Some(stored) = reader.session(enrolled.session).await? else { continue };
-            let devices = reader.surgeon_devices(enrolled.session).await?;
-            let reports = devices.iter().map(|device| device.told_on(&clocks));
-            outstanding += usize::from(stored.grace(&clocks).outstanding(now, reports).is_some());
+            let grace = stored.grace(&clocks);
+            let left = super::outstanding(reader, &clocks, enrolled.session, grace, now).await?;
+            outstanding += usize::from(left.is_some());
         }
         Ok(outstanding)
     }

@@ -8,12 +8,11 @@ use tokio::time::sleep;
 
 use super::remarks::taken;
 use super::{ConductError, Conductor, Shared};
-use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_records::store::{Erasure, KeptVoice, PieceKept, VoicePiece};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::role::Role;
-use parfocal_trial::voice::{self, MediaType, NewPiece};
+use parfocal_trial::voice::{self, NewPiece};
 
 /// Interval between two searches for recordings whose retention period is over.
 const DAILY: Duration = Duration::from_hours(24);
@@ -29,21 +28,6 @@ impl Conductor {
     /// else, or the disk failed.
     pub async fn voice_piece(&self, piece: NewPiece) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.voice_piece(piece).await }).await
-    }
-
-    /// The sound of a voice comment of `session`, and its media type.
-    ///
-    /// # Errors
-    /// If there is none, it was erased, the participant withdrew, or the database failed.
-    pub async fn voice_audio(
-        &self,
-        session: SessionId,
-        comment: IdempotencyKey,
-    ) -> Result<(MediaType, Vec<u8>), ConductError> {
-        self.check_reading(session).await?;
-        let found = self.shared.store.reader().voice_audio(session, comment).await?;
-        let none = || ConductError::NotFound("this session has no such recording, or it was erased".to_owned());
-        found.ok_or_else(none)
     }
 
     /// Erases recordings whose retention period by their protocol is over. Returns how many.

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 use super::error::PlaybackError;
 use super::projector::Projector;
 use super::spectrum::PlaceSpectrum;
-use crate::conductor::{Conductor, Played};
+use crate::reports::{Played, Reports};
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::{Circle, Size};
 use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, Kind, RecordingError, belonging, of_session};
@@ -46,7 +46,7 @@ pub struct RecordingCourse {
 pub struct Player(Arc<Shared>);
 
 struct Shared {
-    conductor: Conductor,
+    reports: Reports,
     /// Folder that holds the recordings.
     folder: PathBuf,
     projector: Projector,
@@ -59,9 +59,9 @@ impl Player {
     ///
     /// # Errors
     /// If the system cannot start another thread.
-    pub fn new(conductor: Conductor, folder: PathBuf) -> std::io::Result<Self> {
+    pub fn new(reports: Reports, folder: PathBuf) -> std::io::Result<Self> {
         let projector = Projector::start()?;
-        Ok(Self(Arc::new(Shared { conductor, folder, projector, playable: Mutex::default() })))
+        Ok(Self(Arc::new(Shared { reports, folder, projector, playable: Mutex::default() })))
     }
 
     /// The recordings of `session`, with the times of their frames.
@@ -69,7 +69,7 @@ impl Player {
     /// # Errors
     /// If `by` may not play them (yet), there is no such session, or the database failed.
     pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, PlaybackError> {
-        let played = self.0.conductor.to_play(by, session).await?;
+        let played = self.0.reports.to_play(by, session).await?;
         let folder = self.0.folder.clone();
         let found = spawn_blocking(move || {
             of_session(&folder, &session.to_string()).map(|found| session_recordings(found, &played))
@@ -131,9 +131,9 @@ impl Player {
         let known = by == Role::Researcher && self.playable().contains(&session);
         if known {
             // The participant may have withdrawn since, even while the recording is playing.
-            self.0.conductor.check_reading(session).await?;
+            self.0.reports.check_reading(session).await?;
         } else {
-            self.0.conductor.to_play(by, session).await?;
+            self.0.reports.to_play(by, session).await?;
             self.playable().insert(session);
         }
         Ok(())

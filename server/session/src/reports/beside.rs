@@ -4,8 +4,8 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::course::Course;
-use super::{ConductError, Conductor};
+use super::Reports;
+use crate::conductor::{ConductError, Course, words_left};
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::{Answer, Erased, Stamp, StoredConsent, StoredCorrection, StoredErasure};
 use parfocal_trial::consent::Consent;
@@ -69,12 +69,12 @@ pub struct WithdrawalLine {
     pub words_left: usize,
 }
 
-impl Conductor {
+impl Reports {
     /// The log lines of consents, corrections and erasures. Each comes with its time by the server's clocks over its
     /// restarts.
     pub(super) async fn beside(&self, session: SessionId) -> Result<Vec<(Timestamp, LogLine)>, ConductError> {
-        let reader = self.shared.store.reader();
-        let clocks = &self.shared.run_clock.clocks;
+        let reader = &self.reader;
+        let clocks = &self.run_clock.clocks;
         let actors = reader.actors(session).await?;
         let line = |kind: &str, number: i64, run: i64, stamp: Stamp, by: Role, text: String| {
             let account = actors.get(&(kind.to_owned(), number.to_string())).cloned();
@@ -117,13 +117,13 @@ impl Conductor {
     }
 
     pub(super) async fn consent_lines(&self, session: SessionId) -> Result<Vec<ConsentLine>, ConductError> {
-        let consents = self.shared.store.reader().consents(session).await?;
+        let consents = self.reader.consents(session).await?;
         let line = |stored: StoredConsent| ConsentLine { at: stored.stamp.wall, consent: stored.consent };
         Ok(consents.into_iter().map(line).collect())
     }
 
     pub(super) async fn correction_lines(&self, course: &Course) -> Result<Vec<CorrectionLine>, ConductError> {
-        let reader = self.shared.store.reader();
+        let reader = &self.reader;
         let session = course.session();
         let corrections = reader.corrections(session).await?;
         let answers = reader.answers(session).await?;
@@ -172,7 +172,7 @@ impl Conductor {
             by: event.by,
             account: event.account.map(|account| account.to_string()),
             reason,
-            words_left: self.shared.words_left(course.session()).await?.len(),
+            words_left: words_left(&self.reader, course.session()).await?.len(),
         }))
     }
 }

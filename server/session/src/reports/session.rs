@@ -1,25 +1,20 @@
-//! Reports for the operator's and researcher's pages: participants, protocols, sessions, one session in detail.
-
-use std::sync::Arc;
+//! One session in detail, for the researcher's page.
 
 use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::Reports;
 use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
-use super::course::Course;
-use super::{ConductError, Conductor, ProtocolSummary};
+use crate::conductor::{ConductError, Course};
 use parfocal_base::PolicyName;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal_records::store::{DeviceEvent, Erased, Latest, Participant, Reader, Recorder, SessionLine, standings};
-use parfocal_trial::account::Actor;
+use parfocal_records::store::{DeviceEvent, Erased, Latest, SessionLine, standings};
 use parfocal_trial::correction::{Field, Subject};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
 use parfocal_trial::grace::Outstanding;
 use parfocal_trial::instruments::{Measure, in_words, measures, sus_score};
-use parfocal_trial::participant::ParticipantCode;
-use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::question::{AnswerValue, QuestionKind};
 use parfocal_trial::role::Role;
 use parfocal_trial::session::inspections;
@@ -127,66 +122,13 @@ pub struct Unblinding {
     pub policies: Vec<PolicyName>,
 }
 
-impl Conductor {
-    /// Reads the database.
-    #[must_use]
-    pub fn reader(&self) -> &Reader {
-        self.shared.store.reader()
-    }
-
-    /// Records what `by` looks at.
-    #[must_use]
-    pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
-        Recorder::of_server(&self.shared.store, by.into(), Arc::clone(&self.shared.clock))
-    }
-
-    /// Checks that the comments, answers and recordings of `session` may be read.
-    ///
-    /// # Errors
-    /// If its participant withdrew, or the database failed.
-    pub async fn check_reading(&self, session: SessionId) -> Result<(), ConductError> {
-        let withdrawn = self.shared.store.reader().is_withdrawn(session).await?;
-        Ok(permission::check_reading(withdrawn)?)
-    }
-
-    /// The participants, by code.
-    ///
-    /// # Errors
-    /// If the database failed.
-    pub async fn participants(&self) -> Result<Vec<Participant>, ConductError> {
-        Ok(self.shared.store.reader().participants().await?)
-    }
-
-    /// Adds a participant; an existing one stays.
-    ///
-    /// # Errors
-    /// If `code` is not a valid code, `by` may not add participants, or the disk failed.
-    pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
-        permission::check(by, Request::AddParticipant, CurrentSession::None)?;
-        let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
-        Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
-    }
-
-    /// The protocols, by name.
-    #[must_use]
-    pub fn protocols(&self) -> Vec<ProtocolSummary> {
-        self.shared.library.summaries()
-    }
-
-    /// The sessions, newest first; practice sessions only if `practice` is set.
-    ///
-    /// # Errors
-    /// If the database failed.
-    pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, ConductError> {
-        Ok(self.shared.store.reader().sessions(practice).await?)
-    }
-
+impl Reports {
     /// Session `session` in detail.
     ///
     /// # Errors
     /// If there is no such session, or the database failed.
     pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
-        let course = self.shared.load(session).await?;
+        let course = self.load(session).await?;
         let withdrawal = self.withdrawal(&course).await?;
         let mut answers = self.answer_lines(&course).await?;
         let mut corrections = self.correction_lines(&course).await?;
@@ -196,7 +138,7 @@ impl Conductor {
             corrections.retain(|correction| correction.field == Field::Participant);
         }
 
-        let line = self.shared.store.reader().session_line(session).await?;
+        let line = self.reader.session_line(session).await?;
         let line = line.ok_or_else(|| ConductError::NotFound("there is no such session".to_owned()))?;
         Ok(SessionDetail {
             line,
@@ -209,7 +151,7 @@ impl Conductor {
             consents: self.consent_lines(session).await?,
             withdrawal,
             counts_until: course.grace.until(),
-            outstanding: self.shared.outstanding(course.session(), course.grace).await?,
+            outstanding: self.outstanding(&course).await?,
             log: self.log(&course).await?,
             unblinding: unblinding(&course),
         })
@@ -217,10 +159,9 @@ impl Conductor {
 
     /// The events of the session, and those of camera and lens since the session was made.
     async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
-        let reader = self.shared.store.reader();
-        let clocks = &self.shared.run_clock.clocks;
-        let events = reader.events(course.session()).await?;
-        let devices = reader.device_events(course.session()).await?;
+        let clocks = &self.run_clock.clocks;
+        let events = self.reader.events(course.session()).await?;
+        let devices = self.reader.device_events(course.session()).await?;
 
         // In the order in which things happened, even if the wall clock was changed in between.
         let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
@@ -249,11 +190,11 @@ impl Conductor {
     }
 
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
-        let clocks = &self.shared.run_clock.clocks;
-        let answers = self.shared.store.reader().answers(course.session()).await?;
+        let clocks = &self.run_clock.clocks;
+        let answers = self.reader.answers(course.session()).await?;
         let standings = standings(&answers, clocks);
-        let corrections = Latest::of(&self.shared.store.reader().corrections(course.session()).await?);
-        let erased = Erased::by(&self.shared.store.reader().erasures(course.session()).await?);
+        let corrections = Latest::of(&self.reader.corrections(course.session()).await?);
+        let erased = Erased::by(&self.reader.erasures(course.session()).await?);
 
         let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();
         for ((run, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {

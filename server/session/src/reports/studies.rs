@@ -4,14 +4,13 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::studies::Studies;
-use super::{ConductError, Conductor, ProtocolSummary};
+use crate::conductor::{ConductError, ProtocolSummary, Studies};
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::StoredStudy;
 use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
-use parfocal_trial::study::definition::{Definition, PlaceRules, Site};
+use parfocal_trial::study::definition::{PlaceRules, Site};
 use parfocal_trial::study::event::StudyEvent;
 use parfocal_trial::study::lists::commitment_line;
 use parfocal_trial::study::places::Enrolled;
@@ -142,52 +141,28 @@ pub struct OpenStudy {
     pub protocols: Vec<ProtocolSummary>,
 }
 
-impl Studies {
+impl StudyLine {
     /// All studies, in the order in which they were planned.
     ///
     /// # Errors
     /// If the database failed.
-    pub async fn lines(&self) -> Result<Vec<StudyLine>, ConductError> {
+    pub async fn all(studies: &Studies) -> Result<Vec<Self>, ConductError> {
         let mut lines = Vec::new();
-        for name in self.reader().study_names().await? {
-            lines.push(line(&self.stored(&name).await?));
+        for name in studies.reader().study_names().await? {
+            lines.push(line(&studies.stored(&name).await?));
         }
         Ok(lines)
     }
-
-    /// Study `name` in detail.
-    ///
-    /// # Errors
-    /// If there is no such study, or the database failed.
-    pub async fn detail(&self, name: &str) -> Result<StudyDetail, ConductError> {
-        let study = self.stored(name).await?;
-        let mut detail = StudyDetail::of(&study);
-        if detail.line.stage == Stage::Planned {
-            detail.concerns = self.concerns(&study).await?;
-        }
-        if detail.line.stage == Stage::Closed {
-            detail.outstanding = self.outstanding(&study).await?;
-        }
-        Ok(detail)
-    }
 }
 
-impl Conductor {
-    /// The text of a definition to start from, for a study that `lead` unblinds; none if no protocol is for studies.
-    #[must_use]
-    pub fn study_template(&self, lead: &str) -> Option<String> {
-        let protocols = self.shared.library.protocols();
-        let protocol = protocols.iter().find(|protocol| !protocol.practice)?;
-        Some(Definition::template(protocol, lead))
-    }
-
+impl OpenStudy {
     /// The studies that accept new sessions now.
     ///
     /// # Errors
     /// If the database failed.
-    pub async fn open_studies(&self) -> Result<Vec<OpenStudy>, ConductError> {
-        let open = self.shared.studies.taking_sessions().await?;
-        let summary = |study: StoredStudy| OpenStudy {
+    pub async fn all(studies: &Studies) -> Result<Vec<Self>, ConductError> {
+        let open = studies.taking_sessions().await?;
+        let summary = |study: StoredStudy| Self {
             study: study.definition.name.as_str().to_owned(),
             title: study.definition.title.clone(),
             protocols: study.definition.protocols.iter().map(ProtocolSummary::of).collect(),
@@ -209,6 +184,22 @@ fn line(study: &StoredStudy) -> StudyLine {
 }
 
 impl StudyDetail {
+    /// Study `name` in detail.
+    ///
+    /// # Errors
+    /// If there is no such study, or the database failed.
+    pub async fn read(studies: &Studies, name: &str) -> Result<Self, ConductError> {
+        let study = studies.stored(name).await?;
+        let mut detail = Self::of(&study);
+        if detail.line.stage == Stage::Planned {
+            detail.concerns = studies.concerns(&study).await?;
+        }
+        if detail.line.stage == Stage::Closed {
+            detail.outstanding = studies.outstanding(&study).await?;
+        }
+        Ok(detail)
+    }
+
     /// The details of `study`; `outstanding` is 0, and `concerns` is empty.
     #[must_use]
     pub fn of(study: &StoredStudy) -> Self {

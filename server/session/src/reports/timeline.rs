@@ -7,8 +7,8 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::course::Course;
-use super::{ConductError, Conductor};
+use super::Reports;
+use crate::conductor::{ConductError, Course};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn};
@@ -200,17 +200,17 @@ pub struct SetAside {
     pub late: bool,
 }
 
-impl Conductor {
+impl Reports {
     /// Session `session` over time, as `by` may see it. The focal path is thinned to about `points` points per setting.
     ///
     /// # Errors
     /// If there is no such session, its participant withdrew, or the database failed.
     pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
-        let course = self.shared.load(session).await?;
+        let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
         let with_metric = permission::may_see_metric(by, course.state.unblinded());
-        let reader = self.shared.store.reader();
-        let runs = &self.shared.run_clock.clocks;
+        let reader = &self.reader;
+        let runs = &self.run_clock.clocks;
         let events = reader.events(session).await?;
         let events: Vec<(Timestamp, Event)> =
             events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
@@ -305,18 +305,18 @@ impl Played {
     }
 }
 
-impl Conductor {
+impl Reports {
     /// The facts about `session` that are needed to play its recordings.
     ///
     /// # Errors
     /// If `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
     pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
-        let course = self.shared.load(session).await?;
+        let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
         permission::check_playing(by, course.state.unblinded())?;
 
-        let clocks = Arc::clone(&self.shared.run_clock.clocks);
-        let events = self.shared.store.reader().events(session).await?;
+        let clocks = Arc::clone(&self.run_clock.clocks);
+        let events = self.reader.events(session).await?;
         let events: Vec<_> = events.into_iter().map(|(run, event)| (clocks.wall(run, event.at), event)).collect();
         Ok(Played {
             start: start(&course, &events),
