@@ -17,7 +17,6 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
-use tokio_rustls::rustls::ServerConfig;
 use tracing_subscriber::EnvFilter;
 
 pub use self::arguments::Arguments;
@@ -31,7 +30,7 @@ use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
 use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
 use parfocal_dashboard::openigtlink;
-use parfocal_dashboard::tls::{Certificates, TlsError, keep_current};
+use parfocal_dashboard::tls::{Certificates, keep_current};
 use parfocal_imaging::{Calibration, Developer, Size};
 use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Settings};
 use parfocal_pipeline::live;
@@ -112,7 +111,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     let registry = rig.registry.clone();
     let store = open_store(arguments, folder, &calibration, &registry, clock.as_ref()).await?;
-    let settings = certificates.as_ref().map(|certificates| encryption(certificates, &clock)).transpose()?;
+    let settings = certificates.as_ref().map(Certificates::settings).transpose()?;
+    keep_in_time(certificates.as_ref(), &clock);
 
     let mosaics = rig.camera.mosaic_size();
     let frame_period = Duration::from_secs(1) / arguments.fps;
@@ -301,10 +301,11 @@ async fn open_store(
     Ok(store)
 }
 
-/// The settings of TLS with `certificates`, which are renewed from now on.
-fn encryption(certificates: &Arc<Certificates>, clock: &Arc<dyn Clock>) -> Result<Arc<ServerConfig>, TlsError> {
-    tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(clock)));
-    certificates.settings()
+/// Renews `certificates` from now on, if there are any.
+fn keep_in_time(certificates: Option<&Arc<Certificates>>, clock: &Arc<dyn Clock>) {
+    if let Some(certificates) = certificates {
+        tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(clock)));
+    }
 }
 
 /// A random source that may be predictable; real sessions draw nothing from it.
