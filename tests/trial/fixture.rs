@@ -183,7 +183,7 @@ impl Trial {
                 QuestionKind::SurgTlx { scales, pairs } => {
                     AnswerValue::Points([vec![11; scales.len()], vec![1; pairs.len()]].concat())
                 }
-                QuestionKind::Sus => AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]),
+                QuestionKind::Sus { .. } => AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]),
             };
 
             self.answer(&question.id, value).await.unwrap();

@@ -243,7 +243,8 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
     }
 
     let view = trial.view();
-    let sus = view.questions.iter().find(|question| question.kind == QuestionKind::Sus).unwrap().id.clone();
+    let sus =
+        view.questions.iter().find(|question| matches!(question.kind, QuestionKind::Sus { .. })).unwrap().id.clone();
     let item = |place: usize, point: u8| {
         let mut items = vec![0; 10];
         items[place] = point;

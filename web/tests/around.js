@@ -9,6 +9,7 @@ export const VIEW = {
   may_pause: true,
   unrecorded: false,
   practice: false,
+  language: "en",
   title: "Trial",
   segment: "a",
   setting: 2,

@@ -14,7 +14,14 @@ const REMARKS = { id: "remarks", kind: "text", text: "Remarks?", optional: true 
 /** @type {Api.Question} */
 const ORDER = { id: "order", kind: "ranking", text: "Which was best?" };
 /** @type {Api.Question} */
-const USABILITY = { id: "usability", kind: "sus", text: "Usability" };
+const USABILITY = {
+  id: "usability",
+  kind: "sus",
+  text: "Usability",
+  items: Array.from({ length: 10 }, (_, item) => `Item ${item + 1}`),
+  low: "Strongly disagree",
+  high: "Strongly agree",
+};
 
 const UNCONFIRMED = "Kept on this device until you tap “This order is right”";
 

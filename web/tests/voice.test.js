@@ -2,9 +2,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { Refused } from "../static/shared/api.js";
+import { say } from "../static/shared/language.js";
 import { Origins } from "../static/surgeon/origin.js";
 import { VoiceOutbox } from "../static/surgeon/voice_outbox.js";
-import { heldWords, NO_CONNECTION } from "../static/surgeon/words.js";
+import { heldWords } from "../static/surgeon/words.js";
 import { countedIds, FakeDisk, FakeTime, fakeStore, settle } from "./around.js";
 
 const PLACE = { session: "s", segment: "g", setting: 1, frame: 7, run: 1 };
@@ -78,7 +79,7 @@ test("without a network everything stays on the device and lands in order, over 
   await settle();
   assert.equal(page.store.kept.size, 2);
   assert.equal(outbox.waiting, 1, "one recording, however many pieces");
-  assert.deepEqual([outbox.heldUp, outbox.trouble, outbox.status.text], [1, NO_CONNECTION, ""]);
+  assert.deepEqual([outbox.heldUp, outbox.trouble, outbox.status.text], [1, say("no-connection"), ""]);
 
   // The page is loaded again, and the network is back.
   page.answers.length = 0;
@@ -127,7 +128,7 @@ test("a device without room says so, and sends all the same", async () => {
 });
 
 test("one line tells everything that waits, where it is, and what becomes of it", () => {
-  const held = { comments: 3, recordings: 1, durable: true, trouble: NO_CONNECTION };
+  const held = { comments: 3, recordings: 1, durable: true, trouble: say("no-connection") };
   assert.equal(heldWords(held), "Saved here: 3 comments, 1 recording. Sent when the network is back.");
   assert.equal(heldWords({ ...held, comments: 0, trouble: null }), "Saved here: 1 recording.");
   assert.equal(

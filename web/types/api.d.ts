@@ -1961,6 +1961,11 @@ export interface components {
          * @enum {string}
          */
         Kind: "mosaic" | "view";
+        /**
+         * @description A language that surgeons can read.
+         * @enum {string}
+         */
+        Language: "en" | "de" | "fr" | "es";
         /** @description A circle in the camera's mosaic. */
         LivePlace: {
             /**
@@ -2424,8 +2429,14 @@ export interface components {
             /** @description Whether settings may share a place. */
             ties?: boolean;
         } | {
+            /** @description Meaning of 5. */
+            high: string;
+            /** @description The ten items as the surgeon reads them. */
+            items: string[];
             /** @enum {string} */
             kind: "sus";
+            /** @description Meaning of 1. */
+            low: string;
         } | {
             /** @enum {string} */
             kind: "nasa-tlx";
@@ -3013,6 +3024,8 @@ export interface components {
             focus_held: boolean;
             /** @description Whether the protocol lets the surgeon hold the focus. */
             holding: boolean;
+            /** @description Language of all that the surgeon reads. */
+            language: components["schemas"]["Language"];
             /** @description Whether the surgeon may pause the session. */
             may_pause: boolean;
             /** @description Whether the surgeon may resume the session: not after a pause by the operator. */

@@ -555,6 +555,9 @@ class Interval(TypedDict):
 Kind = Literal["mosaic", "view"]
 """What a recording is made of."""
 
+Language = Literal["en", "de", "fr", "es"]
+"""A language that surgeons can read."""
+
 class LivePlace(TypedDict):
     """A circle in the camera's mosaic."""
 
@@ -776,6 +779,9 @@ class OperatorView(TypedDict):
 
     holding: bool
     """Whether the protocol lets the surgeon hold the focus."""
+
+    language: Language
+    """Language of all that the surgeon reads."""
 
     may_pause: bool
     """Whether the surgeon may pause the session."""
@@ -1734,6 +1740,9 @@ class SurgeonView(TypedDict):
 
     holding: bool
     """Whether the protocol lets the surgeon hold the focus."""
+
+    language: Language
+    """Language of all that the surgeon reads."""
 
     may_pause: bool
     """Whether the surgeon may pause the session."""

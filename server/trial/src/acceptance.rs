@@ -4,10 +4,11 @@
 use super::answers;
 use super::protocol::Protocol;
 use super::question::AnswerValue;
-use super::refusal::Refusal;
+use super::refusal::{Refusal, RefusalKind};
 use super::remark::{CommentContent, NewAnswer};
 use super::session::SessionState;
 use parfocal_base::ids::SegmentId;
+use parfocal_language::Message;
 
 /// Checks the content of a comment.
 ///
@@ -16,7 +17,7 @@ use parfocal_base::ids::SegmentId;
 pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
     let (CommentContent::Text(text) | CommentContent::Quick(text)) = said else { return Ok(()) };
     if text.trim().is_empty() {
-        return Err(Refusal::Invalid("the comment is empty".to_owned()));
+        return Err(Refusal::Said(RefusalKind::Invalid, Message::new("refused-empty")));
     }
     check_length(text)
 }
@@ -28,7 +29,7 @@ pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
 /// If the comment is spoken and the session does not ask for voice.
 pub fn check_spoken(said: &CommentContent, voice: bool) -> Result<(), Refusal> {
     if *said == CommentContent::Voice && !voice {
-        return Err(Refusal::conflict("this trial does not record voice; type the comment"));
+        return Err(Refusal::not_now("refused-no-voice"));
     }
     Ok(())
 }
@@ -41,13 +42,13 @@ pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) 
     let plan = state.plan();
     let has_segment = new.segment.is_none_or(|segment| plan.position(segment).is_some());
     let question = protocol.question(&new.question, new.segment.is_some()).filter(|_| has_segment);
-    let question = question.ok_or(Refusal::UnknownQuestion)?;
+    let question = question.ok_or(Refusal::unknown_question())?;
 
     if !state.takes_answers(new.segment) {
-        return Err(Refusal::conflict("this question has not been asked yet"));
+        return Err(Refusal::not_now("refused-question-not-asked"));
     }
     let fits = answers::check(question, &new.value, plan.segments.len());
-    fits.map_err(|misfit| Refusal::Invalid(misfit.to_string()))
+    fits.map_err(Refusal::from)
 }
 
 /// Checks the answer `new` in a session of `segments` whose questions are unknown, because this version cannot read the
@@ -60,13 +61,13 @@ pub fn check_unasked(new: &NewAnswer, segments: &[SegmentId]) -> Result<(), Refu
         check_length(text)?;
     }
     match new.segment {
-        Some(segment) if !segments.contains(&segment) => Err(Refusal::UnknownSegment),
+        Some(segment) if !segments.contains(&segment) => Err(Refusal::unknown_segment()),
         _ => Ok(()),
     }
 }
 
 fn check_length(text: &str) -> Result<(), Refusal> {
-    answers::check_length(text).map_err(|misfit| Refusal::Invalid(misfit.to_string()))
+    answers::check_length(text).map_err(Refusal::from)
 }
 
 #[cfg(test)]
@@ -77,14 +78,14 @@ mod tests {
     fn voice_is_taken_only_where_the_protocol_asks_for_it() {
         assert_eq!(check_spoken(&CommentContent::Voice, true), Ok(()));
         assert_eq!(check_spoken(&CommentContent::Mark, false), Ok(()));
-        assert!(matches!(check_spoken(&CommentContent::Voice, false), Err(Refusal::Conflict(_))));
+        assert!(matches!(check_spoken(&CommentContent::Voice, false), Err(Refusal::Said(RefusalKind::Conflict, _))));
     }
 
     #[test]
     fn a_comment_must_say_something_and_no_more_than_fits() {
         assert_eq!(check_comment(&CommentContent::Text("sharp".to_owned())), Ok(()));
         let refused = |text: &str| check_comment(&CommentContent::Text(text.to_owned())).unwrap_err();
-        assert_eq!(refused(" \n"), Refusal::Invalid("the comment is empty".to_owned()));
-        assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Invalid(_)));
+        assert_eq!(refused(" \n").to_string(), "the comment is empty");
+        assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Said(RefusalKind::Invalid, _)));
     }
 }

@@ -2,6 +2,8 @@
 
 use super::instruments;
 use super::question::{AnswerValue, Question};
+use super::refusal::{Refusal, RefusalKind};
+use parfocal_language::Message;
 
 /// Maximum length of the text of an answer or comment, in bytes of UTF-8: about 2500 words.
 pub const LONGEST_TEXT: usize = 16 * 1024;
@@ -18,11 +20,24 @@ pub enum Misfit {
         expected: String,
     },
     /// The text is too long.
-    #[error("the text is {length} bytes long; the limit is {LONGEST_TEXT}, so please split it")]
+    #[error("{}", too_long(*length))]
     TooLong {
         /// Length of the text in bytes.
         length: usize,
     },
+}
+
+fn too_long(length: usize) -> Message {
+    Message::new("refused-too-long").number("length", length).number("limit", LONGEST_TEXT)
+}
+
+impl From<Misfit> for Refusal {
+    fn from(misfit: Misfit) -> Self {
+        match misfit {
+            Misfit::TooLong { length } => Self::Said(RefusalKind::Invalid, too_long(length)),
+            Misfit::Kind { .. } => Self::Invalid(misfit.to_string()),
+        }
+    }
 }
 
 /// Checks that `value` is an answer to `question` in a session of `settings` settings.
@@ -81,7 +96,7 @@ mod tests {
 
     #[test]
     fn the_items_of_a_questionnaire_add_up_in_any_order_and_the_latest_of_each_counts() {
-        let sus = question(QuestionKind::Sus);
+        let sus = question(crate::instruments::sus::question(parfocal_language::Language::English).unwrap());
         let item = |place: usize, point: u8| {
             let mut items = vec![0; SUS_ITEMS];
             items[place] = point;

@@ -172,7 +172,7 @@ pub fn check_value(
     protocol: &Protocol,
     settings: usize,
 ) -> Result<(), Refusal> {
-    let question = protocol.question(answer.question, answer.segment.is_some()).ok_or(Refusal::UnknownQuestion)?;
+    let question = protocol.question(answer.question, answer.segment.is_some()).ok_or(Refusal::unknown_question())?;
     if question.kind == QuestionKind::Text {
         return Err(Refusal::conflict("a surgeon's words are never corrected; add a note instead"));
     }

@@ -76,7 +76,7 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
             Err(Refusal::conflict("the session is under way; abort it to end it"))
         }
         (Request::PlacePatch, CurrentSession::UnderWay | CurrentSession::Ended) => {
-            Err(Refusal::conflict("a session is under way; load the page again"))
+            Err(Refusal::not_now("refused-under-way"))
         }
         // This also holds after the end: the surgeon still sees the view, and may still be answering questions.
         (Request::MoveLens, CurrentSession::UnderWay | CurrentSession::Ended) => {

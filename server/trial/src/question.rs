@@ -54,7 +54,14 @@ pub enum QuestionKind {
         ties: bool,
     },
     /// The System Usability Scale: ten items of 1..=5.
-    Sus,
+    Sus {
+        /// The ten items as the surgeon reads them.
+        items: Vec<String>,
+        /// Meaning of 1.
+        low: String,
+        /// Meaning of 5.
+        high: String,
+    },
     /// The NASA Task Load Index without weights.
     NasaTlx {
         /// The six scales.
@@ -104,7 +111,7 @@ impl QuestionKind {
             Self::Likert { .. } => "likert",
             Self::VisualAnalogue { .. } => "visual-analogue",
             Self::Ranking { .. } => "ranking",
-            Self::Sus => "sus",
+            Self::Sus { .. } => "sus",
             Self::NasaTlx { .. } => "nasa-tlx",
             Self::SurgTlx { .. } => "surg-tlx",
             Self::Recognition => "recognition",

@@ -1,23 +1,33 @@
 //! Why a request was refused.
 
+use parfocal_language::Message;
+
 /// Why a request was refused. Nothing was changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// Only another role may do this.
     #[error("{0}")]
     NotAllowed(String),
-    /// The session has no such segment.
-    #[error("this session has no such setting; reload the page")]
-    UnknownSegment,
-    /// The session does not ask this question about this segment.
-    #[error("this session does not ask this question about this setting; reload the page")]
-    UnknownQuestion,
     /// The request does not fit the present state.
     #[error("{0}")]
     Conflict(String),
     /// The request is not valid.
     #[error("{0}")]
     Invalid(String),
+    /// The same as one of the above; a surgeon can meet it, and reads it in the session's language.
+    #[error("{1}")]
+    Said(RefusalKind, Message),
+}
+
+/// The kinds of refusal that a surgeon can meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// There is no such session, setting or question.
+    Unknown,
+    /// The request does not fit the present state.
+    Conflict,
+    /// The request is not valid.
+    Invalid,
 }
 
 impl Refusal {
@@ -25,6 +35,24 @@ impl Refusal {
     #[must_use]
     pub fn only(who: &str) -> Self {
         Self::NotAllowed(format!("only {who} can do this"))
+    }
+
+    /// The session has no such segment.
+    #[must_use]
+    pub const fn unknown_segment() -> Self {
+        Self::Said(RefusalKind::Unknown, Message::new("refused-no-setting"))
+    }
+
+    /// The session does not ask this question about this segment.
+    #[must_use]
+    pub const fn unknown_question() -> Self {
+        Self::Said(RefusalKind::Unknown, Message::new("refused-no-question"))
+    }
+
+    /// A refusal because of the present state, which a surgeon can meet. `id` names its message.
+    #[must_use]
+    pub const fn not_now(id: &'static str) -> Self {
+        Self::Said(RefusalKind::Conflict, Message::new(id))
     }
 
     /// A refusal because of the present state. `text` describes it.

@@ -13,6 +13,7 @@ use super::remark::CommentContent;
 use super::role::Role;
 use super::session::PauseCause;
 use parfocal_base::ids::{SegmentId, SessionId};
+use parfocal_language::Language;
 
 /// A session as the surgeon's browser gets it. Nothing in it depends on the policy.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -34,6 +35,8 @@ pub struct SurgeonView {
     pub unrecorded: bool,
     /// Whether this is a practice session.
     pub practice: bool,
+    /// Language of all that the surgeon reads.
+    pub language: Language,
     /// The protocol's title for surgeons.
     pub title: String,
     /// Random id of the current segment; none if no segment is under way. No two segments share an id.

@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 64] = [
+const KEYS: [&str; 66] = [
     "age",
     "answers",
     "area",
@@ -47,8 +47,10 @@ const KEYS: [&str; 64] = [
     "high",
     "holding",
     "id",
+    "items",
     "kind",
     "labels",
+    "language",
     "lens_simulated",
     "low",
     "may_pause",

@@ -10,7 +10,7 @@ use super::theatre::Theatre;
 const TABLET: [(u32, u32); 2] = [(820, 1180), (1180, 820)];
 
 /// Checks the state `name` of a page in both positions of the tablet.
-async fn look(browser: &Browser, name: &str) {
+pub(super) async fn look(browser: &Browser, name: &str) {
     for (width, height) in TABLET {
         resize(browser, width, height).await;
         accessible::check_reach(browser, &format!("{name} at {width}x{height}")).await;

@@ -18,6 +18,7 @@ mod full_disk;
 mod instruments;
 mod keyboard;
 mod killed;
+mod languages;
 mod large_text;
 mod lens_troubles;
 mod offline;

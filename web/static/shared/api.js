@@ -1,5 +1,7 @@
 // Sends JSON to the server, and distinguishes three outcomes: success, a refusal by the server, no answer.
 
+import { say } from "./language.js";
+
 /** A request that the server refused. Its message is written for people. */
 export class Refused extends Error {
   /**
@@ -109,12 +111,11 @@ function refusal(text, status) {
 /** @param {number} status */
 function explanation(status) {
   if (status === 401 || status === 403) {
-    return "This link is no longer valid here. Open it again, or ask for a new one.";
+    return say("link-refused");
   }
-  if (status === 413) return "This text is too long. Send it in shorter parts.";
-  if (status < 300)
-    return "Something else answered in place of the server. Check which network this device is on.";
-  return `The server answered with an error (${status}).`;
+  if (status === 413) return say("text-too-long");
+  if (status < 300) return say("other-answered");
+  return say("server-error", { status: String(status) });
 }
 
 /**
@@ -198,6 +199,6 @@ export async function keepAudio(path, audio, type) {
  * @param {unknown} error
  * @param {string} [noAnswer] the text if the server did not answer
  */
-export function inWords(error, noAnswer = "No connection to the server. Try again in a moment.") {
+export function inWords(error, noAnswer = say("server-silent")) {
   return error instanceof Refused ? error.message : noAnswer;
 }

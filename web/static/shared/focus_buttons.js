@@ -2,6 +2,7 @@
 
 import { byId, setText } from "./dom.js";
 import { Hold, isHoldKey } from "./hold.js";
+import { say } from "./language.js";
 import { tell, tellTrouble } from "./trouble.js";
 
 /** @typedef {Pick<Api.SurgeonView, "phase" | "paused" | "pointing" | "holding" | "focus_held">} View */
@@ -14,7 +15,7 @@ import { tell, tellTrouble } from "./trouble.js";
  */
 export function tellPointing(element, trouble) {
   if (typeof trouble === "string" || trouble === null) tell(element, trouble ?? "");
-  else tellTrouble(element, trouble, "The server does not answer, so the focus was not moved.");
+  else tellTrouble(element, trouble, say("not-pointed-server"));
 }
 
 /**
@@ -46,7 +47,7 @@ export function focusButtons(pointing, ask) {
     button.hidden = isOver || !(inspecting && session.holding);
     button.disabled = !looking;
     button.setAttribute("aria-pressed", String(held));
-    setText(button, held ? "Focus held" : "Hold focus");
+    setText(button, held ? say("focus-held") : say("hold-focus"));
   }
 
   const open = () => !button.hidden && !button.disabled;

@@ -1,5 +1,7 @@
 // How times and counts are written.
 
+import { language } from "./language.js";
+
 /**
  * Seconds as `1:05`. Elapsed time is rounded down. For remaining time, pass `Math.ceil`.
  *
@@ -17,7 +19,11 @@ export function clockText(seconds, round = Math.floor) {
  * @param {number} millis since 1970
  */
 export function minuteText(millis) {
-  return new Date(millis).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+  return new Date(millis).toLocaleTimeString(language(), {
+    hour: "2-digit",
+    minute: "2-digit",
+    hourCycle: "h23",
+  });
 }
 
 /**

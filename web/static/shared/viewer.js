@@ -4,6 +4,7 @@ import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
 import { make, setText } from "./dom.js";
 import { Fit } from "./fit.js";
 import { Framing } from "./framing.js";
+import { say } from "./language.js";
 import { Live } from "./live.js";
 import { drawContentArea, drawPatch, drawRing, Peaking } from "./overlay.js";
 import { Pointing } from "./pointing.js";
@@ -71,11 +72,10 @@ export class Viewer {
     this.#element = element;
     this.#colour = colour;
     this.#picture.canvas.setAttribute("role", "img");
-    this.#picture.canvas.setAttribute("aria-label", "Live view");
     element.append(this.#picture.canvas, this.#overlay.canvas, this.#unzoom, this.#stale, this.#heard);
     element.tabIndex = 0;
     element.setAttribute("role", "group");
-    element.setAttribute("aria-label", "Live view. Plus and minus zoom, zero shows everything.");
+    this.drawWords();
 
     this.#lookAtScreen = onResize(this.#overlay.canvas, () => {
       const { canvas } = this.#overlay;
@@ -158,13 +158,9 @@ export class Viewer {
       },
       now: () => performance.now(),
       changed: () => this.#drawOverlays(),
-      whyNot: () => (this.#isStale ? "The picture is not live, so the focus was not moved." : ""),
+      whyNot: () => (this.#isStale ? say("not-pointed-live") : ""),
     });
-    this.#element.setAttribute(
-      "aria-label",
-      "Live view. Plus and minus zoom, zero shows everything. Where it is allowed, Shift with an arrow points " +
-        "the focus, and C brings it back to the centre.",
-    );
+    this.drawWords();
     return this.#pointing;
   }
 
@@ -180,6 +176,14 @@ export class Viewer {
 
   get #takenTool() {
     return this.#tool?.isTaken ? this.#tool : null;
+  }
+
+  /** Draws the words on and about the picture, when it is made and when the page's language changes. */
+  drawWords() {
+    const help = this.#pointing ? say("view-help-pointing") : say("view-help");
+    this.#element.setAttribute("aria-label", help);
+    this.#picture.canvas.setAttribute("aria-label", say("live-view"));
+    if (this.#last) this.#place();
   }
 
   /** @param {import("./framing.js").Point} point of the view, CSS pixels */
@@ -235,7 +239,7 @@ export class Viewer {
 
     const { zoom } = this.#framing;
     const isZoomed = zoom > 1.005;
-    if (isZoomed) setText(this.#unzoom, `${zoom.toFixed(1)}× · Show all`);
+    if (isZoomed) setText(this.#unzoom, say("show-all", { zoom: Math.round(zoom * 10) / 10 }));
     this.#unzoom.hidden = !isZoomed;
     this.#element.classList.toggle("viewer-is-zoomed", isZoomed);
 
@@ -283,7 +287,7 @@ export class Viewer {
     // The text on screen counts the seconds. Screen readers announce only when the picture stops being live, and when
     // it is live again.
     if (this.#stale.hidden === isStale) {
-      setText(this.#heard, isStale ? "The picture is not live" : "The picture is live again");
+      setText(this.#heard, isStale ? say("picture-not-live") : say("picture-live-again"));
     }
     this.#stale.hidden = !isStale;
     if (isStale) setText(this.#stale, staleText(age, this.#connected));
@@ -304,14 +308,14 @@ function cellsOf({ width, height, per_cell: perCell }) {
  * @param {boolean} connected
  */
 function staleText(age, connected) {
-  const text =
-    age === null ? "Waiting for the first picture" : `Not live: the picture is ${ageText(age)} old`;
-  return connected ? text : `${text} · connecting`;
+  const state = age === null ? say("picture-first") : ageText(age);
+  return connected ? state : say("picture-connecting", { state });
 }
 
 /** @param {number} ms */
 function ageText(ms) {
   const seconds = Math.round(ms / 1000);
-  if (seconds < 2) return "more than half a second";
-  return seconds < 120 ? `${seconds} seconds` : `${Math.round(seconds / 60)} minutes`;
+  if (seconds < 2) return say("picture-old");
+  if (seconds < 120) return say("picture-old-seconds", { seconds });
+  return say("picture-old-minutes", { minutes: Math.round(seconds / 60) });
 }

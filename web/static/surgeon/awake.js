@@ -1,6 +1,7 @@
 // Keeps the tablet's screen on while a session is under way (Screen Wake Lock API). A browser ends the lock whenever
 // the page is hidden, so the page asks for it again when it is shown.
 
+import { say } from "../shared/language.js";
 import { isEnded } from "./words.js";
 
 /** @typedef {{ release: () => Promise<void>, addEventListener: (type: "release", run: () => void) => void }} Lock */
@@ -74,7 +75,7 @@ export class Awake {
   /** What people have to do to keep the screen on; empty if the page does it. */
   get advice() {
     if (this.#request !== null && !this.#refused) return "";
-    return "This browser does not keep the screen on. Set the tablet so that its screen stays on.";
+    return say("screen-advice");
   }
 }
 

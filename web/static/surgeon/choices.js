@@ -1,7 +1,7 @@
 // Radio buttons for the questions: a scale of numbers, or a few choices in words.
 
 import { make } from "../shared/dom.js";
-import { NOT_ANSWERED } from "./questions.js";
+import { say, words } from "../shared/language.js";
 
 /**
  * @typedef {object} Choices
@@ -22,15 +22,18 @@ export function drawScale(name, { points, low, high }, choose) {
   const ends = make(
     "div",
     { className: "ends" },
-    make("span", { "aria-hidden": "true" }, low),
-    make("span", { className: "gap" }, NOT_ANSWERED),
-    make("span", { "aria-hidden": "true" }, high),
+    make("span", { "aria-hidden": "true", dir: "auto" }, low),
+    make("span", { className: "gap" }, say("not-answered")),
+    make("span", { "aria-hidden": "true", dir: "auto" }, high),
   );
 
   const inputs = Array.from({ length: points }, (_, index) => {
     const point = index + 1;
-    const meaning = point === 1 ? `, ${low}` : point === points ? `, ${high}` : "";
-    const label = `${point} of ${points}${meaning}`;
+    const meaning = point === 1 ? low : point === points ? high : null;
+    const label =
+      meaning === null
+        ? say("scale-point", { point, points })
+        : say("scale-end", { point, points, meaning: words(meaning) });
     const input = make("input", { type: "radio", name, value: String(point), "aria-label": label });
     input.addEventListener("change", () => choose(point));
     return input;
@@ -49,18 +52,20 @@ export function drawScale(name, { points, low, high }, choose) {
  * Radio buttons with words on them.
  *
  * @param {string} name
- * @param {string[]} words
+ * @param {string[]} meanings
  * @param {(point: number) => void} choose
  * @param {string} [className]
  * @returns {Choices}
  */
-export function drawWords(name, words, choose, className = "") {
-  const inputs = words.map((_, index) => {
+export function drawWords(name, meanings, choose, className = "") {
+  const inputs = meanings.map((_, index) => {
     const input = make("input", { type: "radio", name, value: String(index + 1) });
     input.addEventListener("change", () => choose(index + 1));
     return input;
   });
-  const labels = inputs.map((input, index) => make("label", {}, input, make("span", {}, words[index])));
+  const labels = inputs.map((input, index) =>
+    make("label", {}, input, make("span", { dir: "auto" }, meanings[index])),
+  );
   return {
     element: make(
       "div",

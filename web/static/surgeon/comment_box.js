@@ -1,6 +1,7 @@
 // The comment box, the quick comments and "Mark this moment".
 
 import { byId, make, setText } from "../shared/dom.js";
+import { say, words } from "../shared/language.js";
 import { followDrafts } from "./device.js";
 import { isKeyboardUp } from "./room.js";
 
@@ -40,8 +41,8 @@ export function commentBox(comments, outbox, voice) {
     byId("compose").hidden = comments.disabled && state !== null;
     if (!state) endUndo();
     const looking = state?.phase === "inspecting";
-    const invitation = looking ? "Write what you see" : "Write a comment";
-    box.placeholder = state ? invitation : "Comments are kept once a trial begins";
+    const invitation = looking ? say("write-what-you-see") : say("write-comment");
+    box.placeholder = state ? invitation : say("comments-later");
 
     mark.hidden = !looking;
     drawQuick(looking ? state.quick_comments : []);
@@ -56,7 +57,7 @@ export function commentBox(comments, outbox, voice) {
     quick.hidden = texts.length === 0;
     quick.replaceChildren(
       ...texts.map((text) => {
-        const button = make("button", { type: "button" }, text);
+        const button = make("button", { type: "button", dir: "auto" }, text);
         button.onclick = () => tap(button, { kind: "quick", text });
         return button;
       }),
@@ -77,13 +78,13 @@ export function commentBox(comments, outbox, voice) {
 
     const setting = comments.aboutOtherSetting;
     byId("about").hidden = setting === null;
-    if (setting !== null) setText(byId("about"), `This comment is about setting ${setting}.`);
+    if (setting !== null) setText(byId("about"), say("about-setting", { setting }));
 
     const { offer } = comments;
     elsewhere.hidden = offer === null;
     if (offer) {
-      setText(elsewhere, `Continue “${offer.start}”`);
-      elsewhere.title = `Begun in another tab: ${offer.whole}`;
+      setText(elsewhere, say("continue-draft", { start: words(offer.start) }));
+      elsewhere.title = say("begun-elsewhere", { whole: words(offer.whole) });
     }
   }
 
@@ -117,7 +118,7 @@ export function commentBox(comments, outbox, voice) {
   function offerUndo(entry) {
     clearTimeout(undoTimer);
     undo.hidden = false;
-    undo.setAttribute("aria-label", `Undo: ${entry.body.text ?? "the mark"}`);
+    undo.setAttribute("aria-label", say("undo-what", { what: words(entry.body.text ?? say("the-mark")) }));
     undo.onclick = () => {
       endUndo();
       comments.withdraw(entry);

@@ -2,7 +2,7 @@
 // was begun, even if the setting changes while it is being written. A comment begun in another tab is offered, not
 // shown.
 
-import { counted } from "../shared/text.js";
+import { say, words } from "../shared/language.js";
 import { heldWords } from "./words.js";
 
 export const PATH = "/api/surgeon/comments";
@@ -251,7 +251,7 @@ export class Comments {
       this.#begun ??= begunAt({ segment, setting, frame, run, picture_width, pictures_per_second });
       this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
     }
-    this.trouble = `${refusedWords(body)}: ${reason}`;
+    this.trouble = refusedWords(body, reason);
   }
 
   /**
@@ -272,11 +272,11 @@ export class Comments {
     const waiting = this.#waiting;
     const recordings = this.#voice.heldUp;
     if (waiting === 0 && recordings === 0) {
-      return { kind: "saved", text: this.#saved === 0 ? "" : `${counted(this.#saved, "comment")} saved` };
+      return { kind: "saved", text: this.#saved === 0 ? "" : say("comments-saved", { count: this.#saved }) };
     }
 
     const trouble = this.#outbox.trouble ?? this.#voice.trouble;
-    if (trouble === null && recordings === 0) return { kind: "saving", text: "Saving…" };
+    if (trouble === null && recordings === 0) return { kind: "saving", text: say("saving") };
     const durable = this.#outbox.durable && this.#voice.durable;
     return { kind: "unsaved", text: heldWords({ comments: waiting, recordings, durable, trouble }) };
   }
@@ -290,10 +290,13 @@ function begunAt({ segment, setting, frame, run, picture_width = null, pictures_
   return { segment, setting, frame, run, picture_width, pictures_per_second };
 }
 
-/** @param {Record<string, any>} body */
-function refusedWords({ kind, text }) {
-  if (kind === "text") return "The comment was not saved and is back in the box";
-  if (kind === "mark") return "The mark was not saved";
-  if (kind === "withdrawal") return "The comment was not taken back";
-  return `“${text}” was not saved`;
+/**
+ * @param {Record<string, any>} body
+ * @param {string} reason
+ */
+function refusedWords({ kind, text }, reason) {
+  if (kind === "text") return say("comment-not-saved", { reason });
+  if (kind === "mark") return say("mark-not-saved", { reason });
+  if (kind === "withdrawal") return say("comment-not-undone", { reason });
+  return say("quick-not-saved", { text: words(text), reason });
 }

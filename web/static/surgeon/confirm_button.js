@@ -17,7 +17,7 @@ const HELD_MS = 800;
  */
 export function askForSecondPress(button, heard, done) {
   const confirmation = new Confirmation();
-  const second = button.querySelector(".second")?.textContent ?? "";
+  const second = () => button.querySelector(".second")?.textContent ?? "";
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let timer;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -28,7 +28,7 @@ export function askForSecondPress(button, heard, done) {
   /** @param {boolean} armed */
   function draw(armed) {
     button.classList.toggle("armed", armed);
-    setText(heard, armed ? second : "");
+    setText(heard, armed ? second() : "");
   }
 
   function letGo() {

@@ -23,7 +23,7 @@ export const drafts = new Drafts(store, origins, uuid, tab);
 export const lastView = new LastView(store, document.body.dataset.link ?? "", clock.wall);
 
 /** What to do if this browser cannot store anything; empty if it can. */
-export const storage = storageAdvice(store);
+export const storage = () => storageAdvice(store);
 
 /**
  * Runs `run` after `ms` milliseconds. Returns a function that cancels it.

@@ -1,8 +1,8 @@
 // Forms for workload indices, and for a ranking in which settings may share a place.
 
 import { make } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { drawScale, drawWords } from "./choices.js";
-import { NOT_ANSWERED } from "./questions.js";
 import { drawTrack } from "./track.js";
 
 /** @typedef {import("./question_form.js").Drawn} Drawn */
@@ -23,8 +23,8 @@ export function drawWorkload(answer, heading, changed) {
   };
 
   const scales = answer.scales.map(({ title, text, low, high }, item) => {
-    const words = (/** @type {number} */ value) => `${(value - 1) * 5} of 100`;
-    const line = { label: title, low, high, min: 1, max: GRADATIONS, graded: true, words };
+    const inWords = (/** @type {number} */ value) => say("gradation", { value: (value - 1) * 5 });
+    const line = { label: title, low, high, min: 1, max: GRADATIONS, graded: true, inWords };
     const track = drawTrack(line, (value) => choose(item, value));
     const about = make("p", { className: "about" }, text);
     return {
@@ -37,7 +37,7 @@ export function drawWorkload(answer, heading, changed) {
     const item = scales.length + index;
     const names = [first, second].map((place) => answer.scales[place]?.title ?? "");
     const choices = drawWords(`${answer.question.id}-${item}`, names, (point) => choose(item, point), "pair");
-    const label = `${names[0]} or ${names[1]}`;
+    const label = say("pair-label", { first: names[0] ?? "", second: names[1] ?? "" });
     return {
       element: make("fieldset", { "aria-label": label }, choices.element, gap()),
       show: choices.check,
@@ -45,11 +45,7 @@ export function drawWorkload(answer, heading, changed) {
   });
 
   const items = [...scales, ...pairs];
-  const compare = make(
-    "p",
-    { className: "about" },
-    "In each pair, tap the one that contributed more to the workload.",
-  );
+  const compare = make("p", { className: "about" }, say("pair-choose"));
   return {
     nodes: [
       heading,
@@ -78,17 +74,22 @@ export function drawWorkload(answer, heading, changed) {
  * @returns {Drawn}
  */
 export function drawPlaces(answer, heading, changed) {
-  const ends = { points: answer.points.length, low: "Best", high: "Worst" };
+  const ends = { points: answer.points.length, low: say("best"), high: say("worst") };
   const settings = answer.points.map((_, item) => {
     const scale = drawScale(`${answer.question.id}-${item}`, ends, (place) => {
       answer.choose(item, place);
       changed();
     });
-    const element = make("fieldset", {}, make("legend", {}, `Setting ${item + 1}`), scale.element);
+    const element = make(
+      "fieldset",
+      {},
+      make("legend", {}, say("setting-number", { setting: item + 1 })),
+      scale.element,
+    );
     return { element, check: scale.check };
   });
 
-  const about = make("p", { className: "about" }, "Give each setting a place. Settings may share a place.");
+  const about = make("p", { className: "about" }, say("give-places"));
   return {
     nodes: [
       heading,
@@ -106,5 +107,5 @@ export function drawPlaces(answer, heading, changed) {
 
 /** The mark of an unanswered item. It always takes up its space. */
 function gap() {
-  return make("span", { className: "gap" }, NOT_ANSWERED);
+  return make("span", { className: "gap" }, say("not-answered"));
 }

@@ -1,5 +1,7 @@
 // Records from the microphone. The message of each error says what to do.
 
+import { say } from "../shared/language.js";
+
 /** Formats of the recording, in order of preference. The server accepts no others. */
 const TYPES = ["audio/webm;codecs=opus", "audio/mp4", "audio/ogg;codecs=opus"];
 
@@ -19,12 +21,12 @@ export class MicrophoneTrouble extends Error {}
  */
 export function whyNoMicrophone(allowed) {
   if (!globalThis.isSecureContext) {
-    return "Voice needs an encrypted connection (https), which this page does not have. Type your comments.";
+    return say("microphone-unencrypted");
   }
   if (!navigator.mediaDevices?.getUserMedia || typeof MediaRecorder === "undefined" || !recordedType()) {
-    return "This browser cannot record voice. Type your comments.";
+    return say("microphone-unable");
   }
-  return allowed ? "" : "Load this page again to use the microphone. Until then, type your comments.";
+  return allowed ? "" : say("microphone-reload");
 }
 
 function recordedType() {
@@ -122,7 +124,7 @@ export async function record(heard) {
     };
   } catch {
     closeMicrophone();
-    throw new MicrophoneTrouble("This browser could not begin to record. Type your comment.");
+    throw new MicrophoneTrouble(say("microphone-no-start"));
   }
 }
 
@@ -143,15 +145,15 @@ export function refusalWords(name) {
   switch (name) {
     case "NotAllowedError":
     case "SecurityError":
-      return "The microphone is blocked for this page. Allow it in the browser’s settings, or type your comment.";
+      return say("microphone-blocked");
     case "NotFoundError":
     case "OverconstrainedError":
-      return "This device has no microphone. Connect one, or type your comment.";
+      return say("microphone-none");
     case "NotReadableError":
     case "AbortError":
-      return "Another program uses the microphone. Close it, or type your comment.";
+      return say("microphone-busy");
     default:
-      return "The microphone could not be opened. Type your comment.";
+      return say("microphone-failed-type");
   }
 }
 

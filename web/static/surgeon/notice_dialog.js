@@ -1,9 +1,8 @@
 // The full-screen notice at each change of setting.
 
 import { byId, setText } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { NoticeGuard } from "./notice.js";
-
-const TAP = "Tap to continue";
 
 /**
  * Calls `accept(segment)` when the surgeon taps the notice of `segment`. A surgeon who is writing in `box` when the
@@ -40,7 +39,7 @@ export function noticeDialog(box, accept) {
 
   button.onclick = ({ detail }) => {
     if (segment === null || !guard.click(performance.now(), detail === 0)) return;
-    ask("One moment…");
+    ask(say("one-moment"));
     accept(segment);
   };
 
@@ -50,14 +49,12 @@ export function noticeDialog(box, accept) {
     segment = state.segment;
     guard.shown(performance.now());
 
-    const change = state.setting === 1 ? "This is the first setting." : "The setting has changed.";
-    setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
-    setText(
-      byId("change-what"),
-      `${change} Look around as you would in surgery, and ${state.voice ? "say or write" : "write"} what you notice.`,
-    );
+    const change = state.setting === 1 ? say("change-first") : say("change-next");
+    setText(byId("change-title"), say("setting-of", { setting: state.setting, settings: state.settings }));
+    const look = state.voice ? say("change-say") : say("change-write");
+    setText(byId("change-what"), `${change} ${look}`);
     byId("change-practice").hidden = !state.practice;
-    ask(TAP);
+    ask(say("tap-to-continue"));
 
     if (dialog.open) return;
     focusBefore = document.activeElement;

@@ -1,6 +1,7 @@
 // One line that says what the surgeon can do now. It is derived from the session's state and from what is not saved
 // yet, so it is the same for every policy.
 
+import { say } from "../shared/language.js";
 import { minuteText } from "../shared/text.js";
 
 /** @typedef {Api.SurgeonView} View */
@@ -23,33 +24,29 @@ import { minuteText } from "../shared/text.js";
 /** @param {Facts} facts */
 export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved, soon, over }) {
   if (over && view !== null) return endWords(view, unsent, unsaved);
-  if (over) return unsaved ? KEEP_OPEN : "Scan the operator’s code to open the next session.";
+  if (over) return unsaved ? say("now-keep-open") : say("now-scan-code");
   if (missed) return unreachableWords(view, heardAt, refused);
-  if (!known) return "Connecting to the server…";
-  if (view === null) return "Nothing to do yet: wait for the operator to start a trial.";
+  if (!known) return say("now-connecting");
+  if (view === null) return say("now-nothing");
   if (view.phase === "completed" || view.phase === "aborted") return endWords(view, unsent, unsaved);
   if (view.paused) {
-    return view.may_resume
-      ? "Press “Continue” when you are ready."
-      : "Wait for the operator. You can still comment.";
+    return view.may_resume ? say("now-press-continue") : say("now-wait-paused");
   }
 
   switch (view.phase) {
     case "ready":
-      return "Wait for the operator to start the trial.";
+      return say("now-wait-start");
     case "notice":
-      return `Tap to begin setting ${view.setting}.`;
+      return say("now-tap-begin", { setting: view.setting });
     case "inspecting":
-      if (soon) return "This setting ends in a moment. What you are writing stays.";
-      return `Look around and ${view.voice ? "say or write" : "write"} what you notice. Then finish the setting.`;
+      if (soon) return say("now-ends-soon");
+      return view.voice ? say("now-look-say") : say("now-look-write");
     case "questions":
-      return "Answer the questions, then press “Continue”.";
+      return say("now-answer");
     case "closing":
-      return "Answer the last questions, then press “Finish”.";
+      return say("now-answer-last");
   }
 }
-
-const KEEP_OPEN = "Keep this page open until everything is saved.";
 
 /**
  * @param {View} view
@@ -57,11 +54,9 @@ const KEEP_OPEN = "Keep this page open until everything is saved.";
  * @param {boolean} unsaved
  */
 function endWords(view, unsent, unsaved) {
-  if (unsent) return "Save or delete the comment in the box.";
-  if (unsaved) return KEEP_OPEN;
-  return view.practice
-    ? "Practice is over. Keep the tablet: the trial comes next."
-    : "You are done. Give the tablet back.";
+  if (unsent) return say("now-comment-left");
+  if (unsaved) return say("now-keep-open");
+  return view.practice ? say("now-practice-over") : say("now-done");
 }
 
 /**
@@ -71,9 +66,7 @@ function endWords(view, unsent, unsaved) {
  */
 function unreachableWords(view, heardAt, refused) {
   const since =
-    heardAt === null ? "The server cannot be reached." : `No server since ${minuteText(heardAt)}.`;
-  const why = refused ? `${since} Its certificate has ended: tell the operator.` : since;
-  return view === null
-    ? `${why} This page keeps trying.`
-    : `${why} Comments are saved here and sent later.`;
+    heardAt === null ? say("now-unreachable") : say("now-silent-since", { time: minuteText(heardAt) });
+  const why = refused ? [since, say("now-certificate-over")] : [since];
+  return [...why, view === null ? say("now-keeps-trying") : say("now-comment-on")].join(" ");
 }

@@ -6,7 +6,7 @@
 // next opened.
 
 import { inWords, Refused } from "../shared/api.js";
-import { NO_CONNECTION } from "./words.js";
+import { say } from "../shared/language.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
@@ -295,7 +295,7 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, NO_CONNECTION);
+    this.trouble = inWords(error, say("no-connection"));
     const heard = error instanceof Refused;
     this.#tell(entry, "waiting", this.trouble, heard);
     return heard;

@@ -4,6 +4,7 @@ import { get, inWords, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
+import { language, say, speak } from "../shared/language.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import { Sight } from "../shared/sight.js";
@@ -28,6 +29,7 @@ import {
 } from "./device.js";
 import { followDimmer } from "./dimmer.js";
 import { Holding } from "./holding.js";
+import { showLanguage, speakAsThePage } from "./languages.js";
 import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { nowWords } from "./now.js";
@@ -43,6 +45,7 @@ import {
   endsSoon,
   headline,
   isEnded,
+  noticeWords,
   pausedWords,
   readyWords,
   savedWords,
@@ -67,6 +70,8 @@ let panelDrawn = "";
 /** Whether this tablet's link has ended, and why if its session had not. */
 let over = false;
 let overBecause = "";
+/** @type {Stream.SurgeonStatus | null} */
+let lastStatus = null;
 
 const outbox = openOutbox();
 const contact = new Contact(clock, lastView.read());
@@ -123,6 +128,17 @@ function here() {
   return { session, segment, setting, frame: viewer.frame, run: viewer.run, ...seen };
 }
 
+/* Language */
+
+speakAsThePage();
+
+/** Puts all words on the page into the language that is spoken now. What is drawn with the session follows anyway. */
+function drawWords() {
+  showLanguage();
+  viewer.drawWords();
+  if (lastStatus) followStatus(lastStatus);
+}
+
 /* State in */
 
 /**
@@ -146,6 +162,7 @@ function followLastView() {
 /** @param {View | null} next */
 function follow(next) {
   known = true;
+  if (next && speak(next.language)) drawWords();
   state = next;
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
@@ -192,11 +209,11 @@ async function act(action) {
     const refused = error instanceof Refused;
     // Not the notice of the next setting, which may stand there by now and which nobody has tapped.
     if (action.action === "acknowledge" && isStillMeant(action)) {
-      notice.ask(refused ? "Tap to continue" : "The server did not answer. Tap again.");
+      notice.ask(refused ? say("tap-to-continue") : say("tap-unanswered"));
     }
     if (refused && error.status < 500) await refresh();
     if (isStillMeant(action)) {
-      tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
+      tellTrouble(byId("trouble"), error, say("act-unanswered"));
     }
   }
 }
@@ -230,9 +247,9 @@ async function followMicrophone() {
 async function tryMicrophone() {
   try {
     await openMicrophone();
-    microphone = "The microphone is ready.";
+    microphone = say("microphone-ready");
   } catch (error) {
-    microphone = error instanceof Error ? error.message : "The microphone could not be opened.";
+    microphone = error instanceof Error ? error.message : say("microphone-failed");
   }
   drawPanel();
 }
@@ -240,11 +257,8 @@ async function tryMicrophone() {
 /** The button that asks for the microphone before the trial; null where it need not. */
 function microphoneButton() {
   if (!state?.voice || microphone !== "" || whyNoMicrophone(mayRecord) !== "") return null;
-  return make(
-    "button",
-    { type: "button", className: "primary", onclick: tryMicrophone },
-    "Try the microphone",
-  );
+  const words = say("try-microphone");
+  return make("button", { type: "button", className: "primary", onclick: tryMicrophone }, words);
 }
 
 /* Bar */
@@ -262,9 +276,7 @@ function drawBar() {
   if (finish.disabled) forgetFirstPress();
   byId("pause").hidden = !state?.may_pause;
 
-  const unrecorded =
-    "This step is not recorded yet because the server cannot write to its disk. Tell the operator.";
-  setText(byId("unrecorded"), state?.unrecorded ? unrecorded : "");
+  setText(byId("unrecorded"), state?.unrecorded ? say("unrecorded") : "");
   setText(byId("prompt"), looking ? (state?.prompt ?? "") : "");
   drawTime();
 }
@@ -298,11 +310,12 @@ function drawNow() {
 
 /** @param {Stream.SurgeonStatus} status */
 function followStatus(status) {
+  lastStatus = status;
   contact.certifiedUntil(status.certificate_until);
   const simulated = simulatedWords(status);
   byId("simulated").hidden = simulated === "";
   setText(byId("simulated"), simulated);
-  setText(byId("device-notice"), status.notice ?? "");
+  setText(byId("device-notice"), noticeWords(status));
 }
 
 /* Panel over the picture */
@@ -311,6 +324,7 @@ function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
   const words = over || isEnded(state) ? kept() : mayResume ? saved() : "";
   const key = JSON.stringify([
+    language(),
     known,
     over,
     overBecause,
@@ -332,10 +346,10 @@ function drawPanel() {
 function panelContent() {
   if (!known) return null;
   if (over && !isEnded(state)) {
-    return card("centred", "Not open to this tablet", overBecause);
+    return card("centred", say("not-open-here"), overBecause);
   }
   if (!state) {
-    return card("aside idle", "No trial is under way. You can look around.", "");
+    return card("aside idle", say("no-trial"), "");
   }
   if (state.paused && !isEnded(state)) return pausedCard(state);
 
@@ -343,15 +357,15 @@ function panelContent() {
     case "ready":
       return card("aside", state.title, [readyWords(state), ...advice()].join(" "), microphoneButton());
     case "questions":
-      return questions(state, `Setting ${state.setting}: a few questions`);
+      return questions(state, say("few-questions", { setting: state.setting }));
     case "closing":
-      return questions(state, "Final questions");
+      return questions(state, say("final-questions"));
     case "completed":
       return state.practice
-        ? card("centred", "Practice is over", `That was practice; it does not count. ${kept()}`)
-        : card("centred", "Thank you", `The trial is complete. ${kept()}`);
+        ? card("centred", say("practice-over"), say("practice-over-more", { kept: kept() }))
+        : card("centred", say("thank-you"), say("trial-complete", { kept: kept() }));
     case "aborted":
-      return card("aside sign", "The session was ended", `There is nothing more to do. ${kept()}`);
+      return card("aside sign", say("session-ended"), say("nothing-more", { kept: kept() }));
     default:
       return null;
   }
@@ -359,11 +373,11 @@ function panelContent() {
 
 /** What people have to do before the trial starts, because the browser does not do it. */
 function advice() {
-  return [awake.advice, storage, microphone].filter((words) => words !== "");
+  return [awake.advice, storage(), microphone].filter((words) => words !== "");
 }
 
 function kept() {
-  return comments.unsent ? "Your last comment is still in the box. Save it or delete it." : saved();
+  return comments.unsent ? say("comment-in-box") : saved();
 }
 
 function saved() {
@@ -377,11 +391,11 @@ function saved() {
  * @param {View} view
  */
 function pausedCard(view) {
-  if (!view.may_resume) return card("aside sign", "Paused", pausedWords(view, saved()));
+  if (!view.may_resume) return card("aside sign", say("paused"), pausedWords(view, saved()));
 
-  const resume = make("button", { type: "button", className: "primary" }, "Continue");
+  const resume = make("button", { type: "button", className: "primary" }, say("continue"));
   resume.onclick = () => act({ action: "resume" });
-  return card("aside sign", "Paused", pausedWords(view, saved()), resume);
+  return card("aside sign", say("paused"), pausedWords(view, saved()), resume);
 }
 
 /**

@@ -17,7 +17,7 @@ let freshTimer;
  * @returns {Content}
  */
 export function card(className, heading, text, more = null) {
-  const title = make("h2", { tabIndex: -1 }, heading);
+  const title = make("h2", { tabIndex: -1, dir: "auto" }, heading);
   const words = text !== "" && make("p", {}, text);
   const node = make("div", { className: "panel-card", role: "status" }, title, words, more);
   return { className, nodes: [node] };

@@ -1,6 +1,7 @@
 // Draws the questions as a form.
 
 import { make, setText } from "../shared/dom.js";
+import { say, words } from "../shared/language.js";
 import { drawScale, drawWords } from "./choices.js";
 import { drawPlaces, drawWorkload } from "./instrument_form.js";
 import { PlacesAnswer, ScaleAnswer, SusAnswer, TextAnswer, WorkloadAnswer } from "./questions.js";
@@ -10,7 +11,7 @@ import { drawTrack } from "./track.js";
 /** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
 
 /** The labels for whether settings were recognised. The values count from 1. */
-const RECOGNITION = ["No", "Not sure", "Yes"];
+const recognition = () => [say("no"), say("not-sure"), say("yes")];
 
 /**
  * One question's element. `draw` shows the answer's state. `wantedPlace` returns the first place that is still to be
@@ -89,8 +90,8 @@ function drawKind(answer, changed) {
 
 /** @param {Api.Question} question */
 function heading(question) {
-  const optional = question.optional && make("span", { className: "optional" }, " (optional)");
-  return make("legend", { className: "ask", id: `ask-${question.id}` }, question.text, optional);
+  const optional = question.optional && make("span", { className: "optional" }, ` ${say("optional")}`);
+  return make("legend", { className: "ask", id: `ask-${question.id}`, dir: "auto" }, question.text, optional);
 }
 
 /**
@@ -99,7 +100,7 @@ function heading(question) {
  * @returns {Drawn}
  */
 function drawText(answer, changed) {
-  const area = make("textarea", { rows: 3, "aria-labelledby": `ask-${answer.question.id}` });
+  const area = make("textarea", { rows: 3, dir: "auto", "aria-labelledby": `ask-${answer.question.id}` });
   area.addEventListener("input", () => {
     answer.write(area.value);
     changed();
@@ -146,11 +147,12 @@ function drawPoints(question, choose) {
         ? drawWords(question.id, question.labels, choose, "column")
         : drawScale(question.id, question, choose);
     case "recognition":
-      return drawWords(question.id, RECOGNITION, choose);
+      return drawWords(question.id, recognition(), choose);
     case "visual-analogue": {
       const { low, high, text } = question;
-      const words = (/** @type {number} */ value) => `${value} of 100, from ${low} to ${high}`;
-      const track = drawTrack({ label: text, low, high, min: 0, max: 100, graded: false, words }, choose);
+      const ends = { low: words(low), high: words(high) };
+      const inWords = (/** @type {number} */ value) => say("line-value", { value, ...ends });
+      const track = drawTrack({ label: text, low, high, min: 0, max: 100, graded: false, inWords }, choose);
       return { element: track.element, check: track.show };
     }
     default:
@@ -164,7 +166,7 @@ function drawPoints(question, choose) {
  * @returns {Drawn}
  */
 function drawSus(answer, changed) {
-  const ends = { points: 5, low: "Strongly disagree", high: "Strongly agree" };
+  const ends = { points: 5, low: answer.low, high: answer.high };
   const scales = answer.items.map((_, item) =>
     drawScale(`${answer.question.id}-${item}`, ends, (point) => {
       answer.choose(item, point);

@@ -1,6 +1,7 @@
 // The questions on screen: draws them, sends the answers, and says which questions are still open.
 
 import { make, setText } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { tell, tellUntilAnswered } from "../shared/trouble.js";
 import { PATH, placeOf, slotOf } from "./answers.js";
 import { drafts, later } from "./device.js";
@@ -73,7 +74,7 @@ export class QuestionPanel {
    * @returns {import("./panel.js").Content}
    */
   content(heading) {
-    const label = this.#place.segment === null ? "Finish" : "Continue";
+    const label = this.#place.segment === null ? say("finish") : say("continue");
     const done = make("button", { type: "button", className: "primary", onclick: () => this.#done() }, label);
     const form = make(
       "div",
@@ -94,13 +95,13 @@ export class QuestionPanel {
       return;
     }
 
-    tell(this.#missing, "Saving…");
+    tell(this.#missing, say("saving"));
     if (!(await this.#outbox.settled(PATH))) {
-      tellUntilAnswered(this.#missing, `${this.#outbox.trouble} Your answers are saved here.`);
+      tellUntilAnswered(this.#missing, say("answers-kept", { trouble: this.#outbox.trouble ?? "" }));
       return;
     }
     if (this.#questionnaire.refused) {
-      tell(this.#missing, "One answer was not saved. The reason is shown above.");
+      tell(this.#missing, say("answer-refused"));
       return;
     }
 
@@ -111,8 +112,7 @@ export class QuestionPanel {
 
   /** @param {import("./questions.js").AnyAnswer[]} unanswered */
   #showUnanswered(unanswered) {
-    const count = unanswered.length;
-    tell(this.#missing, count === 1 ? "One question is still open." : `${count} questions are still open.`);
+    tell(this.#missing, say("questions-open", { count: unanswered.length }));
 
     const first = this.#boxes.find(({ answer }) => answer === unanswered[0])?.wantedPlace();
     first?.scrollIntoView({ block: "center" });

@@ -1,6 +1,8 @@
 // The protocol's questions, and whether the answer to each is saved. Each answer goes to the outbox the moment it is
 // given. The page shows the server's answer, unless a newer one is on its way there.
 
+import { language, say } from "../shared/language.js";
+
 /** @typedef {"saving" | "saved" | "waiting" | "refused" | "partly" | ""} Reached */
 /** @typedef {import("./drafts.js").Draft} Draft */
 
@@ -27,19 +29,6 @@
  * @property {string} lot the same on every device of the session; a starting order is drawn from it
  */
 
-const SUS_ITEMS = [
-  "I think that I would like to use this system frequently.",
-  "I found the system unnecessarily complex.",
-  "I thought the system was easy to use.",
-  "I think that I would need the support of a technical person to be able to use this system.",
-  "I found the various functions in this system were well integrated.",
-  "I thought there was too much inconsistency in this system.",
-  "I would imagine that most people would learn to use this system very quickly.",
-  "I found the system very cumbersome to use.",
-  "I felt very confident using the system.",
-  "I needed to learn a lot of things before I could get going with this system.",
-];
-
 /** From this many questions on, the number of answers given is shown. */
 const AT_A_GLANCE = 3;
 
@@ -47,14 +36,18 @@ const AT_A_GLANCE = 3;
 const YES = 3;
 
 const TYPING_PAUSE_MS = 900;
-export const NOT_ANSWERED = "Not answered yet";
 
-/** @type {Partial<Record<Reached, string>>} */
-const REACHED_WORDS = {
-  saving: "Saving…",
-  saved: "Saved",
-  waiting: "Saved here. It is sent when the connection is back.",
-};
+/**
+ * Says what has become of an answer; undefined if that is not the same for all.
+ *
+ * @param {Reached} reached
+ */
+function reachedWords(reached) {
+  if (reached === "saving") return say("saving");
+  if (reached === "saved") return say("answer-saved");
+  if (reached === "waiting") return say("answer-waiting");
+  return undefined;
+}
 
 /**
  * The answer that results when `given` comes after `earlier`. A 0 among points keeps the earlier point, as on the
@@ -75,9 +68,8 @@ export function onTopOf(earlier, given) {
  * @param {number} number
  */
 export function ordinal(number) {
-  const isTeen = number % 100 >= 11 && number % 100 <= 13;
-  const ending = ["th", "st", "nd", "rd"][number % 10] ?? "th";
-  return `${number}${isTeen ? "th" : ending}`;
+  const ending = new Intl.PluralRules(language(), { type: "ordinal" }).select(number);
+  return say("place", { place: number, ending });
 }
 
 /**
@@ -182,9 +174,9 @@ class Answer {
       this.note(this.begun);
       return;
     }
-    const text = REACHED_WORDS[reached] ?? reason;
+    const text = reachedWords(reached) ?? reason;
     this.reached = this.open !== null && reached !== "refused" ? "partly" : reached;
-    this.status = this.open === null ? text : `${this.open} · ${text}`;
+    this.status = this.open === null ? text : say("partly-answered", { open: this.open, state: text });
   }
 
   /**
@@ -200,7 +192,7 @@ class Answer {
   /** Marks what is still to be answered. */
   want() {
     this.wanted = true;
-    this.note(this.begun ?? NOT_ANSWERED);
+    this.note(this.begun ?? say("not-answered"));
   }
 
   /** Removes the marks. */
@@ -273,7 +265,7 @@ export class TextAnswer extends Answer {
     this.text = text;
     this.#written = true;
     this.#draft.write(text);
-    this.note("Writing…");
+    this.note(say("writing"));
     this.#giveLater();
   }
 
@@ -294,7 +286,7 @@ export class TextAnswer extends Answer {
 
     const text = this.text.trim();
     if (text !== "") this.give(text, null, from);
-    else this.note(this.#answered ? "The earlier answer stays until you write another." : "");
+    else this.note(this.#answered ? say("earlier-stays") : "");
   }
 
   /**
@@ -369,7 +361,7 @@ class ItemsAnswer extends Answer {
   /** @override @returns {string | null} */
   get open() {
     const given = this.points.filter((point) => point > 0).length;
-    return given < this.points.length ? `${given} of ${this.points.length} answered` : null;
+    return given < this.points.length ? say("answered-of", { given, total: this.points.length }) : null;
   }
 
   /** @override */
@@ -416,15 +408,22 @@ class ItemsAnswer extends Answer {
 
 /** The ten items of the System Usability Scale. */
 export class SusAnswer extends ItemsAnswer {
-  items = SUS_ITEMS;
+  items;
+  /** What the ends of each item's scale mean. */
+  low;
+  high;
 
   /**
    * @param {Api.Question} question
    * @param {Api.AnswerValue | undefined} answered
    * @param {Context} context
+   * @param {{ items: string[], low: string, high: string }} scale
    */
-  constructor(question, answered, context) {
-    super(question, answered, context, SUS_ITEMS.length);
+  constructor(question, answered, context, { items, low, high }) {
+    super(question, answered, context, items.length);
+    this.items = items;
+    this.low = low;
+    this.high = high;
   }
 }
 
@@ -490,7 +489,7 @@ export class RankingAnswer extends Answer {
   /** @override @returns {string | null} */
   get begun() {
     const isArranged = !this.confirmed && this.#draft.read() !== null;
-    return isArranged ? "Kept on this device until you tap “This order is right”" : null;
+    return isArranged ? say("order-kept") : null;
   }
 
   /**
@@ -559,7 +558,7 @@ export function answerTo(question, answered, context) {
     case "recognition":
       return new ScaleAnswer(question, answered, context);
     case "sus":
-      return new SusAnswer(question, answered, context);
+      return new SusAnswer(question, answered, context, question);
     case "nasa-tlx":
       return new WorkloadAnswer(question, answered, context, question.scales, []);
     case "surg-tlx":
@@ -611,7 +610,7 @@ export class Questionnaire {
     const all = asked.map(({ progress }) => progress);
     const answered = all.reduce((sum, one) => sum + one.answered, 0);
     const total = all.reduce((sum, one) => sum + one.total, 0);
-    return total < AT_A_GLANCE ? "" : `${answered} of ${total} answered`;
+    return total < AT_A_GLANCE ? "" : say("answered-of", { given: answered, total });
   }
 
   /** Whether anything is marked as still to be answered. */

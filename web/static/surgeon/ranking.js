@@ -1,6 +1,7 @@
 // The form of a ranking: each setting can be dragged, moved by arrows, or put on top by one tap.
 
 import { make, setText } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { ordinal } from "./questions.js";
 
 /** @typedef {import("./question_form.js").Drawn} Drawn */
@@ -30,12 +31,8 @@ export function placeAt(middles, from, y) {
 export function drawRanking(answer, heading, changed) {
   const list = make("ol", { className: "ranking" });
   const heard = make("p", { className: "visually-hidden", "aria-live": "polite" });
-  const confirm = make("button", { type: "button", className: "confirm primary" }, "This order is right");
-  const about = make(
-    "p",
-    { className: "about" },
-    "Drag a setting by its handle, or use the arrows; ⤒ puts it first. The order below is drawn by lot.",
-  );
+  const confirm = make("button", { type: "button", className: "confirm primary" }, say("order-right"));
+  const about = make("p", { className: "about" }, say("order-help"));
   confirm.onclick = () => {
     answer.confirm();
     changed();
@@ -49,7 +46,7 @@ export function drawRanking(answer, heading, changed) {
   function move(from, to) {
     const setting = answer.move(from, to);
     changed();
-    setText(heard, `Setting ${setting} is now in place ${to + 1} of ${answer.order.length}`);
+    setText(heard, say("order-moved", { setting, place: to + 1, places: answer.order.length }));
   }
 
   /**
@@ -95,7 +92,8 @@ export function drawRanking(answer, heading, changed) {
    * @param {number} index
    */
   function line(setting, index) {
-    const place = `${ordinal(index + 1)}${index === 0 ? ", best" : ""}`;
+    const number = ordinal(index + 1);
+    const place = index === 0 ? say("place-best", { place: number }) : number;
     const handle = make(
       "span",
       { className: "place" },
@@ -110,12 +108,12 @@ export function drawRanking(answer, heading, changed) {
       make(
         "span",
         { className: "what" },
-        `Setting ${setting}`,
-        words !== "" && make("span", { className: "said" }, words),
+        say("setting-number", { setting }),
+        words !== "" && make("span", { className: "said", dir: "auto" }, words),
       ),
-      mover("up", `Move setting ${setting} up`, "↑", index, index - 1),
-      mover("down", `Move setting ${setting} down`, "↓", index, index + 1),
-      mover("top", `Put setting ${setting} first`, "⤒", index, 0),
+      mover("up", say("move-up", { setting }), "↑", index, index - 1),
+      mover("down", say("move-down", { setting }), "↓", index, index + 1),
+      mover("top", say("move-first", { setting }), "⤒", index, 0),
     );
     drag(item, handle, index);
     return item;

@@ -1,5 +1,7 @@
 // Finds out whether this browser can store comments and answers over a reload, and says what to do if it cannot.
 
+import { say } from "../shared/language.js";
+
 /** Written and removed at once, to test whether the storage works. */
 const TRIAL = "parfocal.trial";
 
@@ -12,10 +14,7 @@ export function storageAdvice(store) {
   const keeps = store.write(TRIAL, "1");
   store.remove(TRIAL);
   if (keeps) return "";
-  return (
-    "This browser keeps nothing on the device: its storage is full or switched off, as in a private window. " +
-    "What you say waits on this page until it is saved, so do not close or reload the page."
-  );
+  return say("storage-advice");
 }
 
 /** Asks the browser not to clear its storage when the device runs out of space. */

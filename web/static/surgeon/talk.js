@@ -1,5 +1,6 @@
 // Hold to talk: from the press to the end of the recording. Does not deal with buttons and keys.
 
+import { say } from "../shared/language.js";
 import { clockText } from "../shared/text.js";
 import { MicrophoneTrouble } from "./microphone.js";
 
@@ -66,13 +67,13 @@ export class Talk {
   /** The button's label. */
   get label() {
     const held = this.#held;
-    if (held === null) return "Hold to talk";
-    if (held.comment === null) return "Wait…";
+    if (held === null) return say("hold-to-talk");
+    if (held.comment === null) return say("talk-wait");
 
     const gone = this.#around.now() - held.began;
     const left = LIMIT_MS - gone;
-    if (left <= TOLD_MS) return `Ends in ${Math.max(1, Math.ceil(left / 1000))} s`;
-    return `Recording ${clockText(gone / 1000)}`;
+    if (left <= TOLD_MS) return say("talk-ends", { seconds: Math.max(1, Math.ceil(left / 1000)) });
+    return say("talk-recording", { time: clockText(gone / 1000) });
   }
 
   /** The surgeon presses. Returns whether a recording is begun. */
@@ -122,8 +123,7 @@ export class Talk {
         stopped: () => this.#stopped(held),
       });
     } catch (error) {
-      this.trouble =
-        error instanceof MicrophoneTrouble ? error.message : "The microphone could not be opened.";
+      this.trouble = error instanceof MicrophoneTrouble ? error.message : say("microphone-failed");
       this.#close(held);
       return;
     }
@@ -173,7 +173,7 @@ export class Talk {
   /** @param {Held} held */
   #lost(held) {
     if (held.ending !== null) return;
-    this.trouble = "The microphone was taken away. What you said until then is kept.";
+    this.trouble = say("talk-lost");
     this.#end(held, "microphone-lost");
   }
 
@@ -186,16 +186,12 @@ export class Talk {
     held.ending = ending;
     held.cancel();
     if (ending === "limit") {
-      this.trouble =
-        "The recording ended after two minutes. What you said is kept. Let go, then press again to continue.";
+      this.trouble = say("talk-limit");
     }
     if (ending === "left" && held.comment !== null) {
-      this.trouble =
-        "The recording ended because something else came in front of this page. " +
-        "What you said until then is kept. Press again to continue.";
+      this.trouble = say("talk-left");
     }
-    if (held.comment === null)
-      this.trouble ||= "Nothing was recorded. Hold until it says “Recording”, then speak.";
+    if (held.comment === null) this.trouble ||= say("talk-nothing");
     held.recording?.stop();
   }
 

@@ -1,6 +1,7 @@
 // The button that is held to talk, and the keys that do the same.
 
 import { byId, setText } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { Grip } from "./grip.js";
 import { whyNoMicrophone } from "./microphone.js";
 import { focusOn, isTalkKey } from "./talk_keys.js";
@@ -15,7 +16,7 @@ import { focusOn, isTalkKey } from "./talk_keys.js";
 export function talkButton(talk, outbox, allowed) {
   const button = byId("talk", HTMLButtonElement);
   const meter = byId("talk-level");
-  const why = whyNoMicrophone(allowed);
+  const why = () => whyNoMicrophone(allowed);
   const grip = new Grip(talk);
   let open = false;
   let drawing = 0;
@@ -26,8 +27,8 @@ export function talkButton(talk, outbox, allowed) {
     const ended = state?.phase === "completed" || state?.phase === "aborted";
     open = asked && !ended;
     button.hidden = !open;
-    button.disabled = why !== "";
-    setText(byId("voice-why"), open ? why : "");
+    button.disabled = why() !== "";
+    setText(byId("voice-why"), open ? why() : "");
     draw();
   }
 
@@ -36,7 +37,7 @@ export function talkButton(talk, outbox, allowed) {
     setText(byId("talk-label"), talk.label);
     button.classList.toggle("recording", state === "recording");
     button.setAttribute("aria-pressed", String(state !== "idle"));
-    setText(byId("talk-heard"), state === "recording" ? "Recording" : "");
+    setText(byId("talk-heard"), state === "recording" ? say("recording") : "");
     setText(byId("voice-trouble"), talk.trouble);
     drawStatus();
     if (state === "recording" && drawing === 0) drawing = requestAnimationFrame(drawLevel);
@@ -54,14 +55,14 @@ export function talkButton(talk, outbox, allowed) {
     const status = byId("voice-state");
     // A piece is sent every second, so the text would flicker.
     const speaking = talk.state === "recording" && kind !== "unsaved" && outbox.heldUp === 0;
-    setText(status, speaking ? "Saved as you speak." : text);
+    setText(status, speaking ? say("saved-as-you-speak") : text);
     status.classList.toggle("saved", kind === "saved" && !speaking);
     status.classList.toggle("unsaved", kind === "unsaved");
   }
 
   /** @param {string} by */
   function press(by) {
-    if (open && why === "") grip.press(by);
+    if (open && why() === "") grip.press(by);
   }
 
   function leave() {

@@ -2,6 +2,7 @@
 // is marked until the surgeon marks it.
 
 import { make } from "../shared/dom.js";
+import { say, words } from "../shared/language.js";
 
 /**
  * @typedef {object} Line
@@ -11,7 +12,7 @@ import { make } from "../shared/dom.js";
  * @property {number} min
  * @property {number} max
  * @property {boolean} graded whether every value has a tick
- * @property {(value: number) => string} words a value as text for a screen reader
+ * @property {(value: number) => string} inWords a value as text for a screen reader
  */
 
 /**
@@ -75,8 +76,8 @@ export function drawTrack(line, mark) {
     rail,
   );
 
-  const less = stepper("−", `Less: ${line.low}`, "ArrowLeft");
-  const more = stepper("+", `More: ${line.high}`, "ArrowRight");
+  const less = stepper("−", say("line-less", { low: words(line.low) }), "ArrowLeft");
+  const more = stepper("+", say("line-more", { high: words(line.high) }), "ArrowRight");
 
   /**
    * @param {string} sign
@@ -111,12 +112,12 @@ export function drawTrack(line, mark) {
     more.disabled = value === null;
     if (shown === null) {
       slider.removeAttribute("aria-valuenow");
-      slider.setAttribute("aria-valuetext", "Not marked yet");
+      slider.setAttribute("aria-valuetext", say("not-marked"));
       return;
     }
     thumb.style.left = `${(100 * (shown - min)) / (max - min)}%`;
     slider.setAttribute("aria-valuenow", String(shown));
-    slider.setAttribute("aria-valuetext", line.words(shown));
+    slider.setAttribute("aria-valuetext", line.inWords(shown));
   }
 
   slider.addEventListener("pointerdown", (event) => {
@@ -155,8 +156,8 @@ export function drawTrack(line, mark) {
       make(
         "div",
         { className: "ends", "aria-hidden": "true" },
-        make("span", {}, line.low),
-        make("span", {}, line.high),
+        make("span", { dir: "auto" }, line.low),
+        make("span", { dir: "auto" }, line.high),
       ),
     ),
     /** @param {number | null} marked */

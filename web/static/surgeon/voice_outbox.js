@@ -4,8 +4,8 @@
 // device, and is tried again when the page is next opened.
 
 import { inWords, Refused } from "../shared/api.js";
+import { say } from "../shared/language.js";
 import { PATH as COMMENTS } from "./comments.js";
-import { NO_CONNECTION } from "./words.js";
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
@@ -181,17 +181,13 @@ export class VoiceOutbox {
   get status() {
     const refusal = [...this.#refused.values()].at(-1);
     if (refusal !== undefined) {
-      const many =
-        this.#refused.size === 1
-          ? "1 recording was not saved and stays on this device."
-          : `${this.#refused.size} recordings were not saved and stay on this device.`;
-      const text = `${many} Tell the operator. ${refusal}`;
+      const text = say("recordings-refused", { count: this.#refused.size, reason: refusal });
       return { kind: "unsaved", text };
     }
 
     if (this.heldUp > 0) return { kind: "", text: "" };
-    if (this.waiting > 0) return { kind: "saving", text: "Saving the recording…" };
-    return this.#hasSaved ? { kind: "saved", text: "Recording saved" } : { kind: "", text: "" };
+    if (this.waiting > 0) return { kind: "saving", text: say("saving-recording") };
+    return this.#hasSaved ? { kind: "saved", text: say("recording-saved") } : { kind: "", text: "" };
   }
 
   #nextId() {
@@ -283,7 +279,7 @@ export class VoiceOutbox {
       this.#tell();
       return true;
     }
-    this.trouble = inWords(error, NO_CONNECTION);
+    this.trouble = inWords(error, say("no-connection"));
     this.#tell();
     return false;
   }

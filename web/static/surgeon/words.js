@@ -1,6 +1,7 @@
 // The session's texts for the surgeon.
 
-import { clockText, counted } from "../shared/text.js";
+import { say } from "../shared/language.js";
+import { clockText } from "../shared/text.js";
 
 /** @typedef {Api.SurgeonView} View */
 
@@ -11,8 +12,8 @@ export function isEnded(state) {
 
 /** @param {View | null} state */
 export function headline(state) {
-  if (state?.segment != null) return `Setting ${state.setting} of ${state.settings}`;
-  return state?.title ?? "Live view";
+  if (state?.segment != null) return say("setting-of", { setting: state.setting, settings: state.settings });
+  return state?.title ?? say("live-view");
 }
 
 /**
@@ -50,7 +51,7 @@ export function endsSoon(state, seconds) {
  */
 export function timeLeft(state, seconds) {
   if (state?.phase !== "inspecting" || seconds === null) return "";
-  return state.paused ? "Paused" : `${clockText(seconds, Math.ceil)} left`;
+  return state.paused ? say("paused") : say("time-left", { time: clockText(seconds, Math.ceil) });
 }
 
 /**
@@ -62,28 +63,38 @@ export function timeLeft(state, seconds) {
 export function pausedWords({ paused_by: by }, saved) {
   switch (by) {
     case "surgeon":
-      return "You have paused the session. You can still comment.";
+      return say("paused-by-you");
     case "restart":
-      return `The server was restarted. ${saved} Continue where you were.`;
+      return say("paused-by-restart", { saved });
     case "tablet-away":
-      return `This tablet was away, so the session was paused. ${saved} Continue where you were.`;
+      return say("paused-by-absence", { saved });
     case "small-picture":
-      return "The picture was too small for this trial, so it was paused. Continue once it is better.";
+      return say("paused-by-picture");
     default:
-      return "The operator has paused the session. You can still comment.";
+      return say("paused-by-operator");
   }
 }
 
 /** @param {Stream.SurgeonStatus} status */
 export function simulatedWords({ camera_simulated: camera, lens_simulated: lens }) {
-  const simulated = [camera && "camera", lens && "lens"].filter(Boolean).join(" and ");
-  return simulated === "" ? "" : `Simulated ${simulated}`;
+  if (camera && lens) return say("simulated-both");
+  if (camera) return say("simulated-camera");
+  return lens ? say("simulated-lens") : "";
+}
+
+/**
+ * What is wrong with the devices; empty if nothing is.
+ *
+ * @param {Stream.SurgeonStatus} status
+ */
+export function noticeWords({ notice }) {
+  if (notice === "camera-failed") return say("camera-failed");
+  return notice === "lens-failed" ? say("lens-failed") : "";
 }
 
 /** @param {View} state */
 export function readyWords({ settings }) {
-  const many = settings === 1 ? "one setting" : `${settings} settings, one after another`;
-  return `You will look at ${many}. The operator will start the trial.`;
+  return say("ready", { settings });
 }
 
 /**
@@ -93,17 +104,10 @@ export function readyWords({ settings }) {
  * @param {number} waiting number of comments and answers that are not saved yet
  */
 export function savedWords(refused, waiting) {
-  const unsaved = counted(refused, "comment or answer", "comments or answers");
-  const are = refused === 1 ? "It is" : "They are";
-  const kept =
-    refused > 0 ? `${unsaved} could not be saved. ${are} kept on this device. Tell the operator. ` : "";
-
-  if (waiting > 0) return `${kept}Please keep this page open. Some of what you said is still being saved.`;
-  return kept.trim() || "Everything you said is saved.";
+  const kept = refused > 0 ? [say("refused-kept", { count: refused })] : [];
+  if (waiting > 0) return [...kept, say("still-saving")].join(" ");
+  return kept[0] ?? say("all-saved");
 }
-
-/** Why something was not sent, if no server answered. */
-export const NO_CONNECTION = "No connection. This page keeps trying.";
 
 /**
  * One line about what the server does not have yet: where it is kept, and what will become of it.
@@ -116,10 +120,11 @@ export const NO_CONNECTION = "No connection. This page keeps trying.";
  */
 export function heldWords({ comments, recordings, durable, trouble }) {
   const what = [
-    comments > 0 && counted(comments, "comment"),
-    recordings > 0 && counted(recordings, "recording"),
+    comments > 0 && say("held-comments", { count: comments }),
+    recordings > 0 && say("held-recordings", { count: recordings }),
   ];
-  const where = durable ? "Saved here" : "Kept on this page only, so do not close it";
-  const then = trouble === NO_CONNECTION ? "Sent when the network is back." : (trouble ?? "");
-  return `${where}: ${what.filter(Boolean).join(", ")}. ${then}`.trim();
+  const listed = { what: what.filter(Boolean).join(", ") };
+  const where = durable ? say("held-here", listed) : say("held-on-page", listed);
+  const then = trouble === say("no-connection") ? say("sent-later") : (trouble ?? "");
+  return `${where} ${then}`.trim();
 }

@@ -3,23 +3,21 @@
 
 import { post } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
+import { say } from "../shared/language.js";
 import { storeOn } from "../shared/storage.js";
 import { tellTrouble } from "../shared/trouble.js";
+import { speakAsThePage } from "../surgeon/languages.js";
 import { device } from "./device.js";
 import { tryAll } from "./trials.js";
-import { PARTS, summary } from "./words.js";
+import { partWords, summary } from "./words.js";
 
+speakAsThePage();
 const store = storeOn(() => localStorage);
 
 /** @param {import("./words.js").Tried[]} tried */
 function draw(tried) {
   const lines = tried.map(({ part, works }) =>
-    make(
-      "li",
-      {},
-      make("strong", {}, works ? "✓ " : "✗ "),
-      `${PARTS[part].name}: ${works ? "works" : PARTS[part].advice}`,
-    ),
+    make("li", {}, make("strong", {}, works ? "✓ " : "✗ "), partWords(part, works)),
   );
   byId("tried").replaceChildren(...lines);
   setText(byId("verdict"), summary(tried));
@@ -28,19 +26,15 @@ function draw(tried) {
 const go = byId("go", HTMLButtonElement);
 go.onclick = async () => {
   go.disabled = true;
-  setText(byId("verdict"), "Trying…");
+  setText(byId("verdict"), say("tablet-trying"));
   // In the tap itself: later a browser would not ask for the microphone, nor let sound be measured.
   const tried = await tryAll(store);
   draw(tried);
   try {
     await post("/api/surgeon/tablet-trials", { device: device(store), tried });
-    setText(byId("result"), "The operator’s page shows it, too, in the card “Ready for a trial?”.");
+    setText(byId("result"), say("tablet-told"));
   } catch (error) {
-    tellTrouble(
-      byId("result"),
-      error,
-      "The server did not answer, so the operator does not know it yet. Try again.",
-    );
+    tellTrouble(byId("result"), error, say("tablet-not-told"));
   }
   go.disabled = false;
 };

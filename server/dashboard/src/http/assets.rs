@@ -21,6 +21,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::bundle::bundle;
 use super::error::Error;
+use parfocal_language::Language;
 
 struct Asset {
     name: &'static str,
@@ -78,12 +79,37 @@ macro_rules! assets {
     };
 }
 
+/// All static files: those of `web/static/` and the languages' modules.
+static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| files().into_iter().chain(languages()).collect());
+
+/// The languages' files as modules for scripts, without what is said to translators.
+fn languages() -> impl Iterator<Item = Asset> {
+    Language::ALL.into_iter().map(|language| {
+        let lines: Vec<&str> = language.source().lines().filter(|line| !line.starts_with('#')).collect();
+        let text = serde_json::Value::from(lines.join("\n"));
+        // They live as long as the program.
+        Asset {
+            name: Box::leak(format!("languages/{language}.js").into_boxed_str()),
+            body: Box::leak(format!("export const text = {text};\n").into_bytes().into_boxed_slice()),
+            packed: OnceLock::new(),
+        }
+    })
+}
+
 /// All files of `web/static/`, by folder and name. A test compares this table with the folder.
-static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+#[allow(clippy::too_many_lines, reason = "a table")]
+fn files() -> Vec<Asset> {
     Vec::from(assets![
         "accounts/backup.js",
         "accounts/people.js",
         "accounts/sign_in.js",
+        "fluent/builtins.js",
+        "fluent/bundle.js",
+        "fluent/memoizer.js",
+        "fluent/resolver.js",
+        "fluent/resource.js",
+        "fluent/scope.js",
+        "fluent/types.js",
         "offline/worker.js",
         "operator/camera_card.js",
         "operator/camera_settings.js",
@@ -141,6 +167,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "shared/gestures.js",
         "shared/hold.js",
         "shared/icon.svg",
+        "shared/language.js",
         "shared/live.js",
         "shared/overlay.js",
         "shared/overlay_boxes.js",
@@ -186,6 +213,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "surgeon/grip.js",
         "surgeon/holding.js",
         "surgeon/instrument_form.js",
+        "surgeon/languages.js",
         "surgeon/last_view.js",
         "surgeon/microphone.js",
         "surgeon/notice.js",
@@ -219,7 +247,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "trust/page.js",
         "trust/verdict.js",
     ])
-});
+}
 
 /// Hash of all files: the first 8 bytes of a SHA-256, in hexadecimal.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -343,7 +371,7 @@ mod tests {
     use axum::http::header::{ACCEPT_ENCODING, HeaderMap};
     use flate2::read::GzDecoder;
 
-    use super::{ASSETS, asset_of, bundle, content, content_type, source, takes_gzip};
+    use super::{ASSETS, asset_of, bundle, content, content_type, files, source, takes_gzip};
 
     #[test]
     fn every_file_of_the_folder_is_part_of_the_program() {
@@ -355,13 +383,13 @@ mod tests {
             for file in std::fs::read_dir(folder.path()).unwrap() {
                 let name = Path::new(&folder.file_name()).join(file.unwrap().file_name());
                 let name = name.to_str().unwrap().to_owned();
-                assert!(ASSETS.iter().any(|asset| asset.name == name), "{name} is missing from the table");
+                assert!(files().iter().any(|asset| asset.name == name), "{name} is missing from the table");
                 assert_ne!(content_type(&name), "application/octet-stream", "{name}");
                 found += 1;
             }
         }
 
-        assert_eq!(found, ASSETS.len(), "a file stands in the table twice");
+        assert_eq!(found, files().len(), "a file stands in the table twice");
     }
 
     #[test]

@@ -13,9 +13,12 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::credentials::{ACCOUNT_COOKIE, cookie};
+use super::tongue::of_tablet;
+use parfocal_language::{Language, Message};
 use parfocal_records::accounts::AccountError;
 use parfocal_records::store::StoreError;
 use parfocal_session::conductor::ConductError;
+use parfocal_trial::refusal::RefusalKind;
 use parfocal_trial::role::Role;
 
 /// The reason why a request was not done. The text is written for people.
@@ -30,29 +33,24 @@ pub enum Error {
     /// The request is invalid.
     #[error("{0}")]
     Invalid(String),
+    /// What was asked for does not exist, does not fit the current state, or is invalid. A surgeon reads it in the
+    /// session's language.
+    #[error("{1}")]
+    Said(RefusalKind, Message),
     /// The browser does not hold this role.
-    #[error("This page is for the {role}. Open it with the {role}'s link{}.", whence(*.0), role = role_name(*.0))]
+    #[error("{}", needs_role(*.0))]
     NeedsRole(Role),
     /// The browser holds no role.
-    #[error(
-        "This browser has not been let in yet. Open it with the link of your role: the server prints all three \
-         when it starts; a surgeon gets the link from the operator."
-    )]
+    #[error("{}", Message::new("error-no-role"))]
     NoRole,
     /// The key in the link is not one of this server's.
-    #[error(
-        "This link is not valid, or no longer valid. A surgeon gets the link from the operator; \
-         the server printed all of them when it last started."
-    )]
+    #[error("{}", Message::new("error-wrong-key"))]
     WrongKey,
     /// The surgeon's link is to a session that has ended.
-    #[error(
-        "This link was for one session, which has ended. This tablet can still send what it holds from that session. \
-         For the next session the operator shows a new code."
-    )]
+    #[error("{}", Message::new("error-session-over"))]
     SessionOver,
     /// The surgeon's shared link was used in a session of a study.
-    #[error("The session under way has its own link. Scan the code on the operator's page.")]
+    #[error("{}", Message::new("error-needs-session-link"))]
     NeedsSessionLink,
     /// In a study, this needs a sign-in under an account with this role.
     #[error(
@@ -68,7 +66,7 @@ pub enum Error {
     #[error("{0}")]
     Forbidden(String),
     /// The request was made by another site.
-    #[error("This request came from another site and was not done. Go back to the page and try again from there.")]
+    #[error("{}", Message::new("error-cross-site"))]
     CrossSite,
     /// The server was asked for by a name that it does not accept.
     #[error(
@@ -83,16 +81,16 @@ pub enum Error {
     )]
     Unencrypted(String),
     /// Members have no place left.
-    #[error("Too many pages are open at once. Close some of them, then try again.")]
+    #[error("{}", Message::new("error-busy"))]
     Busy,
     /// The disk or the database failed; nothing was acknowledged.
-    #[error("Could not be saved: {0}")]
+    #[error("{}", not_saved(.0))]
     Storage(String),
     /// Something in the database comes from another version of parfocal.
     #[error("{0}")]
     Unreadable(String),
     /// The server itself failed.
-    #[error("The server failed to handle this request. What was saved before is safe. The server's log says more.")]
+    #[error("{}", Message::new("error-internal"))]
     Internal,
 }
 
@@ -111,9 +109,9 @@ impl Error {
     #[must_use]
     pub const fn status(&self) -> StatusCode {
         match self {
-            Self::NotFound(_) => StatusCode::NOT_FOUND,
-            Self::Conflict(_) => StatusCode::CONFLICT,
-            Self::Invalid(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::NotFound(_) | Self::Said(RefusalKind::Unknown, _) => StatusCode::NOT_FOUND,
+            Self::Conflict(_) | Self::Said(RefusalKind::Conflict, _) => StatusCode::CONFLICT,
+            Self::Invalid(_) | Self::Said(RefusalKind::Invalid, _) => StatusCode::UNPROCESSABLE_ENTITY,
             Self::NeedsRole(_)
             | Self::NoRole
             | Self::NeedsAccount(_)
@@ -132,6 +130,39 @@ impl Error {
     }
 }
 
+impl Error {
+    /// The error in `language`, as far as a surgeon can meet it; otherwise in English.
+    #[must_use]
+    pub fn say_in(&self, language: Language) -> String {
+        let message = match self {
+            Self::Said(_, message) => message.clone(),
+            Self::NeedsRole(Role::Surgeon) => Message::new("error-needs-surgeon"),
+            Self::NoRole => Message::new("error-no-role"),
+            Self::WrongKey => Message::new("error-wrong-key"),
+            Self::SessionOver => Message::new("error-session-over"),
+            Self::NeedsSessionLink => Message::new("error-needs-session-link"),
+            Self::CrossSite => Message::new("error-cross-site"),
+            Self::Busy => Message::new("error-busy"),
+            Self::Storage(reason) => not_saved(reason),
+            Self::Internal => Message::new("error-internal"),
+            other => return other.to_string(),
+        };
+        message.say_in(language)
+    }
+}
+
+fn needs_role(role: Role) -> String {
+    if role == Role::Surgeon {
+        return Message::new("error-needs-surgeon").to_string();
+    }
+    let role = role_name(role);
+    format!("This page is for the {role}. Open it with the {role}'s link, which the server prints when it starts.")
+}
+
+fn not_saved(reason: &str) -> Message {
+    Message::new("error-storage").words("reason", reason)
+}
+
 impl From<ConductError> for Error {
     fn from(error: ConductError) -> Self {
         match error {
@@ -140,6 +171,7 @@ impl From<ConductError> for Error {
             ConductError::Conflict(text) => Self::Conflict(text),
             ConductError::Invalid(text) => Self::Invalid(text),
             ConductError::Storage(text) => Self::Storage(text),
+            ConductError::Said(kind, message) => Self::Said(kind, message),
             unreadable @ ConductError::Unreadable { .. } => Self::Unreadable(unreadable.to_string()),
         }
     }
@@ -178,6 +210,7 @@ impl IntoResponse for Error {
 #[derive(Template)]
 #[template(path = "error.html")]
 struct ErrorPage<'a> {
+    language: Language,
     title: &'a str,
     message: &'a str,
     /// Whether to load the page again: a browser that followed another site's link does not send strict cookies with
@@ -193,6 +226,7 @@ pub struct OwnBody;
 
 /// Gives every failed response its body: a page if a browser asked for a page, otherwise JSON.
 pub async fn render(request: Request, next: Next) -> Response {
+    let language = of_tablet(&request);
     let page = wants_page(request.headers());
     let from_elsewhere = request.headers().get("sec-fetch-site").is_some_and(|site| site == "cross-site");
     let path = request.uri().path().to_owned();
@@ -211,10 +245,10 @@ pub async fn render(request: Request, next: Next) -> Response {
     let error = parts.extensions.remove::<Error>();
     let message = match &error {
         Some(error @ (Error::NeedsRole(_) | Error::NoRole)) if !page => format!("{error} {FOR_PROGRAMS}"),
-        Some(error) => error.to_string(),
+        Some(error) => error.say_in(language),
         // A parser's message about an address is for programmers.
-        None if page && status == StatusCode::BAD_REQUEST => MISSPELLED.to_owned(),
-        None => message_of(status, &parts.headers, body).await,
+        None if page && status == StatusCode::BAD_REQUEST => language.say("error-misspelled"),
+        None => message_of(status, &parts.headers, body, language).await,
     };
 
     // The cookie outlives its sign-in. Somebody who held a role only by that sign-in is asked to sign in again.
@@ -225,15 +259,17 @@ pub async fn render(request: Request, next: Next) -> Response {
         return (parts, Json(ErrorBody { error: message, sign_in })).into_response();
     }
 
+    let title = language.say(title_of(status));
     let html = ErrorPage {
-        title: title_of(status),
+        language,
+        title: &title,
         message: &message,
         sign_in: may_sign_in(error.as_ref()).then(|| format!("/sign-in?next={path}")),
         reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_) | Error::NoRole)),
     };
 
     match html.render() {
-        Ok(html) => (parts, Html(html)).into_response(),
+        Ok(html) => (parts, Html(language.fill(&html))).into_response(),
         Err(_) => (parts, message).into_response(),
     }
 }
@@ -245,15 +281,12 @@ const fn may_sign_in(error: Option<&Error>) -> bool {
 
 const FOR_PROGRAMS: &str = "A program sends the key that stands in that link, as 'Authorization: Bearer KEY'.";
 
-const MISSPELLED: &str =
-    "This address is incomplete or misspelled. Open the link once more as you were given it, or go to the start page.";
-
 fn wants_page(headers: &HeaderMap) -> bool {
     headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()).is_some_and(|accept| accept.contains("text/html"))
 }
 
 /// The message of an error that another layer made: its own text if it has any, otherwise the meaning of the status.
-async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::Body) -> String {
+async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::Body, language: Language) -> String {
     let is_text = status != StatusCode::PAYLOAD_TOO_LARGE
         && headers.get(CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/plain"));
     if is_text
@@ -265,29 +298,22 @@ async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::B
     }
 
     match status {
-        StatusCode::NOT_FOUND => "There is nothing at this address.".into(),
+        StatusCode::NOT_FOUND => language.say("error-no-address"),
         StatusCode::METHOD_NOT_ALLOWED => "This address does not take this kind of request.".into(),
-        StatusCode::PAYLOAD_TOO_LARGE => "This text is too long. Send it in shorter parts.".into(),
-        StatusCode::REQUEST_TIMEOUT => "The server took too long; try again.".into(),
+        StatusCode::PAYLOAD_TOO_LARGE => language.say("text-too-long"),
+        StatusCode::REQUEST_TIMEOUT => language.say("error-timeout"),
         other => other.canonical_reason().unwrap_or("The request failed.").into(),
     }
 }
 
+/// The message that heads the page of an error.
 fn title_of(status: StatusCode) -> &'static str {
     match status {
-        StatusCode::NOT_FOUND => "Nothing here",
-        StatusCode::FORBIDDEN | StatusCode::MISDIRECTED_REQUEST => "Not open to this browser",
-        StatusCode::CONFLICT => "Not possible now",
-        status if status.is_server_error() => "The server failed",
-        _ => "That did not work",
-    }
-}
-
-/// Where to get the link of `role`. A surgeon does not see what the server prints at its start.
-const fn whence(role: Role) -> &'static str {
-    match role {
-        Role::Surgeon => ": the operator has it",
-        _ => ", which the server prints when it starts",
+        StatusCode::NOT_FOUND => "error-nothing-here",
+        StatusCode::FORBIDDEN | StatusCode::MISDIRECTED_REQUEST => "error-not-open",
+        StatusCode::CONFLICT => "error-not-now",
+        status if status.is_server_error() => "error-server-failed",
+        _ => "error-did-not-work",
     }
 }
 

@@ -46,6 +46,7 @@ mod surgeon;
 mod tablet_trial;
 mod tablet_trials;
 mod tablets;
+mod tongue;
 mod trust;
 mod voice;
 

@@ -29,6 +29,7 @@ use parfocal_trial::action::Action;
 use parfocal_trial::instruments::Measure;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::question::AnswerValue;
+use parfocal_trial::refusal::RefusalKind;
 use parfocal_trial::role::Role;
 use parfocal_trial::study::signature::Signature;
 
@@ -216,7 +217,9 @@ async fn session_page(
 ) -> Result<Html<String>, Error> {
     by.for_session(&app, id).await?;
     let detail = app.reports.session_detail(id).await.map_err(|error| match error {
-        ConductError::NotFound(_) => Error::NotFound("There is no such session here.".to_owned()),
+        ConductError::NotFound(_) | ConductError::Said(RefusalKind::Unknown, _) => {
+            Error::NotFound("There is no such session here.".to_owned())
+        }
         error => error.into(),
     })?;
 

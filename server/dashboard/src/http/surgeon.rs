@@ -17,8 +17,9 @@ use super::json::JsonBody;
 use super::offline::PAGE_VERSION;
 use super::roles::{Surgeon, SurgeonsTablet};
 use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
-use super::{AppState, assets};
+use super::{AppState, assets, tongue};
 use parfocal_base::ids::SessionId;
+use parfocal_language::Language;
 use parfocal_trial::action::Action;
 use parfocal_trial::pointing::NewChoice;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
@@ -28,6 +29,7 @@ use parfocal_trial::view::SurgeonView;
 #[derive(Template)]
 #[template(path = "surgeon.html")]
 struct Page {
+    language: Language,
     nonce: String,
     /// Whether the page may ask for the microphone.
     microphone: bool,
@@ -39,6 +41,7 @@ struct Page {
 #[derive(Template)]
 #[template(path = "surgeon_over.html")]
 struct OverPage {
+    language: Language,
     nonce: String,
     message: String,
 }
@@ -55,15 +58,17 @@ async fn page(
 ) -> Result<Response, Error> {
     // A tablet that is no longer let in still sends what it holds.
     if let Err(error) = surgeon {
-        let message = error.to_string();
-        let html = OverPage { nonce, message }.render().map_err(|_| Error::Internal)?;
-        return Ok(Html(html).into_response());
+        let language = tongue::of_former_tablet(&app, &headers);
+        let message = error.say_in(language);
+        let html = OverPage { language, nonce, message }.render().map_err(|_| Error::Internal)?;
+        return Ok(Html(language.fill(&html)).into_response());
     }
 
     let microphone = app.surgeon_view.borrow().as_ref().is_some_and(|view| view.voice);
     let link = pass(&headers, &app.keys).map(|pass| link_name(pass, &app.keys)).unwrap_or_default();
-    let html = Page { nonce, microphone, link }.render().map_err(|_| Error::Internal)?;
-    let mut response = Html(html).into_response();
+    let language = tongue::of_page(&app, &headers);
+    let html = Page { language, nonce, microphone, link }.render().map_err(|_| Error::Internal)?;
+    let mut response = Html(language.fill(&html)).into_response();
     response.headers_mut().insert(PAGE_VERSION, HeaderValue::from_static(assets::version()));
     if microphone {
         response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);

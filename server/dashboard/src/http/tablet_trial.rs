@@ -10,26 +10,34 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::roles::SurgeonsTablet;
 use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
+use super::{AppState, tongue};
 use crate::doctor::{TabletPart, TriedTablet};
 use parfocal_base::ids::DeviceId;
+use parfocal_language::Language;
 
 #[derive(Template)]
 #[template(path = "tablet.html")]
 struct Page {
+    language: Language,
     nonce: String,
 }
 
 /// The page that tries a tablet.
 #[utoipa::path(get, path = "/tablet", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn tablet_page(_: SurgeonsTablet, Nonce(nonce): Nonce) -> Result<Response, Error> {
-    let html = Page { nonce }.render().map_err(|_| Error::Internal)?;
-    let mut response = Html(html).into_response();
+async fn tablet_page(
+    _: SurgeonsTablet,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+    headers: HeaderMap,
+) -> Result<Response, Error> {
+    let language = tongue::of_page(&app, &headers);
+    let html = Page { language, nonce }.render().map_err(|_| Error::Internal)?;
+    let mut response = Html(language.fill(&html)).into_response();
     response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);
     Ok(response)
 }

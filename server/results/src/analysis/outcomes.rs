@@ -144,7 +144,7 @@ fn of_ranking(question: &Question, settings: usize) -> Outcome {
 fn of_question(question: &Question) -> Vec<Outcome> {
     // `measures` names all measures even for an answer without any item.
     let nothing = match &question.kind {
-        QuestionKind::Sus => AnswerValue::Points(vec![0; parfocal_trial::instruments::sus::ITEMS]),
+        QuestionKind::Sus { .. } => AnswerValue::Points(vec![0; parfocal_trial::instruments::sus::ITEMS]),
         QuestionKind::NasaTlx { scales } => AnswerValue::Points(vec![0; scales.len()]),
         QuestionKind::SurgTlx { scales, pairs } => AnswerValue::Points(vec![0; scales.len() + pairs.len()]),
         QuestionKind::Text => AnswerValue::Text(String::new()),
@@ -156,7 +156,8 @@ fn of_question(question: &Question) -> Vec<Outcome> {
 
 /// Whether a measure is an outcome. Of a questionnaire only the scores are, not the items.
 fn is_outcome(kind: &QuestionKind, measure: &Measure) -> bool {
-    let questionnaire = matches!(kind, QuestionKind::Sus | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. });
+    let questionnaire =
+        matches!(kind, QuestionKind::Sus { .. } | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. });
     if questionnaire { measure.score && !measure.name.starts_with("weight-of-") } else { !is_order(kind) }
 }
 
@@ -172,7 +173,7 @@ fn outcome(question: &Question, measure: &Measure) -> Outcome {
         QuestionKind::VisualAnalogue { low, high } => {
             (scale("hundredths of the line, 0", 100, low, high), None, Some((0.0, 100.0)))
         }
-        QuestionKind::Sus => ("0 to 100".to_owned(), Some("higher"), Some((0.0, 100.0))),
+        QuestionKind::Sus { .. } => ("0 to 100".to_owned(), Some("higher"), Some((0.0, 100.0))),
         QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. } => {
             ("0 to 100".to_owned(), Some("lower"), Some((0.0, 100.0)))
         }

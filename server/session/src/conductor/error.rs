@@ -1,8 +1,9 @@
 //! Errors of the conductor.
 
 use parfocal_base::ids::SessionId;
+use parfocal_language::Message;
 use parfocal_records::store::StoreError;
-use parfocal_trial::refusal::Refusal;
+use parfocal_trial::refusal::{Refusal, RefusalKind};
 use parfocal_trial::study::refusal::StudyRefusal;
 
 /// The reason why the conductor did not do something.
@@ -20,6 +21,9 @@ pub enum ConductError {
     /// The request is invalid; the text says which part.
     #[error("{0}")]
     Invalid(String),
+    /// The same as one of the above; a surgeon can meet it, and reads it in the session's language.
+    #[error("{1}")]
+    Said(RefusalKind, Message),
     /// The disk or database failed; nothing was acknowledged.
     #[error("could not be saved: {0}")]
     Storage(String),
@@ -38,7 +42,7 @@ pub enum ConductError {
 
 impl ConductError {
     pub(crate) fn no_session() -> Self {
-        Self::NotFound("there is no such session; reload the page".to_owned())
+        Self::Said(RefusalKind::Unknown, Message::new("refused-no-session"))
     }
 }
 
@@ -59,9 +63,9 @@ impl From<Refusal> for ConductError {
         let text = refusal.to_string();
         match refusal {
             Refusal::NotAllowed(_) => Self::Forbidden(text),
-            Refusal::UnknownSegment | Refusal::UnknownQuestion => Self::NotFound(text),
             Refusal::Conflict(_) => Self::Conflict(text),
             Refusal::Invalid(_) => Self::Invalid(text),
+            Refusal::Said(kind, message) => Self::Said(kind, message),
         }
     }
 }

@@ -6,10 +6,12 @@ use super::{ConductError, Conductor, Shared};
 use parfocal_base::PatchPlace;
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::place_of;
+use parfocal_language::Message;
 use parfocal_pipeline::control::Aim;
 use parfocal_trial::account::Actor;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::pointing::{Choice, NewChoice, Touch};
+use parfocal_trial::refusal::RefusalKind;
 
 impl Conductor {
     /// Makes the policy look where `by` has chosen. In a session this is recorded, if its protocol allows it. The lens
@@ -42,7 +44,7 @@ impl Shared {
 
         let sight = self.control.status.borrow().sight;
         let place = place_of((x, y), sight.cells, sight.content_area.as_ref())
-            .ok_or_else(|| ConductError::Invalid("the place lies outside the picture".to_owned()))?;
+            .ok_or_else(|| ConductError::Said(RefusalKind::Invalid, Message::new("refused-outside")))?;
         Ok(Choice { frame, at: Some(Touch { x: hundredths(x), y: hundredths(y) }), place })
     }
 

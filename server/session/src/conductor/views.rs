@@ -51,6 +51,7 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         may_pause: may_pause(course),
         unrecorded: course.is_unrecorded(),
         practice: course.made.practice,
+        language: course.protocol.language,
         title: course.protocol.title.clone(),
         segment: state.segment(),
         setting: setting(course),

@@ -27,7 +27,7 @@ pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
         (QuestionKind::Recognition, AnswerValue::Point(point)) => recognition::fits(*point),
         (QuestionKind::Ranking { ties: false }, AnswerValue::Points(order)) => ranking::is_order(order, settings),
         (QuestionKind::Ranking { ties: true }, AnswerValue::Points(places)) => ranking::are_places(places, settings),
-        (QuestionKind::Sus, AnswerValue::Points(items)) => sus::fits(items),
+        (QuestionKind::Sus { .. }, AnswerValue::Points(items)) => sus::fits(items),
         (QuestionKind::NasaTlx { scales }, AnswerValue::Points(items)) => workload::fits(items, scales.len(), 0),
         (QuestionKind::SurgTlx { scales, pairs }, AnswerValue::Points(items)) => {
             workload::fits(items, scales.len(), pairs.len())
@@ -40,7 +40,7 @@ pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
 #[must_use]
 pub fn sus_score(kind: Option<&QuestionKind>, value: &AnswerValue) -> Option<f64> {
     match (kind, value) {
-        (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
+        (Some(QuestionKind::Sus { .. }), AnswerValue::Points(items)) => sus::score(items),
         _ => None,
     }
 }
@@ -59,7 +59,7 @@ pub fn expected(kind: &QuestionKind, settings: usize) -> String {
         QuestionKind::Ranking { ties: true } => {
             format!("a place from 1 to {settings} for each of the {settings} settings, {OPEN}")
         }
-        QuestionKind::Sus => format!("{} points from 1 to 5, {OPEN}", sus::ITEMS),
+        QuestionKind::Sus { .. } => format!("{} points from 1 to 5, {OPEN}", sus::ITEMS),
         QuestionKind::NasaTlx { scales } => {
             format!("{} gradations from 1 to {}, {OPEN}", scales.len(), workload::GRADATIONS)
         }
@@ -86,7 +86,7 @@ pub fn measures(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
         (QuestionKind::VisualAnalogue { .. }, AnswerValue::Point(place)) => visual_analogue::measures(*place),
         (QuestionKind::Recognition, AnswerValue::Point(point)) => recognition::measures(*point),
         (QuestionKind::Ranking { ties }, AnswerValue::Points(points)) => ranking::measures(points, *ties),
-        (QuestionKind::Sus, AnswerValue::Points(items)) => sus::measures(items),
+        (QuestionKind::Sus { .. }, AnswerValue::Points(items)) => sus::measures(items),
         (QuestionKind::NasaTlx { scales }, AnswerValue::Points(items)) => nasa_tlx::measures(scales, items),
         (QuestionKind::SurgTlx { scales, pairs }, AnswerValue::Points(items)) => {
             surg_tlx::measures(scales, pairs, items)
@@ -120,6 +120,7 @@ fn item_in_words(point: u8) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use parfocal_language::Language;
 
     #[test]
     fn words_have_no_measures_and_no_answer_fits_another_sort_of_question() {
@@ -129,9 +130,9 @@ mod tests {
             QuestionKind::Likert { points: 5, low: String::new(), high: String::new(), labels: Vec::new() },
             QuestionKind::VisualAnalogue { low: String::new(), high: String::new() },
             QuestionKind::Ranking { ties: true },
-            QuestionKind::Sus,
-            nasa_tlx::question(),
-            surg_tlx::question(true),
+            sus::question(Language::English).unwrap(),
+            nasa_tlx::question(Language::English).unwrap(),
+            surg_tlx::question(true, Language::English).unwrap(),
             QuestionKind::Recognition,
         ];
         for kind in kinds {

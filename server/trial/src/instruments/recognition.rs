@@ -4,6 +4,7 @@
 
 use super::measure::{Measure, given};
 use crate::question::{Question, QuestionKind};
+use parfocal_language::Language;
 
 const WORDS: [&str; 3] = ["No", "Not sure", "Yes"];
 
@@ -16,15 +17,11 @@ pub fn fits(point: u8) -> bool {
 /// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether the
 /// recognition question `id` is about all settings.
 #[must_use]
-pub fn follow_up(id: &str, closing: bool) -> Question {
-    let text = if closing {
-        "Which settings did you recognise, and by what? Give their numbers."
-    } else {
-        "By what did you recognise this setting?"
-    };
+pub fn follow_up(id: &str, closing: bool, language: Language) -> Question {
+    let text = if closing { "recognised-which" } else { "recognised-this" };
     Question {
         id: format!("{id}-why"),
-        text: text.to_owned(),
+        text: language.say(text),
         kind: QuestionKind::Text,
         optional: true,
         only_if_yes: Some(id.to_owned()),

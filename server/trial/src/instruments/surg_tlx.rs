@@ -7,13 +7,18 @@
 use super::measure::Measure;
 use super::workload;
 use crate::question::{Pair, QuestionKind, Scale};
+use parfocal_language::Language;
 
-/// The question with its six scales. If it is `weighted`, it also has the 15 pairs.
+/// The question with its six scales. If it is `weighted`, it also has the 15 pairs. `None` where we know no published
+/// translation.
 #[must_use]
-pub fn question(weighted: bool) -> QuestionKind {
+pub fn question(weighted: bool, language: Language) -> Option<QuestionKind> {
+    if language != Language::English {
+        return None;
+    }
     let scales = scales();
     let pairs = if weighted { pairs(scales.len()) } else { Vec::new() };
-    QuestionKind::SurgTlx { scales, pairs }
+    Some(QuestionKind::SurgTlx { scales, pairs })
 }
 
 fn scales() -> Vec<Scale> {
@@ -84,7 +89,9 @@ mod tests {
     use super::*;
 
     fn value(items: &[u8], weighted: bool, name: &str) -> Option<f64> {
-        let QuestionKind::SurgTlx { scales, pairs } = question(weighted) else { panic!("no SURG-TLX") };
+        let Some(QuestionKind::SurgTlx { scales, pairs }) = question(weighted, Language::English) else {
+            panic!("no SURG-TLX")
+        };
         let measures = measures(&scales, &pairs, items);
         measures.iter().find(|measure| measure.name == name).unwrap_or_else(|| panic!("{name}")).value
     }

@@ -2,9 +2,86 @@
 //! Industry).
 
 use super::measure::{Measure, given};
+use crate::question::QuestionKind;
+use parfocal_language::Language;
 
 /// Number of items.
 pub const ITEMS: usize = 10;
+
+/// The scale's wording in one language.
+struct Wording {
+    items: [&'static str; ITEMS],
+    low: &'static str,
+    high: &'static str,
+}
+
+/// Brooke 1996.
+const ENGLISH: Wording = Wording {
+    items: [
+        "I think that I would like to use this system frequently.",
+        "I found the system unnecessarily complex.",
+        "I thought the system was easy to use.",
+        "I think that I would need the support of a technical person to be able to use this system.",
+        "I found the various functions in this system were well integrated.",
+        "I thought there was too much inconsistency in this system.",
+        "I would imagine that most people would learn to use this system very quickly.",
+        "I found the system very cumbersome to use.",
+        "I felt very confident using the system.",
+        "I needed to learn a lot of things before I could get going with this system.",
+    ],
+    low: "Strongly disagree",
+    high: "Strongly agree",
+};
+
+/// Rummel 2016, "System Usability Scale – jetzt auch auf Deutsch", SAP User Experience Community.
+const GERMAN: Wording = Wording {
+    items: [
+        "Ich kann mir sehr gut vorstellen, das System regelmäßig zu nutzen.",
+        "Ich empfinde das System als unnötig komplex.",
+        "Ich empfinde das System als einfach zu nutzen.",
+        "Ich denke, dass ich technischen Support brauchen würde, um das System zu nutzen.",
+        "Ich finde, dass die verschiedenen Funktionen des Systems gut integriert sind.",
+        "Ich finde, dass es im System zu viele Inkonsistenzen gibt.",
+        "Ich kann mir vorstellen, dass die meisten Leute das System schnell zu beherrschen lernen.",
+        "Ich empfinde die Bedienung als sehr umständlich.",
+        "Ich habe mich bei der Nutzung des Systems sehr sicher gefühlt.",
+        "Ich musste eine Menge Dinge lernen, bevor ich mit dem System arbeiten konnte.",
+    ],
+    low: "Stimme überhaupt nicht zu",
+    high: "Stimme voll zu",
+};
+
+/// The F-SUS: Gronier & Baudet 2021, International Journal of Human-Computer Interaction 37:1571,
+/// doi:10.1080/10447318.2021.1898828. Its authors let everybody use it who names them.
+const FRENCH: Wording = Wording {
+    items: [
+        "Je voudrais utiliser ce système fréquemment",
+        "Ce système est inutilement complexe",
+        "Ce système est facile à utiliser",
+        "J'aurais besoin du soutien d'un technicien pour être capable d'utiliser ce système",
+        "Les différentes fonctionnalités de ce système sont bien intégrées",
+        "Il y a trop d'incohérences dans ce système",
+        "La plupart des gens apprendront à utiliser ce système très rapidement",
+        "Ce système est très lourd à utiliser",
+        "Je me suis senti·e très en confiance en utilisant ce système",
+        "J'ai eu besoin d'apprendre beaucoup de choses avant de pouvoir utiliser ce système",
+    ],
+    low: "Pas du tout d'accord",
+    high: "Tout à fait d'accord",
+};
+
+/// The question in `language`. `None` where we have no published translation whose wording is certain: there are several
+/// Spanish ones (such as Sevilla-Gonzalez et al. 2020, JMIR Human Factors 7:e21161), which we have not seen in print.
+#[must_use]
+pub fn question(language: Language) -> Option<QuestionKind> {
+    let Wording { items, low, high } = match language {
+        Language::English => ENGLISH,
+        Language::German => GERMAN,
+        Language::French => FRENCH,
+        Language::Spanish => return None,
+    };
+    Some(QuestionKind::Sus { items: items.map(str::to_owned).to_vec(), low: low.to_owned(), high: high.to_owned() })
+}
 
 /// Whether `items` are points of all items (1 to 5), or of some of them (0 for the others).
 #[must_use]

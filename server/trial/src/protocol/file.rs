@@ -12,12 +12,13 @@ use super::{Prompt, Protocol, Record};
 use crate::allocation::Order;
 use crate::consent;
 use crate::grace::DEFAULT_GRACE;
-use crate::instruments::{nasa_tlx, recognition, surg_tlx};
+use crate::instruments::{nasa_tlx, recognition, surg_tlx, sus};
 use crate::pointing::PatchRule;
 use crate::question::{Question, QuestionKind};
 use crate::tablet::WhenAway;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
+use parfocal_language::Language;
 
 /// Maximum number of segments in a session: more can no longer be compared or ranked by a surgeon.
 const MOST_SETTINGS: usize = 24;
@@ -61,6 +62,8 @@ impl Protocol {
 #[serde(deny_unknown_fields)]
 struct File {
     name: Spanned<String>,
+    #[serde(default)]
+    language: Option<Spanned<String>>,
     title: Spanned<String>,
     researcher_title: Spanned<String>,
     #[serde(default)]
@@ -171,7 +174,8 @@ impl FileQuestion {
 /// Reads and checks `source`.
 fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
     let file: File = toml::from_str(source)?;
-    let reader = Reader { known };
+    let language = language(file.language.as_ref())?;
+    let reader = Reader { known, language };
     identifier(&file.name, "name")?;
 
     let policies = reader.policies(&file.policies)?;
@@ -187,6 +191,7 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
 
     let mut ids = BTreeSet::new();
     Ok(Protocol {
+        language,
         title: reader.shown(&file.title, "title")?,
         researcher_title: file.researcher_title.get_ref().clone(),
         practice: file.practice,
@@ -243,6 +248,16 @@ fn voice_days(file: &File) -> Result<Option<u32>, Fault> {
         return Err(Fault::new(days.span(), "voice_days", "needs 'voice = true'"));
     }
     between(days, "voice_days", 1..=LONGEST_VOICE_DAYS, " days").map(Some)
+}
+
+/// Reads the language of all that surgeons read.
+fn language(given: Option<&Spanned<String>>) -> Result<Language, Fault> {
+    let Some(given) = given else { return Ok(Language::default()) };
+    let code = given.get_ref();
+    Language::from_code(code).ok_or_else(|| {
+        let message = format!("there is no language \"{code}\" here; there are: {}", Language::codes());
+        Fault::new(given.span(), "language", message)
+    })
 }
 
 /// Reads who chooses the patch's place.
@@ -334,6 +349,7 @@ pub(crate) fn identifier(value: &Spanned<String>, key: &str) -> Result<(), Fault
 
 struct Reader<'a> {
     known: &'a [PolicyName],
+    language: Language,
 }
 
 impl Reader<'_> {
@@ -413,7 +429,8 @@ impl Reader<'_> {
             take(&id)?;
 
             let kind = self.kind(question, closing)?;
-            let follow_up = (kind == QuestionKind::Recognition).then(|| recognition::follow_up(&id, closing));
+            let follow_up =
+                (kind == QuestionKind::Recognition).then(|| recognition::follow_up(&id, closing, self.language));
             if let Some(follow_up) = &follow_up {
                 take(&follow_up.id)?;
             }
@@ -444,11 +461,31 @@ impl Reader<'_> {
                 Err(Fault::new(question.kind.span(), "kind", message))
             }
             Kind::Ranking => Ok(QuestionKind::Ranking { ties: is_set(question.ties.as_ref()) }),
-            Kind::Sus => Ok(QuestionKind::Sus),
-            Kind::NasaTlx => Ok(nasa_tlx::question()),
-            Kind::SurgTlx => Ok(surg_tlx::question(is_set(question.weighted.as_ref()))),
+            Kind::Sus => self.translated(question, "System Usability Scale", sus::question(self.language)),
+            Kind::NasaTlx => self.translated(question, "NASA-TLX", nasa_tlx::question(self.language)),
+            Kind::SurgTlx => {
+                let asked = surg_tlx::question(is_set(question.weighted.as_ref()), self.language);
+                self.translated(question, "SURG-TLX", asked)
+            }
             Kind::Recognition => Ok(QuestionKind::Recognition),
         }
+    }
+
+    /// The instrument in the protocol's language. A translation of our own would not be the instrument.
+    fn translated(
+        &self,
+        question: &FileQuestion,
+        name: &str,
+        asked: Option<QuestionKind>,
+    ) -> Result<QuestionKind, Fault> {
+        asked.ok_or_else(|| {
+            let language = self.language.name();
+            let message = format!(
+                "there is no published {language} translation of the {name} here; \
+                 ask it in another language, or leave it out"
+            );
+            Fault::new(question.kind.span(), "kind", message)
+        })
     }
 
     fn likert(&self, question: &FileQuestion) -> Result<QuestionKind, Fault> {

@@ -20,12 +20,15 @@ use super::question::Question;
 use super::tablet::WhenAway;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
+use parfocal_language::Language;
 
 /// A valid protocol, with the text that it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Protocol {
     /// Name: lower-case letters, digits and dashes.
     pub name: String,
+    /// Language of all that surgeons read.
+    pub language: Language,
     /// Title for surgeons.
     pub title: String,
     /// Title for researchers and operators, shown before a session. It is never sent to a surgeon.
@@ -237,6 +240,52 @@ mod tests {
         assert!(blinded.contains("key 'patch_follows': cannot be \"tissue\": sessions are blinded"), "{blinded}");
         let unknown = surgeon("vessel").unwrap_err();
         assert!(unknown.contains("key 'patch_follows': must be \"screen\", not \"vessel\""), "{unknown}");
+    }
+
+    /// The paper's protocol in `language`, with one question of `kind` at the end.
+    fn asking(language: &str, kind: &str) -> Result<Protocol, String> {
+        let source = PAPER.replace("repeats = 2", &format!("repeats = 2\nlanguage = \"{language}\""));
+        let question = format!("\n[[closing]]\nid = \"q\"\ntext = \"?\"\nkind = \"{kind}\"\n");
+        let source = format!("{source}{question}");
+        Protocol::parse(&source, "trial.toml", &known()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn surgeons_read_english_unless_the_protocol_names_another_language() {
+        let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
+        assert_eq!(paper.language, Language::English);
+        for language in Language::ALL {
+            assert_eq!(asking(language.code(), "text").unwrap().language, language);
+        }
+        for unknown in ["it", "DE", "german", ""] {
+            let said = asking(unknown, "text").unwrap_err();
+            assert!(said.contains(&format!("key 'language': there is no language \"{unknown}\"")), "{said}");
+            assert!(said.ends_with("there are: en, de, fr, es"), "{said}");
+        }
+    }
+
+    #[test]
+    fn an_instrument_is_asked_only_in_a_language_into_which_it_was_translated() {
+        let translated = [("sus", vec!["en", "de", "fr"]), ("nasa-tlx", vec!["en", "de"]), ("surg-tlx", vec!["en"])];
+        for (kind, languages) in translated {
+            for language in Language::ALL {
+                let asked = asking(language.code(), kind);
+                if languages.contains(&language.code()) {
+                    assert!(asked.is_ok(), "{kind} {language}: {asked:?}");
+                    continue;
+                }
+                let said = asked.unwrap_err();
+                assert!(said.contains("key 'kind': "), "{said}");
+                assert!(said.contains(&format!("no published {} translation", language.name())), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_follows_a_recognition_question_is_asked_in_the_protocols_language() {
+        let questions = asking("de", "recognition").unwrap().closing;
+        let follow_up = questions.iter().find(|question| question.id == "q-why").unwrap();
+        assert!(follow_up.text.starts_with("Welche Einstellungen"), "{}", follow_up.text);
     }
 
     #[test]

@@ -11,12 +11,13 @@ use crate::phase::Phase;
 use crate::pointing::{Choice, Touch};
 use crate::question::Question;
 use crate::reason;
-use crate::refusal::Refusal;
+use crate::refusal::{Refusal, RefusalKind};
 use crate::role::Role;
 use crate::tablet::{Presence, WhenAway};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
 use parfocal_base::{FocalPower, PatchPlace};
+use parfocal_language::Message;
 
 /// The events that `action` by `by` causes at `now`. Empty if the action was done before (a double click, a stale tab).
 ///
@@ -81,11 +82,11 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
         return Err(Refusal::only("the surgeon or the operator"));
     }
     if !state.plan.patch.is_free() {
-        return Err(Refusal::conflict("the protocol keeps the focus on the centre of the view"));
+        return Err(Refusal::not_now("refused-centre"));
     }
 
     let segment = state.segment().filter(|_| state.running());
-    let segment = segment.ok_or_else(|| not_inspecting(state, "the focus is pointed"))?;
+    let segment = segment.ok_or_else(|| not_inspecting(state, "refused-point-not-looking"))?;
     Ok(match choice.at {
         Some(Touch { x, y }) => {
             vec![EventKind::PatchPlaced { segment, frame: choice.frame, x, y, place: choice.place }]
@@ -95,13 +96,9 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
     })
 }
 
-/// The refusal of something that is done only while a setting is inspected.
-fn not_inspecting(state: &SessionState, what: &str) -> Refusal {
-    if state.paused.is_some() {
-        Refusal::conflict("the session is paused")
-    } else {
-        Refusal::Conflict(format!("{what} only while a setting is inspected"))
-    }
+/// The refusal of something that is done only while a setting is inspected. `said` names its message.
+fn not_inspecting(state: &SessionState, said: &'static str) -> Refusal {
+    if state.paused.is_some() { Refusal::not_now("refused-paused") } else { Refusal::not_now(said) }
 }
 
 /// The events that are caused by what the surgeon's tablets report: that none shows the page any longer, or one does
@@ -174,15 +171,15 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
 /// # Errors
 /// If the session has no such segment or has not reached it, or was aborted.
 fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
-    let position = state.plan.position(segment).ok_or(Refusal::UnknownSegment)?;
+    let position = state.plan.position(segment).ok_or(Refusal::unknown_segment())?;
     if position < state.done {
         return Ok(None);
     }
     if state.phase == Phase::Aborted {
-        return Err(Refusal::conflict("the session was aborted"));
+        return Err(Refusal::not_now("refused-aborted"));
     }
     if position > state.done || state.segment().is_none() {
-        return Err(Refusal::conflict("this setting has not been reached"));
+        return Err(Refusal::not_now("refused-not-reached"));
     }
     Ok(Some(state.phase))
 }
@@ -211,7 +208,7 @@ fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind
 
 fn finish_segment(state: &SessionState, segment: SegmentId, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match current(state, segment)? {
-        Some(Phase::Notice) => Err(Refusal::conflict("this setting has not begun")),
+        Some(Phase::Notice) => Err(Refusal::not_now("refused-not-begun")),
         Some(Phase::Inspecting) => {
             going_on(state)?;
             Ok(finish(state, segment, state.inspected(now)))
@@ -227,7 +224,7 @@ fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<Even
             answered(state, Some(segment), &state.plan.after_segment)?;
             Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
         }
-        Some(_) => Err(Refusal::conflict("the questions on this setting have not been asked")),
+        Some(_) => Err(Refusal::not_now("refused-not-asked")),
         None => Ok(Vec::new()),
     }
 }
@@ -240,7 +237,7 @@ fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
             answered(state, None, &state.plan.closing)?;
             Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
         }
-        _ => Err(Refusal::conflict("the closing questions have not been asked")),
+        _ => Err(Refusal::not_now("refused-closing-not-asked")),
     }
 }
 
@@ -259,8 +256,8 @@ fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
 
 fn pause(state: &SessionState, by: Role, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match state.phase {
-        Phase::Ready => return Err(Refusal::conflict("the session has not started")),
-        Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
+        Phase::Ready => return Err(Refusal::not_now("refused-not-started")),
+        Phase::Completed | Phase::Aborted => return Err(Refusal::not_now("refused-ended")),
         _ => {}
     }
 
@@ -286,13 +283,13 @@ fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<Eve
 
 fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
     if !state.plan.hold {
-        return Err(Refusal::conflict("the protocol does not let anybody hold the focus"));
+        return Err(Refusal::not_now("refused-no-hold"));
     }
     match current(state, segment)? {
         Some(_) if state.running() => {
             Ok(if state.pointed.held { Vec::new() } else { vec![EventKind::FocusHeld { segment }] })
         }
-        Some(_) => Err(not_inspecting(state, "the focus is held")),
+        Some(_) => Err(not_inspecting(state, "refused-hold-not-looking")),
         None => Ok(Vec::new()),
     }
 }
@@ -335,11 +332,14 @@ fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal
 fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Question]) -> Result<(), Refusal> {
     let whole = |question: &Question| state.answer(segment, &question.id).is_some_and(is_whole);
     let open = questions.iter().find(|question| !question.optional && !whole(question));
-    open.map_or(Ok(()), |question| Err(Refusal::Conflict(format!("still to be answered: {}", question.text))))
+    open.map_or(Ok(()), |question| {
+        let said = Message::new("refused-still-open").words("question", &question.text);
+        Err(Refusal::Said(RefusalKind::Conflict, said))
+    })
 }
 
 fn going_on(state: &SessionState) -> Result<(), Refusal> {
-    if state.paused.is_some() { Err(Refusal::conflict("the session is paused")) } else { Ok(()) }
+    if state.paused.is_some() { Err(Refusal::not_now("refused-paused")) } else { Ok(()) }
 }
 
 fn milliseconds(duration: Duration) -> u64 {

@@ -150,7 +150,7 @@ fn a_double_click_and_a_stale_tab_change_nothing() {
     assert_eq!(run.act(Role::Operator, &Action::Start), Ok(0));
     assert_eq!((run.state.phase(), run.state.segment()), (Phase::Notice, Some(segment(1))));
     let unknown = run.act(Role::Surgeon, &Action::Acknowledge { segment: segment(9) });
-    assert_eq!(unknown, Err(Refusal::UnknownSegment));
+    assert_eq!(unknown, Err(Refusal::unknown_segment()));
 }
 
 #[test]

@@ -89,11 +89,21 @@ pub(super) struct SurgeonStatus {
     camera_simulated: bool,
     /// Whether the lens is simulated.
     lens_simulated: bool,
-    /// What is wrong, if anything; the words are the same for every policy.
-    notice: Option<&'static str>,
+    /// What is wrong, if anything; the same for every policy.
+    notice: Option<SurgeonNotice>,
     /// When the server's certificate expires. The page cannot reach the server after that.
     #[schema(value_type = Option<String>)]
     certificate_until: Option<Timestamp>,
+}
+
+/// What is wrong with the devices, as far as a surgeon needs to know it. The page has the words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+enum SurgeonNotice {
+    /// The camera is not delivering pictures.
+    CameraFailed,
+    /// The lens does not answer, so the focus is held.
+    LensFailed,
 }
 
 impl SurgeonStatus {
@@ -101,8 +111,8 @@ impl SurgeonStatus {
     /// that comes with only one policy would tell it from the others.
     fn new(status: &ControlStatus, certificate_until: Option<Timestamp>) -> Self {
         let notice = match status.held {
-            Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
-            Some(Hold::LensFailed) => Some("The focus is being held for the moment."),
+            Some(Hold::CameraFailed) => Some(SurgeonNotice::CameraFailed),
+            Some(Hold::LensFailed) => Some(SurgeonNotice::LensFailed),
             _ => None,
         };
 

@@ -1,0 +1,108 @@
+// Says the pages' messages in one language. The messages lie in `web/languages/`, one file a language, in Mozilla's format
+// Fluent; the server makes a module of each file. English is always there. Pages that know other languages offer them.
+
+import { FluentBundle } from "../fluent/bundle.js";
+import { FluentResource } from "../fluent/resource.js";
+import { text as english } from "../languages/en.js";
+
+const ENGLISH = "en";
+
+/** Begin and end of words that may be written in another direction than the sentence (Unicode's first strong isolate). */
+const ISOLATED = ["\u2068", "\u2069"];
+
+/** Letters that are written from right to left. */
+const RIGHT_TO_LEFT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc]/u;
+
+/** The text of each language's file. @type {Map<string, string>} */
+const texts = new Map([[ENGLISH, english]]);
+
+/**
+ * @param {string} code
+ * @returns {import("@fluent/bundle").FluentBundle}
+ */
+function bundleOf(code) {
+  /** @type {any} */
+  const bundle = new FluentBundle(code, { useIsolating: false });
+  bundle.addResource(new FluentResource(texts.get(code) ?? english));
+  return bundle;
+}
+
+let spoken = ENGLISH;
+let bundle = bundleOf(ENGLISH);
+
+/** The code of the language that is spoken. */
+export function language() {
+  return spoken;
+}
+
+/**
+ * Makes a language known.
+ *
+ * @param {string} code
+ * @param {string} text the language's file
+ */
+export function offer(code, text) {
+  texts.set(code, text);
+}
+
+/**
+ * Speaks a language from now on. Returns whether that changes anything: a language that is not known changes nothing.
+ *
+ * @param {string} code
+ */
+export function speak(code) {
+  if (code === spoken || !texts.has(code)) return false;
+  spoken = code;
+  bundle = bundleOf(code);
+  return true;
+}
+
+/**
+ * Words of people as the argument of a message.
+ *
+ * @param {string} text
+ */
+export function words(text) {
+  return RIGHT_TO_LEFT.test(text) ? `${ISOLATED[0]}${text}${ISOLATED[1]}` : text;
+}
+
+/** @typedef {Record<string, string | number>} Arguments */
+
+/**
+ * The message `id`.
+ *
+ * @param {string} id
+ * @param {Arguments} [args]
+ */
+export function say(id, args) {
+  return format(id, bundle.getMessage(id)?.value, args);
+}
+
+/**
+ * An attribute of the message `id`.
+ *
+ * @param {string} id
+ * @param {string} name
+ */
+export function sayAttribute(id, name) {
+  return format(id, bundle.getMessage(id)?.attributes[name]);
+}
+
+/**
+ * The names of the attributes that message `id` sets on an element, and whether it has a text of its own.
+ *
+ * @param {string} id
+ */
+export function partsOf(id) {
+  const message = bundle.getMessage(id);
+  return { hasText: message?.value != null, attributes: Object.keys(message?.attributes ?? {}) };
+}
+
+/**
+ * @param {string} id shown if the message is missing, which a test rules out
+ * @param {Parameters<import("@fluent/bundle").FluentBundle["formatPattern"]>[0] | null | undefined} pattern
+ * @param {Arguments} [args]
+ */
+function format(id, pattern, args) {
+  return pattern == null ? id : bundle.formatPattern(pattern, args ?? null, []);
+}
