@@ -152,7 +152,7 @@ over-held =
     }
 over-saved = Alles auf diesem Tablet ist gespeichert.
 storage-advice = Dieser Browser speichert nichts auf dem Gerät: Sein Speicher ist voll oder ausgeschaltet, wie in einem privaten Fenster. Was Sie sagen, wartet auf dieser Seite, bis es gespeichert ist. Schließen Sie die Seite nicht und laden Sie sie nicht neu.
-screen-advice = Dieser Browser hält den Bildschirm nicht an. Stellen Sie das Tablet so ein, dass der Bildschirm an bleibt.
+screen-advice = Dieser Browser hält den Bildschirm nicht wach. Stellen Sie das Tablet so ein, dass der Bildschirm an bleibt.
 
 ## Comments
 
