@@ -9,6 +9,7 @@ use parfocal_records::store::export::verify::verify;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
 use parfocal_trial::question::AnswerValue;
+use parfocal_trial::refusal::RefusalKind;
 use parfocal_trial::remark::{Holding, NewAnswer, Origin, WaitClock};
 use parfocal_trial::role::Role;
 use uuid::Uuid;
@@ -249,7 +250,8 @@ async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_
     unblind(&trial, session, false).await.unwrap();
 
     let elsewhere = Holding { session: SessionId(Uuid::from_u128(1)), ..told(TABLET_A, 0) };
-    assert!(matches!(trial.conductor.holding(elsewhere).await, Err(ConductError::NotFound(_))));
+    let refused = trial.conductor.holding(elsewhere).await.unwrap_err();
+    assert!(matches!(refused, ConductError::Said(RefusalKind::Unknown, _)), "{refused}");
 }
 
 #[tokio::test]

@@ -6,6 +6,7 @@ use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
 use parfocal_trial::phase::Phase;
 use parfocal_trial::question::{AnswerValue, QuestionKind};
+use parfocal_trial::refusal::RefusalKind;
 use parfocal_trial::remark::{CommentContent, NewAnswer, Origin, WaitClock};
 use parfocal_trial::role::Role;
 
@@ -204,7 +205,9 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
     let other = trial.key();
     trial.conductor.answer(answer(key, segment)).await.unwrap();
     let elsewhere = trial.view().segment;
-    assert!(matches!(trial.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));
+    let refused = trial.conductor.answer(answer(other, elsewhere)).await.unwrap_err();
+    assert!(matches!(refused, ConductError::Said(RefusalKind::Unknown, _)), "{refused}");
+    assert!(refused.to_string().contains("there is no such session"), "{refused}");
 
     let kept = trial.store.reader().answers(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
@@ -226,10 +229,13 @@ async fn emoji_are_kept_whole_and_a_megabyte_is_refused_with_the_limit() {
 
     let megabyte = trial.comment(&"x".repeat(1_000_000));
     let refused = trial.conductor.comment(megabyte).await.unwrap_err();
-    assert!(matches!(&refused, ConductError::Invalid(text) if text.contains("16384")), "{refused}");
+    assert!(matches!(refused, ConductError::Said(RefusalKind::Invalid, _)), "{refused}");
+    assert!(refused.to_string().contains("the limit is 16384"), "{refused}");
 
     let blank = trial.comment(" \n");
-    assert!(matches!(trial.conductor.comment(blank).await, Err(ConductError::Invalid(_))));
+    let refused = trial.conductor.comment(blank).await.unwrap_err();
+    assert!(matches!(refused, ConductError::Said(RefusalKind::Invalid, _)), "{refused}");
+    assert!(refused.to_string().contains("the comment is empty"), "{refused}");
 }
 
 #[tokio::test]
@@ -279,7 +285,8 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
 
     let done = Action::FinishQuestions { segment: None };
     let refused = trial.conductor.act(Role::Surgeon, session, done.clone()).await.unwrap_err();
-    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("still to be answered")), "{refused}");
+    assert!(matches!(refused, ConductError::Said(RefusalKind::Conflict, _)), "{refused}");
+    assert!(refused.to_string().contains("still to be answered"), "{refused}");
 
     trial.answer(&sus, item(9, 2)).await.unwrap();
     trial.surgeon(done).await;

@@ -9,7 +9,7 @@ use uuid::Uuid;
 use super::*;
 use crate::action::Action;
 use crate::question::QuestionKind;
-use crate::refusal::Refusal;
+use crate::refusal::{Refusal, RefusalKind};
 use crate::role::Role;
 use parfocal_base::FocalPower;
 
@@ -101,8 +101,9 @@ fn a_whole_session_goes_from_ready_to_completed() {
         run.wait(SECOND);
         run.act(Role::Surgeon, &Action::FinishSegment { segment }).unwrap();
         assert_eq!(run.state.phase(), Phase::Questions);
-        let early = run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) });
-        assert!(matches!(early, Err(Refusal::Conflict(text)) if text.contains("a?")));
+        let early = run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap_err();
+        assert!(matches!(early, Refusal::Said(RefusalKind::Conflict, _)), "{early}");
+        assert_eq!(early.to_string(), "still to be answered: a?");
         run.state.keep_answer(Some(segment), "a", said("yes"));
         run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap();
     }
