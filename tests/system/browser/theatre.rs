@@ -81,6 +81,20 @@ impl Browser {
     }
 }
 
+impl Browser {
+    /// The operator presses "Prepare session", again and again until the session is there: a card that grows above the
+    /// button moves it away under a click.
+    pub async fn prepare_session(&self) {
+        until("the session to be ready to start", || async {
+            self.text("#phase").await.contains("Ready to start") || {
+                self.try_click("#new-session [type=submit]").await;
+                false
+            }
+        })
+        .await;
+    }
+}
+
 impl Theatre {
     /// Starts a server and both browsers, which enter by their links.
     pub async fn open(driver: &Driver) -> Self {
@@ -123,8 +137,7 @@ impl Theatre {
         operator.click("#participant-dialog [type=submit]").await;
         operator.sees_no("#participant-dialog").await;
         operator.select("#protocol", protocol).await;
-        operator.click("#new-session [type=submit]").await;
-        operator.sees("#phase", "Ready to start").await;
+        operator.prepare_session().await;
     }
 
     /// The operator enters `reason` in the dialog that asks for one, and confirms.

@@ -55,8 +55,7 @@ async fn prepare(theatre: &Theatre) {
 
     operator.select("#protocol", "short").await;
     operator.sees("#protocol-summary", "6 settings").await;
-    operator.click("#new-session [type=submit]").await;
-    operator.sees("#phase", "Ready to start").await;
+    operator.prepare_session().await;
     surgeon.sees("#panel", "You will look at 6 settings").await;
     shoot(surgeon, "surgeon-2-ready").await;
     operator.click("#session-actions .primary").await;

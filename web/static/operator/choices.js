@@ -130,8 +130,8 @@ export function followChoices(drawn, prepare) {
   async function add() {
     const code = byId("code", HTMLInputElement).value.trim();
     const codes = await post("/api/operator/participants", { code });
-    if (!choices) return;
-    choices = { ...choices, participants: codes };
+    // The lists may not have come yet. An answer that is older than the participant would not have it to choose.
+    choices = { ...(choices ?? (await get("/api/operator/choices"))), participants: codes };
     draw(choices, code);
     drawn();
   }
