@@ -207,7 +207,7 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
     let elsewhere = trial.view().segment;
     let refused = trial.conductor.answer(answer(other, elsewhere)).await.unwrap_err();
     assert!(matches!(refused, ConductError::Said(RefusalKind::Unknown, _)), "{refused}");
-    assert!(refused.to_string().contains("there is no such session"), "{refused}");
+    assert!(refused.to_string().contains("this session has no such setting"), "{refused}");
 
     let kept = trial.store.reader().answers(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
