@@ -7,9 +7,9 @@ practice = Übung
 reduced-picture = Verkleinertes Bild
 pause = Pause
 display = Anzeige
-show-patch = Zeigen, welche Stelle scharf gehalten wird
-show-edge = Rand des Bildfelds zeigen
-show-sharp = Scharfes hervorheben
+show-patch = Scharf gehaltene Stelle anzeigen
+show-edge = Rand des Bildfelds anzeigen
+show-sharp = Scharfe Bereiche hervorheben
 brightness = Helligkeit um das Bild
 try-tablet = Dieses Tablet prüfen
 not-a-device = Für die Forschung. Kein Medizinprodukt.
@@ -53,31 +53,31 @@ simulated-camera = Simulierte Kamera
 simulated-lens = Simulierte Linse
 simulated-both = Simulierte Kamera und Linse
 camera-failed = Die Kamera liefert keine Bilder.
-lens-failed = Der Fokus bleibt im Moment stehen.
+lens-failed = Der Fokus wird im Moment gehalten.
 
 ## What to do now
 
 now-scan-code = Scannen Sie den Code der Versuchsleitung, um die nächste Sitzung zu öffnen.
 now-connecting = Verbindung zum Server wird hergestellt…
 now-nothing = Noch nichts zu tun: Warten Sie, bis die Versuchsleitung einen Versuch beginnt.
-now-press-continue = Drücken Sie „Weiter“, wenn Sie bereit sind.
+now-press-continue = Tippen Sie auf „Weiter“, wenn Sie bereit sind.
 now-wait-paused = Warten Sie auf die Versuchsleitung. Sie können weiter kommentieren.
 now-wait-start = Warten Sie, bis die Versuchsleitung den Versuch beginnt.
 now-tap-begin = Tippen Sie, um Einstellung { $setting } zu beginnen.
 now-ends-soon = Diese Einstellung endet gleich. Was Sie schreiben, bleibt erhalten.
-now-look-write = Sehen Sie sich um und schreiben Sie, was Ihnen auffällt. Beenden Sie dann die Einstellung.
-now-look-say = Sehen Sie sich um und sagen oder schreiben Sie, was Ihnen auffällt. Beenden Sie dann die Einstellung.
-now-answer = Beantworten Sie die Fragen und drücken Sie dann „Weiter“.
-now-answer-last = Beantworten Sie die letzten Fragen und drücken Sie dann „Fertig“.
+now-look-write = Schreiben Sie, was Ihnen auffällt. Beenden Sie dann die Einstellung.
+now-look-say = Sagen oder schreiben Sie, was Ihnen auffällt. Beenden Sie dann die Einstellung.
+now-answer = Beantworten Sie die Fragen und tippen Sie dann auf „Weiter“.
+now-answer-last = Beantworten Sie die letzten Fragen und tippen Sie dann auf „Fertig“.
 now-keep-open = Lassen Sie diese Seite offen, bis alles gespeichert ist.
 now-comment-left = Speichern oder löschen Sie den Kommentar im Feld.
 now-practice-over = Die Übung ist zu Ende. Behalten Sie das Tablet: Als Nächstes kommt der Versuch.
 now-done = Sie sind fertig. Geben Sie das Tablet zurück.
 now-unreachable = Der Server ist nicht erreichbar.
 now-silent-since = Kein Server seit { $time } Uhr.
-now-certificate-over = Sein Zertifikat ist abgelaufen: Sagen Sie es der Versuchsleitung.
+now-certificate-over = Sein Zertifikat ist abgelaufen: Informieren Sie die Versuchsleitung.
 now-keeps-trying = Diese Seite versucht es weiter.
-now-comment-on = Sie können weiter kommentieren. Kommentare werden hier gespeichert und später gesendet.
+now-comment-on = Kommentare bleiben hier und werden später gesendet.
 
 ## The session
 
@@ -95,7 +95,7 @@ ready =
        *[other] Sie werden { $settings } Einstellungen nacheinander ansehen. Die Versuchsleitung beginnt den Versuch.
     }
 no-trial = Es läuft kein Versuch. Sie können sich umsehen.
-not-open-here = Für dieses Tablet nicht geöffnet
+not-open-here = Für dieses Tablet nicht freigegeben
 few-questions = Einstellung { $setting }: einige Fragen
 final-questions = Letzte Fragen
 practice-over = Die Übung ist zu Ende
@@ -107,7 +107,7 @@ nothing-more = Es gibt nichts mehr zu tun. { $kept }
 comment-in-box = Ihr letzter Kommentar steht noch im Feld. Speichern oder löschen Sie ihn.
 continue = Weiter
 finish = Fertig
-unrecorded = Dieser Schritt ist noch nicht aufgezeichnet, weil der Server nicht auf seine Festplatte schreiben kann. Sagen Sie es der Versuchsleitung.
+unrecorded = Dieser Schritt ist noch nicht aufgezeichnet, weil der Server nicht auf seine Festplatte schreiben kann. Informieren Sie die Versuchsleitung.
 act-unanswered = Der Server antwortet nicht. Versuchen Sie es gleich noch einmal.
 tap-unanswered = Der Server hat nicht geantwortet. Tippen Sie noch einmal.
 one-moment = Einen Moment…
@@ -124,10 +124,10 @@ comments-saved =
         [one] 1 Kommentar gespeichert
        *[other] { $count } Kommentare gespeichert
     }
-refused-kept =
+kept-refused =
     { $count ->
-        [one] 1 Kommentar oder Antwort konnte nicht gespeichert werden und bleibt auf diesem Gerät. Sagen Sie es der Versuchsleitung.
-       *[other] { $count } Kommentare oder Antworten konnten nicht gespeichert werden und bleiben auf diesem Gerät. Sagen Sie es der Versuchsleitung.
+        [one] 1 Kommentar oder Antwort konnte nicht gespeichert werden und bleibt auf diesem Gerät. Informieren Sie die Versuchsleitung.
+       *[other] { $count } Kommentare oder Antworten konnten nicht gespeichert werden und bleiben auf diesem Gerät. Informieren Sie die Versuchsleitung.
     }
 still-saving = Bitte lassen Sie diese Seite offen. Einiges, was Sie gesagt haben, wird noch gespeichert.
 all-saved = Alles, was Sie gesagt haben, ist gespeichert.
@@ -143,7 +143,7 @@ held-recordings =
        *[other] { $count } Aufnahmen
     }
 held-here = Hier gespeichert: { $what }.
-held-on-page = Nur auf dieser Seite, also schließen Sie sie nicht: { $what }.
+held-on-page = Nur auf dieser Seite gespeichert, schließen Sie sie nicht: { $what }.
 sent-later = Wird gesendet, sobald das Netz wieder da ist.
 over-held =
     { $count ->
@@ -152,13 +152,13 @@ over-held =
     }
 over-saved = Alles auf diesem Tablet ist gespeichert.
 storage-advice = Dieser Browser speichert nichts auf dem Gerät: Sein Speicher ist voll oder ausgeschaltet, wie in einem privaten Fenster. Was Sie sagen, wartet auf dieser Seite, bis es gespeichert ist. Schließen Sie die Seite nicht und laden Sie sie nicht neu.
-screen-advice = Dieser Browser hält den Bildschirm nicht wach. Stellen Sie das Tablet so ein, dass der Bildschirm an bleibt.
+screen-advice = Dieser Browser hält den Bildschirm nicht eingeschaltet. Stellen Sie das Tablet so ein, dass der Bildschirm eingeschaltet bleibt.
 
 ## Comments
 
 write-what-you-see = Schreiben Sie, was Sie sehen
 write-comment = Schreiben Sie einen Kommentar
-comments-later = Kommentare werden behalten, sobald ein Versuch beginnt
+comments-later = Kommentare werden gespeichert, sobald ein Versuch beginnt
 about-setting = Dieser Kommentar betrifft Einstellung { $setting }.
 continue-draft = „{ $start }“ fortsetzen
 begun-elsewhere = In einem anderen Tab begonnen: { $whole }
@@ -181,13 +181,13 @@ saving-recording = Aufnahme wird gespeichert…
 recording-saved = Aufnahme gespeichert
 recordings-refused =
     { $count ->
-        [one] 1 Aufnahme wurde nicht gespeichert und bleibt auf diesem Gerät. Sagen Sie es der Versuchsleitung. { $reason }
-       *[other] { $count } Aufnahmen wurden nicht gespeichert und bleiben auf diesem Gerät. Sagen Sie es der Versuchsleitung. { $reason }
+        [one] 1 Aufnahme wurde nicht gespeichert und bleibt auf diesem Gerät. Informieren Sie die Versuchsleitung. { $reason }
+       *[other] { $count } Aufnahmen wurden nicht gespeichert und bleiben auf diesem Gerät. Informieren Sie die Versuchsleitung. { $reason }
     }
-talk-lost = Das Mikrofon wurde entzogen. Was Sie bis dahin gesagt haben, bleibt erhalten.
+talk-lost = Das Mikrofon steht nicht mehr zur Verfügung. Was Sie bis dahin gesagt haben, bleibt erhalten.
 talk-limit = Die Aufnahme endete nach zwei Minuten. Was Sie gesagt haben, bleibt erhalten. Lassen Sie los und drücken Sie erneut, um fortzufahren.
 talk-left = Die Aufnahme endete, weil etwas anderes vor diese Seite kam. Was Sie bis dahin gesagt haben, bleibt erhalten. Drücken Sie erneut, um fortzufahren.
-talk-nothing = Es wurde nichts aufgenommen. Halten Sie, bis „Aufnahme“ erscheint, und sprechen Sie dann.
+talk-nothing = Es wurde nichts aufgenommen. Halten Sie die Taste gedrückt, bis „Aufnahme“ erscheint, und sprechen Sie dann.
 try-microphone = Mikrofon prüfen
 microphone-ready = Das Mikrofon ist bereit.
 microphone-failed = Das Mikrofon konnte nicht geöffnet werden.
@@ -207,7 +207,7 @@ not-answered = Noch nicht beantwortet
 answered-of = { $given } von { $total } beantwortet
 partly-answered = { $open } · { $state }
 answer-saved = Gespeichert
-answer-waiting = Hier gespeichert. Es wird gesendet, sobald die Verbindung wieder da ist.
+answer-waiting = Hier gespeichert. Wird gesendet, sobald die Verbindung wieder da ist.
 writing = Sie schreiben…
 earlier-stays = Die frühere Antwort gilt, bis Sie eine andere schreiben.
 questions-open =
@@ -243,7 +243,7 @@ move-up = Einstellung { $setting } nach oben
 move-down = Einstellung { $setting } nach unten
 move-first = Einstellung { $setting } an die erste Stelle
 place = { $place }.
-place-best = { $place } beste
+place-best = { $place } (beste)
 
 ## Answers of the server
 
@@ -278,10 +278,10 @@ refused-too-long = der Text ist { $length } Byte lang; erlaubt sind { $limit }, 
 ## Pages that say why something was not done
 
 error-nothing-here = Hier ist nichts
-error-not-open = Für diesen Browser nicht geöffnet
+error-not-open = Für diesen Browser nicht freigegeben
 error-not-now = Jetzt nicht möglich
 error-server-failed = Fehler des Servers
-error-did-not-work = Das hat nicht geklappt
+error-did-not-work = Das hat nicht funktioniert
 error-start-page = Zur Startseite
 error-sign-in = Anmelden
 error-needs-surgeon = Diese Seite ist für die Chirurgin oder den Chirurgen. Öffnen Sie sie mit dem passenden Link: Die Versuchsleitung hat ihn.
@@ -300,7 +300,7 @@ session-over-title = Sitzung beendet
 
 ## The page that tries a tablet
 
-tablet-intro = Einmal für jedes Tablet, vor dem ersten Versuch: Tippen Sie auf die Taste, und erlauben Sie das Mikrofon, wenn das Tablet fragt.
+tablet-intro = Einmal für jedes Tablet, vor dem ersten Versuch: Tippen Sie auf die Schaltfläche und erlauben Sie das Mikrofon, falls das Tablet fragt.
 tablet-go = Alles prüfen
 tablet-too-old = Beim Tippen geschieht nichts? Dann ist dieser Browser zu alt: iPadOS 16.4, Chrome 108, Firefox 121 oder neuer.
 tablet-guided-access = Auf einem iPad hält „Geführter Zugriff“ das Tablet auf dieser Seite: Einstellungen, Bedienungshilfen, Geführter Zugriff. Drücken Sie dann auf der Seite der Chirurgie dreimal die obere Taste.
@@ -308,22 +308,22 @@ tablet-open-page = Seite der Chirurgie öffnen
 tablet-trying = Wird geprüft…
 tablet-works = { $part }: funktioniert
 tablet-fails = { $part }: { $advice }
-tablet-told = Die Seite der Versuchsleitung zeigt es auch, in der Karte “Ready for a trial?”.
+tablet-told = Die Seite der Versuchsleitung zeigt es auch, in der Karte „Ready for a trial?“.
 tablet-not-told = Der Server hat nicht geantwortet, deshalb weiß es die Versuchsleitung noch nicht. Versuchen Sie es noch einmal.
 tablet-encrypted = Verschlüsselte Verbindung
     .advice = öffnen Sie die Seite mit https, sonst gehen Sprache und das Öffnen ohne Netz nicht
 tablet-storage = Speicher für Kommentare
-    .advice = verlassen Sie den privaten Modus, oder schaffen Sie Platz auf dem Tablet: Beim Neuladen gingen Kommentare verloren
+    .advice = verlassen Sie den privaten Modus, oder schaffen Sie Platz auf dem Tablet; sonst gehen beim Neuladen Kommentare verloren
 tablet-disk = Speicher für Sprache
-    .advice = verlassen Sie den privaten Modus, oder schaffen Sie Platz auf dem Tablet: Beim Neuladen gingen Aufnahmen verloren
+    .advice = verlassen Sie den privaten Modus, oder schaffen Sie Platz auf dem Tablet; sonst gehen beim Neuladen Aufnahmen verloren
 tablet-stream = Live-Verbindung
     .advice = das Netz lässt WebSocket-Verbindungen nicht durch; benutzen Sie ein anderes
-tablet-picture = Bilder zeichnen
+tablet-picture = Bilder darstellen
     .advice = dieser Browser ist zu alt: iPadOS 16.4, Chrome 108, Firefox 121 oder neuer
 tablet-microphone = Mikrofon
     .advice = erlauben Sie es für diese Seite in den Einstellungen des Browsers; ohne es können Kommentare getippt werden
-tablet-screen-on = Bildschirm an lassen
-    .advice = stellen Sie das Tablet so ein, dass der Bildschirm an bleibt
+tablet-screen-on = Bildschirm eingeschaltet lassen
+    .advice = stellen Sie das Tablet so ein, dass der Bildschirm eingeschaltet bleibt
 tablet-all-works = Auf diesem Tablet funktioniert alles.
-tablet-unfit = So wie es ist, taugt dieses Tablet nicht für einen Versuch.
+tablet-unfit = In diesem Zustand eignet sich dieses Tablet nicht für einen Versuch.
 tablet-mostly = Auf diesem Tablet kann ein Versuch laufen. Sehen Sie nach, was nicht funktioniert.

@@ -78,7 +78,7 @@ now-unreachable = The server cannot be reached.
 now-silent-since = No server since { $time }.
 now-certificate-over = Its certificate has ended: tell the operator.
 now-keeps-trying = This page keeps trying.
-now-comment-on = You can continue to comment. Comments are saved here and sent later.
+now-comment-on = Comments are saved here and sent later.
 
 ## The session
 
@@ -125,7 +125,7 @@ comments-saved =
         [one] 1 comment saved
        *[other] { $count } comments saved
     }
-refused-kept =
+kept-refused =
     { $count ->
         [one] 1 comment or answer could not be saved. It is kept on this device. Tell the operator.
        *[other] { $count } comments or answers could not be saved. They are kept on this device. Tell the operator.

@@ -6,7 +6,7 @@ live-view = Imagen en directo
 practice = Práctica
 reduced-picture = Imagen reducida
 pause = Pausa
-display = Pantalla
+display = Visualización
 show-patch = Mostrar la zona que se mantiene enfocada
 show-edge = Mostrar el borde del campo
 show-sharp = Resaltar lo que está nítido
@@ -38,17 +38,17 @@ tap-to-continue = Toque para continuar
 view-help = Imagen en directo. Más y menos cambian el zoom, cero lo muestra todo.
 view-help-pointing = { view-help } Donde esté permitido, Mayús con una flecha mueve el enfoque, y C lo devuelve al centro.
 show-all = { NUMBER($zoom, minimumFractionDigits: 1, maximumFractionDigits: 1) }× · Mostrar todo
-picture-not-live = La imagen no es en directo
-picture-live-again = La imagen vuelve a ser en directo
+picture-not-live = La imagen no está en directo
+picture-live-again = La imagen vuelve a estar en directo
 picture-first = Esperando la primera imagen
-picture-old = No es en directo: la imagen tiene más de medio segundo
-picture-old-seconds = No es en directo: la imagen tiene { $seconds } segundos
-picture-old-minutes = No es en directo: la imagen tiene { $minutes } minutos
+picture-old = No está en directo: la imagen tiene más de medio segundo
+picture-old-seconds = No está en directo: la imagen tiene { $seconds } segundos
+picture-old-minutes = No está en directo: la imagen tiene { $minutes } minutos
 picture-connecting = { $state } · conectando
 hold-focus = Mantener enfoque
 focus-held = Enfoque mantenido
 not-pointed-server = El servidor no responde, por eso no se ha movido el enfoque.
-not-pointed-live = La imagen no es en directo, por eso no se ha movido el enfoque.
+not-pointed-live = La imagen no está en directo, por eso no se ha movido el enfoque.
 simulated-camera = Cámara simulada
 simulated-lens = Lente simulada
 simulated-both = Cámara y lente simuladas
@@ -77,7 +77,7 @@ now-unreachable = No se puede contactar con el servidor.
 now-silent-since = Sin servidor desde las { $time }.
 now-certificate-over = Su certificado ha caducado: avise al equipo del ensayo.
 now-keeps-trying = Esta página sigue intentándolo.
-now-comment-on = Puede seguir comentando. Los comentarios se guardan aquí y se envían después.
+now-comment-on = Los comentarios se guardan aquí y se envían después.
 
 ## The session
 
@@ -95,7 +95,7 @@ ready =
        *[other] Verá { $settings } ajustes, uno tras otro. El equipo iniciará el ensayo.
     }
 no-trial = No hay ningún ensayo en curso. Puede observar.
-not-open-here = No abierto para esta tableta
+not-open-here = No disponible para esta tableta
 few-questions = Ajuste { $setting }: unas preguntas
 final-questions = Preguntas finales
 practice-over = La práctica ha terminado
@@ -124,7 +124,7 @@ comments-saved =
         [one] 1 comentario guardado
        *[other] { $count } comentarios guardados
     }
-refused-kept =
+kept-refused =
     { $count ->
         [one] No se ha podido guardar 1 comentario o respuesta; queda en este dispositivo. Avise al equipo del ensayo.
        *[other] No se han podido guardar { $count } comentarios o respuestas; quedan en este dispositivo. Avise al equipo del ensayo.
@@ -225,7 +225,7 @@ line-less = Menos: { $low }
 line-more = Más: { $high }
 not-marked = Aún sin marcar
 no = No
-not-sure = No estoy seguro
+not-sure = No lo sé
 yes = Sí
 recognised-this = ¿En qué ha reconocido este ajuste?
 recognised-which = ¿Qué ajustes ha reconocido y en qué? Indique sus números.
@@ -278,7 +278,7 @@ refused-too-long = el texto tiene { $length } bytes; el límite es { $limit }, d
 ## Pages that say why something was not done
 
 error-nothing-here = Aquí no hay nada
-error-not-open = No abierto para este navegador
+error-not-open = No disponible para este navegador
 error-not-now = No es posible ahora
 error-server-failed = Error del servidor
 error-did-not-work = No ha funcionado
@@ -308,7 +308,7 @@ tablet-open-page = Abrir la página del cirujano
 tablet-trying = Probando…
 tablet-works = { $part }: funciona
 tablet-fails = { $part }: { $advice }
-tablet-told = La página del equipo del ensayo también lo muestra, en la tarjeta “Ready for a trial?”.
+tablet-told = La página del equipo del ensayo también lo muestra, en la tarjeta «Ready for a trial?».
 tablet-not-told = El servidor no ha respondido, por eso el equipo del ensayo aún no lo sabe. Inténtelo de nuevo.
 tablet-encrypted = Conexión cifrada
     .advice = abra la página con https, o no funcionarán la voz ni la apertura sin red

@@ -11,11 +11,11 @@ show-patch = Montrer la zone maintenue nette
 show-edge = Montrer le bord du champ
 show-sharp = Souligner ce qui est net
 brightness = Luminosité autour de l’image
-try-tablet = Essayer cette tablette
+try-tablet = Tester cette tablette
 not-a-device = Pour la recherche. N’est pas un dispositif médical.
 page-starting = Démarrage… Si cette ligne reste, rechargez la page. Si elle reste encore, ce navigateur est trop ancien : iPadOS 16.4, Chrome 108, Firefox 121 ou plus récent.
 needs-javascript = Cette page a besoin de JavaScript. Autorisez-le pour cette adresse, puis rechargez la page.
-estimated-colours = Couleurs estimées : le capteur ne voit pas le rouge.
+estimated-colours = Couleurs estimées : le capteur ignore le rouge.
 focus-buttons =
     .aria-label = Mise au point
 centre = Centre
@@ -28,7 +28,7 @@ comment-box =
     .placeholder = Écrivez ce que vous voyez
 save-comment = Enregistrer
 mark-moment = Marquer cet instant
-done-with-setting = Fini avec ce réglage
+done-with-setting = Terminer ce réglage
 tap-again = Touchez encore
 undo = Annuler
 tap-to-continue = Touchez pour continuer
@@ -60,7 +60,7 @@ lens-failed = La mise au point est figée pour le moment.
 now-scan-code = Scannez le code de l’équipe de l’essai pour ouvrir la séance suivante.
 now-connecting = Connexion au serveur…
 now-nothing = Rien à faire pour l’instant : attendez que l’équipe lance un essai.
-now-press-continue = Appuyez sur « Continuer » quand vous êtes prêt.
+now-press-continue = Appuyez sur « Continuer » quand vous voulez reprendre.
 now-wait-paused = Attendez l’équipe de l’essai. Vous pouvez encore commenter.
 now-wait-start = Attendez que l’équipe lance l’essai.
 now-tap-begin = Touchez pour commencer le réglage { $setting }.
@@ -74,10 +74,10 @@ now-comment-left = Enregistrez ou effacez le commentaire dans le champ.
 now-practice-over = L’entraînement est terminé. Gardez la tablette : l’essai vient ensuite.
 now-done = Vous avez terminé. Rendez la tablette.
 now-unreachable = Le serveur est injoignable.
-now-silent-since = Plus de serveur depuis { $time }.
+now-silent-since = Serveur absent depuis { $time }.
 now-certificate-over = Son certificat a expiré : prévenez l’équipe de l’essai.
 now-keeps-trying = Cette page continue d’essayer.
-now-comment-on = Vous pouvez continuer à commenter. Les commentaires sont enregistrés ici et envoyés plus tard.
+now-comment-on = Les commentaires sont gardés ici et envoyés plus tard.
 
 ## The session
 
@@ -95,7 +95,7 @@ ready =
        *[other] Vous regarderez { $settings } réglages, l’un après l’autre. L’équipe lancera l’essai.
     }
 no-trial = Aucun essai n’est en cours. Vous pouvez regarder.
-not-open-here = Pas ouvert à cette tablette
+not-open-here = Non accessible depuis cette tablette
 few-questions = Réglage { $setting } : quelques questions
 final-questions = Dernières questions
 practice-over = L’entraînement est terminé
@@ -124,7 +124,7 @@ comments-saved =
         [one] { $count } commentaire enregistré
        *[other] { $count } commentaires enregistrés
     }
-refused-kept =
+kept-refused =
     { $count ->
         [one] { $count } commentaire ou réponse n’a pas pu être enregistré et reste sur cet appareil. Prévenez l’équipe de l’essai.
        *[other] { $count } commentaires ou réponses n’ont pas pu être enregistrés et restent sur cet appareil. Prévenez l’équipe de l’essai.
@@ -188,7 +188,7 @@ talk-lost = Le microphone a été retiré. Ce que vous avez dit jusque-là est c
 talk-limit = L’enregistrement s’est arrêté après deux minutes. Ce que vous avez dit est conservé. Relâchez, puis appuyez encore pour continuer.
 talk-left = L’enregistrement s’est arrêté car autre chose est passé devant cette page. Ce que vous avez dit jusque-là est conservé. Appuyez encore pour continuer.
 talk-nothing = Rien n’a été enregistré. Maintenez jusqu’à « Enregistre », puis parlez.
-try-microphone = Essayer le microphone
+try-microphone = Tester le microphone
 microphone-ready = Le microphone est prêt.
 microphone-failed = Le microphone n’a pas pu être ouvert.
 microphone-failed-type = Le microphone n’a pas pu être ouvert. Tapez votre commentaire.
@@ -204,7 +204,7 @@ microphone-busy = Un autre programme utilise le microphone. Fermez-le, ou tapez 
 
 optional = (facultatif)
 not-answered = Pas encore de réponse
-answered-of = { $given } sur { $total } répondues
+answered-of = Réponses : { $given } sur { $total }
 partly-answered = { $open } · { $state }
 answer-saved = Enregistré
 answer-waiting = Conservé ici. Ce sera envoyé dès que la connexion revient.
@@ -225,7 +225,7 @@ line-less = Moins : { $low }
 line-more = Plus : { $high }
 not-marked = Pas encore marqué
 no = Non
-not-sure = Pas sûr
+not-sure = Je ne sais pas
 yes = Oui
 recognised-this = À quoi avez-vous reconnu ce réglage ?
 recognised-which = Quels réglages avez-vous reconnus, et à quoi ? Donnez leurs numéros.
@@ -282,7 +282,7 @@ refused-too-long = le texte fait { $length } octets ; la limite est de { $limi
 ## Pages that say why something was not done
 
 error-nothing-here = Rien ici
-error-not-open = Pas ouvert à ce navigateur
+error-not-open = Non accessible depuis ce navigateur
 error-not-now = Pas possible maintenant
 error-server-failed = Erreur du serveur
 error-did-not-work = Cela n’a pas fonctionné
@@ -305,14 +305,14 @@ session-over-title = Séance terminée
 ## The page that tries a tablet
 
 tablet-intro = Une fois par tablette, avant le premier essai : touchez le bouton, et autorisez le microphone si la tablette le demande.
-tablet-go = Tout essayer
+tablet-go = Tout tester
 tablet-too-old = Rien ne se passe quand vous touchez ? Ce navigateur est alors trop ancien : iPadOS 16.4, Chrome 108, Firefox 121 ou plus récent.
 tablet-guided-access = Sur un iPad, l’Accès guidé garde la tablette sur cette page : Réglages, Accessibilité, Accès guidé. Appuyez ensuite trois fois sur le bouton supérieur sur la page du chirurgien.
 tablet-open-page = Ouvrir la page du chirurgien
-tablet-trying = Essai en cours…
+tablet-trying = Test en cours…
 tablet-works = { $part } : fonctionne
 tablet-fails = { $part } : { $advice }
-tablet-told = La page de l’équipe de l’essai le montre aussi, dans la carte “Ready for a trial?”.
+tablet-told = La page de l’équipe de l’essai le montre aussi, dans la carte « Ready for a trial? ».
 tablet-not-told = Le serveur n’a pas répondu, l’équipe de l’essai ne le sait donc pas encore. Réessayez.
 tablet-encrypted = Connexion chiffrée
     .advice = ouvrez la page en https, sinon la voix et l’ouverture sans réseau ne fonctionnent pas

@@ -1,5 +1,9 @@
-// Lets the tests import the modules that the server makes of the languages' files.
+// Lets the tests say messages: what the server's scripts `languages/*.js` do on a page, of the same files.
 
-import { register } from "node:module";
+import { readdirSync, readFileSync } from "node:fs";
 
-register("./language_modules.js", import.meta.url);
+const FOLDER = new URL("../languages/", import.meta.url);
+
+globalThis.parfocalLanguages = Object.fromEntries(
+  readdirSync(FOLDER).map((name) => [name.replace(".ftl", ""), readFileSync(new URL(name, FOLDER), "utf8")]),
+);

@@ -7,7 +7,7 @@ import { test } from "node:test";
 import { parse, Visitor } from "@fluent/syntax";
 import ts from "typescript";
 
-import { language, offer, say, sayAttribute, speak, words } from "../static/shared/language.js";
+import { language, say, sayAttribute, speak, words } from "../static/shared/language.js";
 
 const ROOT = new URL("../../", import.meta.url);
 const CODES = ["en", "de", "fr", "es"];
@@ -253,8 +253,33 @@ test("every message that is said exists, and every message is said somewhere", (
   );
 });
 
+test("what to do now stays one line beside what is said of the colours, so that the picture does not move", () => {
+  const LETTERS = 130;
+  for (const code of CODES) {
+    speak(code);
+    const lost = `${say("now-silent-since", { time: "14:02" })} ${say("now-comment-on")}`;
+    const lines = [lost, say("now-look-write"), say("now-look-say"), say("now-ends-soon")];
+    for (const line of lines) {
+      const shown = line + say("estimated-colours");
+      assert(shown.length <= LETTERS, `${code}, ${shown.length} letters: ${line}`);
+    }
+  }
+  speak("en");
+});
+
+test("no script says a message that only the server has", () => {
+  const only = [...scripts()].flatMap(([name, source]) => {
+    /** @type {string[]} */
+    const found = [];
+    texts(source, (text) => {
+      if (/^(error|refused)-[a-z-]+$/.test(text)) found.push(`${name}: ${text}`);
+    });
+    return found;
+  });
+  assert.deepEqual(only, [], "server/dashboard/src/http/assets.rs leaves it out");
+});
+
 test("a page speaks the language that it is told, and keeps its own if it does not know it", () => {
-  offer("de", read("web/languages/de.ftl"));
   assert.equal(say("pause"), "Pause");
   assert.equal(speak("it"), false);
   assert.equal(language(), "en");

@@ -6,6 +6,9 @@ import type { components, paths } from "./api.js";
 type Json = "application/json";
 
 declare global {
+  /** The texts of the languages that were loaded, by their codes: the server's `languages/*.js` put them there. */
+  var parfocalLanguages: Record<string, string> | undefined;
+
   /** What the server says over HTTP. */
   namespace Api {
     type Schemas = components["schemas"];

@@ -7,7 +7,9 @@ use std::net::TcpListener;
 
 use flate2::read::GzDecoder;
 use reqwest::StatusCode;
-use reqwest::header::{ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, ETAG, IF_NONE_MATCH, VARY};
+use reqwest::header::{
+    ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, COOKIE, ETAG, IF_NONE_MATCH, VARY,
+};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -206,9 +208,24 @@ async fn static_files_are_kept_for_ever_by_their_hash() {
 /// these there are its link, the page, the session, the worker and the page for it, and the live connection.
 #[tokio::test]
 async fn the_surgeons_page_needs_few_files_and_they_are_small() {
-    const BESIDES: usize = 6;
     let server = Server::start();
-    let page = server.get_as("surgeon", "/surgeon").send().await.unwrap().text().await.unwrap();
+    for language in ["en", "de", "fr", "es"] {
+        let request = server.get_as("surgeon", "/surgeon").header(COOKIE, format!("parfocal-language={language}"));
+        let page = request.send().await.unwrap().text().await.unwrap();
+        assert!(page.contains(&format!("<html lang=\"{language}\"")), "{page}");
+        needs_few_small_files(&server, &page).await;
+
+        // Of the languages it loads its own.
+        let loaded: BTreeSet<&str> = page.split('"').filter(|part| part.contains("/languages/")).collect();
+        assert!(
+            loaded.len() == 1 && loaded.iter().all(|file| file.ends_with(&format!("/{language}.js"))),
+            "{loaded:?}"
+        );
+    }
+}
+
+async fn needs_few_small_files(server: &Server, page: &str) {
+    const BESIDES: usize = 6;
     let files: BTreeSet<&str> = page.split('"').filter(|part| part.starts_with("/static/")).collect();
     assert!(files.len() + BESIDES <= 15, "{files:?}");
 

@@ -1,9 +1,8 @@
 // Says the pages' messages in one language. The messages lie in `web/languages/`, one file a language, in Mozilla's format
-// Fluent; the server makes a module of each file. English is always there. Pages that know other languages offer them.
+// Fluent. The server makes a script of each, which every page loads for its own language before its other scripts.
 
 import { FluentBundle } from "../fluent/bundle.js";
 import { FluentResource } from "../fluent/resource.js";
-import { text as english } from "../languages/en.js";
 
 const ENGLISH = "en";
 
@@ -13,8 +12,9 @@ const ISOLATED = ["\u2068", "\u2069"];
 /** Letters that are written from right to left. */
 const RIGHT_TO_LEFT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc]/u;
 
-/** The text of each language's file. @type {Map<string, string>} */
-const texts = new Map([[ENGLISH, english]]);
+/** The text of each language's file that was loaded: its script puts it there. */
+globalThis.parfocalLanguages ??= {};
+const texts = globalThis.parfocalLanguages;
 
 /**
  * @param {string} code
@@ -23,7 +23,7 @@ const texts = new Map([[ENGLISH, english]]);
 function bundleOf(code) {
   /** @type {any} */
   const bundle = new FluentBundle(code, { useIsolating: false });
-  bundle.addResource(new FluentResource(texts.get(code) ?? english));
+  bundle.addResource(new FluentResource(texts[code] ?? ""));
   return bundle;
 }
 
@@ -36,13 +36,12 @@ export function language() {
 }
 
 /**
- * Makes a language known.
+ * Whether the language's script was loaded.
  *
  * @param {string} code
- * @param {string} text the language's file
  */
-export function offer(code, text) {
-  texts.set(code, text);
+export function knows(code) {
+  return Object.hasOwn(texts, code);
 }
 
 /**
@@ -51,7 +50,7 @@ export function offer(code, text) {
  * @param {string} code
  */
 export function speak(code) {
-  if (code === spoken || !texts.has(code)) return false;
+  if (code === spoken || !knows(code)) return false;
   spoken = code;
   bundle = bundleOf(code);
   return true;

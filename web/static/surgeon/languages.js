@@ -1,14 +1,7 @@
 // The languages of the pages that surgeons see, and how such a page shows which one it speaks.
 
-import { text as german } from "../languages/de.js";
-import { text as spanish } from "../languages/es.js";
-import { text as french } from "../languages/fr.js";
 import { setText } from "../shared/dom.js";
-import { language, offer, partsOf, say, sayAttribute, speak } from "../shared/language.js";
-
-offer("de", german);
-offer("fr", french);
-offer("es", spanish);
+import { knows, language, partsOf, say, sayAttribute, speak } from "../shared/language.js";
 
 /** Languages that are written from right to left. */
 const RIGHT_TO_LEFT = ["ar", "fa", "he", "ur"];
@@ -17,6 +10,35 @@ const RIGHT_TO_LEFT = ["ar", "fa", "he", "ur"];
 export function speakAsThePage() {
   speak(document.documentElement.lang);
   remember();
+}
+
+/** The scripts that are being loaded, by their language. @type {Map<string, Promise<boolean>>} */
+const loading = new Map();
+let failures = 0;
+
+/**
+ * Loads a language that this page does not know yet, as when the page is older than the session. Returns whether it is
+ * known now. A failure is no reason to give up: whoever needs the language asks again.
+ *
+ * @param {string} code
+ */
+export function learn(code) {
+  const begun = loading.get(code) ?? load(code);
+  loading.set(code, begun);
+  return begun;
+}
+
+/** @param {string} code */
+async function load(code) {
+  // Browsers do not ask again for a module that they once failed to get.
+  const again = failures === 0 ? "" : `?${failures}`;
+  try {
+    await import(`../languages/${code}.js${again}`);
+  } catch {
+    failures += 1;
+  }
+  loading.delete(code);
+  return knows(code);
 }
 
 /** Tells the server the language, so that this tablet stays in it on pages that are loaded without a session. */

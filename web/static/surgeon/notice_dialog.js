@@ -17,6 +17,7 @@ export function noticeDialog(box, accept) {
   const guard = new NoticeGuard();
   /** @type {string | null} */
   let segment = null;
+  let asked = "tap-to-continue";
   /** @type {Element | null} */
   let focusBefore = null;
 
@@ -39,27 +40,33 @@ export function noticeDialog(box, accept) {
 
   button.onclick = ({ detail }) => {
     if (segment === null || !guard.click(performance.now(), detail === 0)) return;
-    ask(say("one-moment"));
+    ask("one-moment");
     accept(segment);
   };
 
   /** @param {Api.SurgeonView} state */
   function show(state) {
-    if (!state.segment || (dialog.open && segment === state.segment)) return;
-    segment = state.segment;
-    guard.shown(performance.now());
+    if (!state.segment) return;
+    if (!dialog.open || segment !== state.segment) {
+      segment = state.segment;
+      asked = "tap-to-continue";
+      guard.shown(performance.now());
+    }
+    drawWords(state);
+    if (dialog.open) return;
+    focusBefore = document.activeElement;
+    dialog.showModal();
+    button.focus();
+  }
 
+  /** @param {Api.SurgeonView} state */
+  function drawWords(state) {
     const change = state.setting === 1 ? say("change-first") : say("change-next");
     setText(byId("change-title"), say("setting-of", { setting: state.setting, settings: state.settings }));
     const look = state.voice ? say("change-say") : say("change-write");
     setText(byId("change-what"), `${change} ${look}`);
     byId("change-practice").hidden = !state.practice;
-    ask(say("tap-to-continue"));
-
-    if (dialog.open) return;
-    focusBefore = document.activeElement;
-    dialog.showModal();
-    button.focus();
+    setText(byId("change-go"), say(asked));
   }
 
   function hide() {
@@ -74,9 +81,10 @@ export function noticeDialog(box, accept) {
     else byId("view").focus({ preventScroll: true });
   }
 
-  /** @param {string} text */
-  function ask(text) {
-    setText(byId("change-go"), text);
+  /** @param {string} id of the message in which the notice asks for the tap */
+  function ask(id) {
+    asked = id;
+    setText(byId("change-go"), say(asked));
   }
 
   return { show, hide, ask };

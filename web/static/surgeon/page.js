@@ -4,7 +4,7 @@ import { get, inWords, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
-import { language, say, speak } from "../shared/language.js";
+import { knows, language, say, speak } from "../shared/language.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import { Sight } from "../shared/sight.js";
@@ -29,7 +29,7 @@ import {
 } from "./device.js";
 import { followDimmer } from "./dimmer.js";
 import { Holding } from "./holding.js";
-import { showLanguage, speakAsThePage } from "./languages.js";
+import { learn, showLanguage, speakAsThePage } from "./languages.js";
 import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { nowWords } from "./now.js";
@@ -139,6 +139,23 @@ function drawWords() {
   if (lastStatus) followStatus(lastStatus);
 }
 
+/** Speaks the session's language. */
+function speakAsTheSession() {
+  if (state && speak(state.language)) drawWords();
+}
+
+/**
+ * The same for a language that this page does not know yet. Until it is there, the session is shown in the page's
+ * language: a notice must not wait for it.
+ *
+ * @param {string} code
+ */
+async function learnLanguage(code) {
+  if (!(await learn(code)) || code === language() || code !== state?.language) return;
+  speakAsTheSession();
+  drawState();
+}
+
 /* State in */
 
 /**
@@ -162,11 +179,17 @@ function followLastView() {
 /** @param {View | null} next */
 function follow(next) {
   known = true;
-  if (next && speak(next.language)) drawWords();
   state = next;
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
 
+  speakAsTheSession();
+  drawState();
+  if (next && !knows(next.language)) learnLanguage(next.language);
+}
+
+/** Draws the session's state on all parts of the page. */
+function drawState() {
   drawBar();
   focus.follow(state, over);
   box.follow(state);
@@ -209,7 +232,7 @@ async function act(action) {
     const refused = error instanceof Refused;
     // Not the notice of the next setting, which may stand there by now and which nobody has tapped.
     if (action.action === "acknowledge" && isStillMeant(action)) {
-      notice.ask(refused ? say("tap-to-continue") : say("tap-unanswered"));
+      notice.ask(refused ? "tap-to-continue" : "tap-unanswered");
     }
     if (refused && error.status < 500) await refresh();
     if (isStillMeant(action)) {

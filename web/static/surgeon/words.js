@@ -104,7 +104,7 @@ export function readyWords({ settings }) {
  * @param {number} waiting number of comments and answers that are not saved yet
  */
 export function savedWords(refused, waiting) {
-  const kept = refused > 0 ? [say("refused-kept", { count: refused })] : [];
+  const kept = refused > 0 ? [say("kept-refused", { count: refused })] : [];
   if (waiting > 0) return [...kept, say("still-saving")].join(" ");
   return kept[0] ?? say("all-saved");
 }

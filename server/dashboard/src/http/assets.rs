@@ -79,18 +79,38 @@ macro_rules! assets {
     };
 }
 
-/// All static files: those of `web/static/` and the languages' modules.
+/// All static files: those of `web/static/` and the languages' scripts.
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| files().into_iter().chain(languages()).collect());
 
-/// The languages' files as modules for scripts, without what is said to translators.
+/// Beginnings of the names of messages that the server alone says. Pages get their words with the server's answers.
+const SAID_BY_SERVER: [&str; 2] = ["error-", "refused-"];
+
+/// The messages of `language` that pages say, without what is said to translators.
+fn page_messages(language: Language) -> String {
+    let mut wanted = false;
+    let lines = language.source().lines().filter(|line| {
+        // What belongs to a message is indented.
+        if !line.starts_with(' ') {
+            wanted = !line.starts_with('#') && !SAID_BY_SERVER.iter().any(|beginning| line.starts_with(beginning));
+        }
+        wanted && !line.is_empty()
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The languages' files as scripts. Each gives its text to
+/// `web/static/shared/language.js` by a variable of the page, because the surgeon's page has that file in one with others.
 fn languages() -> impl Iterator<Item = Asset> {
     Language::ALL.into_iter().map(|language| {
-        let lines: Vec<&str> = language.source().lines().filter(|line| !line.starts_with('#')).collect();
-        let text = serde_json::Value::from(lines.join("\n"));
+        let text = serde_json::Value::from(page_messages(language));
         // They live as long as the program.
         Asset {
             name: Box::leak(format!("languages/{language}.js").into_boxed_str()),
-            body: Box::leak(format!("export const text = {text};\n").into_bytes().into_boxed_slice()),
+            body: Box::leak(
+                format!("(globalThis.parfocalLanguages ??= {{}}).{language} = {text};\n")
+                    .into_bytes()
+                    .into_boxed_slice(),
+            ),
             packed: OnceLock::new(),
         }
     })
@@ -274,9 +294,16 @@ pub fn version() -> &'static str {
     &VERSION
 }
 
-/// Addresses of all files that the surgeon's page loads.
+/// Address of the script with the messages of the language with this code.
+#[must_use]
+pub fn language_url(code: impl AsRef<str>) -> String {
+    url(&format!("languages/{}.js", code.as_ref()))
+}
+
+/// Addresses of all files that the surgeon's page loads, in whatever language its sessions are.
 pub fn surgeon_urls() -> impl Iterator<Item = String> {
-    WITH_BUNDLE.into_iter().chain([BUNDLED]).map(url)
+    let languages = Language::ALL.into_iter().map(|language| language_url(language.code()));
+    WITH_BUNDLE.into_iter().chain([BUNDLED]).map(url).chain(languages)
 }
 
 /// What a browser gets as static file `name`; `None` if there is no such file.

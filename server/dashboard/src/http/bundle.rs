@@ -107,6 +107,9 @@ impl Module {
                 continue;
             }
 
+            if line.matches('`').count() % 2 == 1 {
+                return Err(format!("{name}: a text of several lines would lose its indentation: {line}"));
+            }
             if line.starts_with("import ") {
                 let mut statement = line.to_owned();
                 while !statement.ends_with(';') {
@@ -120,7 +123,8 @@ impl Module {
                 module.body.push_str(declaration);
                 module.body.push('\n');
             } else if !start.is_empty() {
-                module.body.push_str(line);
+                // A twentieth of what browsers get would be indentation, even compressed.
+                module.body.push_str(start);
                 module.body.push('\n');
             }
         }
@@ -177,6 +181,7 @@ mod tests {
             "shared/circle.js" => "import { b } from \"./back.js\";\nexport const a = b;\n",
             "shared/back.js" => "import { a } from \"./circle.js\";\nexport const b = a;\n",
             "shared/odd.js" => "export default 1;\n",
+            "shared/long.js" => "export const text = `one\n  two`;\n",
             _ => return None,
         })
     }
@@ -199,7 +204,7 @@ return { twice };
 const $surgeon_sums = (() => {
 const { twice } = $shared_twice;
 function add(a, b) {
-  return twice(a + b) / 2;
+return twice(a + b) / 2;
 }
 const one = 1;
 return { add, one };
@@ -223,5 +228,6 @@ return {  };
         assert_eq!(said("shared/circle.js"), "shared/circle.js imports itself, through others");
         assert_eq!(said("shared/none.js"), "shared/none.js is missing");
         assert!(said("shared/odd.js").contains("not understood"));
+        assert!(said("shared/long.js").contains("would lose its indentation"));
     }
 }

@@ -1,4 +1,0 @@
-// The server makes this module of `web/languages/de.ftl` (`server/dashboard/src/http/assets.rs`).
-
-/** The language's messages, in Fluent. */
-export const text: string;
