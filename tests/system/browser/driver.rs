@@ -2,95 +2,55 @@
 //!
 //! Elements are named by CSS selectors. Actions wait until they are possible; queries ask once.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{Ipv4Addr, TcpStream};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::sync::Arc;
-use std::time::Duration;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
 use fantoccini::elements::Element;
 use fantoccini::error::CmdError;
 use fantoccini::key::Key;
-use fantoccini::wd::{TimeoutConfiguration, WebDriverCompatibleCommand, WindowHandle};
-use fantoccini::{Client, ClientBuilder, Locator};
-use hyper_util::client::legacy::connect::HttpConnector;
-use reqwest::{Method, Url};
+use fantoccini::wd::WindowHandle;
+use fantoccini::{Client, Locator};
+use reqwest::Url;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use super::pool::{self, Chromium};
 use super::wait::{comes_true, until};
 
-const NEEDED: &str =
-    "the browser tests need Chromium and its driver; on Debian: apt-get install chromium chromium-driver";
-const ARGUMENTS: [&str; 9] = [
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--window-size=1180,960",
-];
-
-/// Chromedriver's words before the port that it has chosen.
-const STARTED: &str = "started successfully on port ";
-
-/// A running chromedriver; ends, with its browsers, when dropped.
-pub struct Driver {
-    process: Child,
-    port: u16,
-    /// Kept open, because a closed pipe would end chromedriver at its next output.
-    _said: BufReader<ChildStdout>,
-}
+/// What starts browsers. All tests share one chromedriver, which ends with the test program.
+pub struct Driver(());
 
 impl Driver {
-    /// Starts chromedriver on a free port.
-    pub fn start() -> Self {
-        // It looks for a port that is free with IPv4, and ends if another program has that port with IPv6.
-        let mut attempts = (0..5).filter_map(|_| Self::try_start());
-        attempts.next().expect("chromedriver finds a port and says which")
+    /// Starts chromedriver at the first browser, unless another test has.
+    pub const fn start() -> Self {
+        Self(())
     }
 
-    fn try_start() -> Option<Self> {
-        let mut process = Command::new("chromedriver")
-            .arg("--port=0")
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|error| panic!("cannot start chromedriver ({error}): {NEEDED}"));
-
-        let mut said = BufReader::new(process.stdout.take().expect("piped above"));
-        let mut lines = said.by_ref().lines().map_while(Result::ok);
-        let port = lines.find_map(|line| line.split_once(STARTED)?.1.trim_end_matches('.').parse().ok());
-        let Some(port) = port else {
-            let _ = process.wait();
-            return None;
-        };
-        Some(Self { process, port, _said: said })
-    }
-
-    /// A browser with a fresh profile.
+    /// A browser without memory of anything. Another test may have used it.
     pub async fn browser(&self) -> Browser {
-        self.browser_with(&[]).await
+        Browser::controls(pool::borrow().await, true)
     }
 
-    /// The same, with additional options of Chromium.
+    /// A browser of this test's own, with additional options of Chromium; without options, any browser.
     pub async fn browser_with(&self, options: &[String]) -> Browser {
-        self.browser_as(options, json!({})).await
+        if options.is_empty() {
+            return self.browser().await;
+        }
+        Browser::controls(pool::start(pool::profile(), options, json!({})).await, false)
     }
 
     /// A browser whose user has doubled the text size.
     pub async fn browser_with_large_text(&self) -> Browser {
-        self.browser_as(&[], json!({ "webkit.webprefs.default_font_size": 32 })).await
+        let large = json!({ "webkit.webprefs.default_font_size": 32 });
+        Browser::controls(pool::start(pool::profile(), &[], large).await, false)
     }
 
     /// The browser of a tablet that lost power and is switched on again: `browser` ends at once, without writing
     /// anything more, and another starts with what is on its disk.
     pub async fn after_power_cut(&self, browser: &Browser, options: &[String]) -> Browser {
+        assert!(!browser.is_shared, "no other test may get a browser without power");
         // Chromium's lock on its profile names its process.
         let lock = std::fs::read_link(browser.profile.path().join("SingletonLock")).unwrap();
         let process = lock.to_str().and_then(|lock| lock.rsplit('-').next()?.parse().ok()).and_then(Pid::from_raw);
@@ -100,66 +60,7 @@ impl Driver {
         let stat = format!("/proc/{process}/stat");
         let is_gone = || std::fs::read_to_string(&stat).map_or(true, |stat| stat.contains(") Z "));
         until("the browser to be gone", || async { is_gone() }).await;
-        self.browser_on(Arc::clone(&browser.profile), options, json!({})).await
-    }
-
-    async fn browser_as(&self, options: &[String], preferences: Value) -> Browser {
-        self.browser_on(Arc::new(tempfile::tempdir().unwrap()), options, preferences).await
-    }
-
-    async fn browser_on(&self, profile: Arc<TempDir>, options: &[String], preferences: Value) -> Browser {
-        let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
-        arguments.extend_from_slice(options);
-        arguments.push(format!("--user-data-dir={}", profile.path().display()));
-        let wanted = json!({
-            "goog:chromeOptions": { "args": arguments, "prefs": preferences },
-            "goog:loggingPrefs": { "browser": "ALL" },
-        });
-
-        let Value::Object(wanted) = wanted else { unreachable!("an object") };
-        let client = ClientBuilder::new(HttpConnector::new())
-            .capabilities(wanted)
-            .connect(&format!("http://127.0.0.1:{}", self.port))
-            .await
-            .unwrap_or_else(|error| panic!("cannot start Chromium ({error}): {NEEDED}"));
-
-        let timeouts = TimeoutConfiguration::new(Some(Duration::from_mins(1)), Some(Duration::from_mins(1)), None);
-        client.update_timeouts(timeouts).await.unwrap();
-        Browser { client, profile }
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        // Chromedriver ends its browsers when asked to. Ended by a signal, it would leave them running.
-        let asked = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).and_then(|mut line| {
-            line.set_read_timeout(Some(Duration::from_secs(10)))?;
-            let head = "POST /shutdown HTTP/1.1\r\nHost: 127.0.0.1";
-            write!(line, "{head}:{}\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}", self.port)?;
-            line.read_to_end(&mut Vec::new())
-        });
-
-        if asked.is_err() {
-            let _ = self.process.kill();
-        }
-        let _ = self.process.wait();
-    }
-}
-
-/// A command that only chromedriver has.
-#[derive(Debug)]
-struct ChromeCommand {
-    path: &'static str,
-    body: Value,
-}
-
-impl WebDriverCompatibleCommand for ChromeCommand {
-    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
-        base.join(&format!("session/{}/{}", session.unwrap_or_default(), self.path))
-    }
-
-    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
-        (Method::POST, Some(self.body.to_string()))
+        Browser::controls(pool::start(Arc::clone(&browser.profile), options, json!({})).await, false)
     }
 }
 
@@ -191,14 +92,40 @@ impl Area {
 /// A browser with a profile of its own.
 pub struct Browser {
     client: Client,
-    /// Chromium's profile, which stands for a tablet's disk; removed with the last browser that uses it.
+    /// Chromium's profile, which stands for a tablet's disk.
     profile: Arc<TempDir>,
+    /// Whether other tests may use it afterwards.
+    is_shared: bool,
+    /// Origins of the pages that were opened.
+    origins: Mutex<BTreeSet<String>>,
+}
+
+impl Browser {
+    fn controls(chromium: Chromium, is_shared: bool) -> Self {
+        let Chromium { client, profile } = chromium;
+        Self { client, profile, is_shared, origins: Mutex::default() }
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let chromium = Chromium { client: self.client.clone(), profile: Arc::clone(&self.profile) };
+        let origins = std::mem::take(&mut *self.origins.lock().unwrap_or_else(PoisonError::into_inner));
+        // Nobody knows what a failed test left in it.
+        if self.is_shared && !std::thread::panicking() {
+            pool::give_back(chromium, origins);
+        } else {
+            pool::end(chromium);
+        }
+    }
 }
 
 /// Pages and tabs.
 impl Browser {
     /// Opens `url`.
     pub async fn open(&self, url: &str) {
+        let origin = Url::parse(url).unwrap().origin().ascii_serialization();
+        self.origins.lock().unwrap().insert(origin);
         self.client.goto(url).await.unwrap();
     }
 
@@ -236,7 +163,7 @@ impl Browser {
 
     /// Executes a command of the developer tools.
     pub async fn tools(&self, command: &str, parameters: Value) -> Value {
-        self.chrome("goog/cdp/execute", json!({ "cmd": command, "params": parameters })).await
+        pool::tools(&self.client, command, parameters).await.unwrap_or_else(|error| panic!("{command}: {error}"))
     }
 
     /// Touches the screen with a finger at each of these points; without points, lifts the fingers.
@@ -248,14 +175,9 @@ impl Browser {
 
     /// Errors logged by the page's scripts since the last call.
     pub async fn complaints(&self) -> Vec<String> {
-        let log = self.chrome("se/log", json!({ "type": "browser" })).await;
+        let log = pool::log(&self.client).await.unwrap();
         let severe = log.as_array().into_iter().flatten().filter(|line| line["level"] == "SEVERE");
         severe.map(|line| line["message"].as_str().unwrap_or_default().to_owned()).collect()
-    }
-
-    async fn chrome(&self, path: &'static str, body: Value) -> Value {
-        let answer = self.client.issue_cmd(ChromeCommand { path, body }).await;
-        answer.unwrap_or_else(|error| panic!("{path}: {error}"))
     }
 
     /// Runs `script`, the body of a function of `arguments`, and returns its result. See [`super::scripts`].

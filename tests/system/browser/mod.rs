@@ -26,6 +26,7 @@ mod outbox;
 mod people_page;
 mod playback;
 mod pointing;
+mod pool;
 mod proxy;
 mod recording_card;
 pub mod screenshots;
