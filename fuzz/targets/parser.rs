@@ -10,6 +10,8 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use targets::{TARGETS, Target};
 
+#[path = "../../tests/trial/app.rs"]
+mod app;
 #[path = "../../tests/fuzz/backup.rs"]
 mod backup;
 #[path = "../../tests/trial/fixture.rs"]

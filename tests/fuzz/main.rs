@@ -5,6 +5,8 @@
 //!
 //! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
 
+#[path = "../trial/app.rs"]
+mod app;
 mod backup;
 #[path = "../trial/fixture.rs"]
 #[allow(dead_code, reason = "the trial's tests use more of it")]

@@ -10,16 +10,8 @@ use std::time::Duration;
 
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal_dashboard::health::HealthWatch;
-use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{self, App, Equipment, Metrics, OpenTablets, Reach, TabletTrials};
+use parfocal_dashboard::http::{self, Reach};
 use parfocal_dashboard::tls::Certificates;
-use parfocal_imaging::{Calibration, Developer, Size};
-use parfocal_pipeline::live;
-use parfocal_records::store::Backups;
-use parfocal_results::study_export::StudyExports;
-use parfocal_session::playback::Player;
-use parfocal_session::recorder::{Parts, Recordings};
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
 use parfocal_trial::remark::CommentContent;
@@ -31,6 +23,7 @@ use tokio::sync::watch;
 use tokio::time::timeout;
 use tokio_rustls::client::TlsStream;
 
+use super::app;
 use super::fixture::Trial;
 use super::http2;
 use super::trust::Trust;
@@ -407,62 +400,13 @@ async fn serve(trial: &Trial, folder: &TempDir, shutdown: &watch::Receiver<bool>
     let encrypted = TcpListener::bind((local, 0)).await.unwrap();
     let addresses = [&open, &encrypted].map(|listener| listener.local_addr().unwrap());
 
-    let [in_the_clear, with_tls] = [(addresses[0], None), (addresses[1], Some(certificates))]
-        .map(|(address, certificates)| app(trial, folder, Reach::new(address, certificates), shutdown.clone()));
+    let [in_the_clear, with_tls] =
+        [(addresses[0], None), (addresses[1], Some(certificates))].map(|(address, certificates)| {
+            app::app(trial, folder.path(), Reach::new(address, certificates), shutdown.clone())
+        });
     tokio::spawn(http::run(open, in_the_clear, None));
     tokio::spawn(http::run(encrypted, with_tls, Some(settings)));
     addresses
-}
-
-fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<bool>) -> Arc<App> {
-    let clock: Arc<dyn Clock> = trial.clock.clone();
-    let control = trial.control.clone();
-    let calibration = Arc::new(Calibration::default());
-    let (live, _) = live::start(control.clone(), &Developer::new(&calibration), Size::Full, &clock).unwrap();
-    let conductor = trial.conductor.clone();
-    let recordings = folder.path().join("recordings");
-
-    Arc::new(App {
-        accounts: trial.accounts(),
-        study_exports: StudyExports::new(folder.path()),
-        backups: Backups::new(folder.path()),
-        live: live.clone(),
-        store: trial.store.clone(),
-        health: HealthWatch::new(
-            Arc::clone(&clock),
-            control.status.clone(),
-            conductor.operator_view(),
-            trial.store.clone(),
-        ),
-        player: Player::new(trial.reports.clone(), recordings.clone()).unwrap(),
-        recordings: Recordings::new(Parts {
-            clock: Arc::clone(&clock),
-            run: trial.store.run(),
-            tap: control.tap.clone(),
-            status: control.status.clone(),
-            controls: control.camera.clone(),
-            live,
-            conductor: conductor.clone(),
-            folder: recordings,
-            calibration: Calibration::clone(&calibration),
-            size: None,
-        }),
-        surgeon_view: conductor.surgeon_view(),
-        operator_view: conductor.operator_view(),
-        conductor,
-        reports: trial.reports.clone(),
-        library: trial.library.clone(),
-        registry: parfocal_autofocus::Registry::standard(),
-        keys: Keys::load_or_create(folder.path()).unwrap(),
-        reach,
-        equipment: Equipment::new(None, calibration, None),
-        tablets: OpenTablets::default(),
-        tablet_trials: TabletTrials::default(),
-        metrics: Metrics::default(),
-        shutdown,
-        control: control.observer(),
-        clock,
-    })
 }
 
 /// Counts panics from now on, because the server catches those of its handlers.

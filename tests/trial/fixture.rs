@@ -81,7 +81,14 @@ impl Trial {
 
     /// Starts a server on `folder` with a folder of protocols and a seed.
     pub async fn start_with(folder: &Path, protocols: Option<&Path>, seed: u64) -> Self {
-        let clock = Arc::new(a_clock());
+        let trial = Self::empty(folder, protocols, seed, a_clock()).await;
+        trial.conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
+        trial
+    }
+
+    /// The same without a participant, by `clock`.
+    pub async fn empty(folder: &Path, protocols: Option<&Path>, seed: u64, clock: ManualClock) -> Self {
+        let clock = Arc::new(clock);
         let store = Store::open(folder, &a_run(&clock)).await.unwrap();
         let (control, commands) = listener();
         let library = Library::load(protocols, &known()).unwrap();
@@ -97,7 +104,6 @@ impl Trial {
         .await
         .unwrap();
 
-        conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
         let keys = ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000);
         let reports = Reports::open(&store, clock.clone()).await.unwrap();
         Self { store, conductor, reports, library, clock, control, commands, keys }

@@ -12,7 +12,7 @@ use super::driver::{Browser, Driver};
 use super::screenshots::{resize, shoot};
 use super::theatre::{Theatre, operator};
 use super::wait::until;
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// The sign's words.
 const WORDS: [&str; 3] = ["Nothing to tell the focus by", "Searching for the focus", "In focus"];
@@ -33,7 +33,7 @@ async fn the_operator_sees_whether_the_focus_is_held_by_shape_colour_and_words()
     fs::write(&order, "").unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/system/browser/believer.py");
     let policy = format!("exec:python3 -s {} {}", script.display(), order.display());
-    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--policy", &policy]);
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "10", "--policy", &policy]);
     let operator = operator(&driver, &server).await;
 
     // By hand nothing drives the lens.
@@ -67,7 +67,7 @@ async fn the_operator_sees_whether_the_focus_is_held_by_shape_colour_and_words()
 #[tokio::test(flavor = "multi_thread")]
 async fn nobody_sees_it_in_a_session() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     theatre.operator.sees("#lock", WORDS[0]).await;
     theatre.operator.sees("#follow-choice", "Follow the tissue").await;
     theatre.begin("P-04", "pointing").await;
@@ -100,7 +100,7 @@ async fn marked(operator: &Browser) -> Option<(f64, f64)> {
 async fn a_place_follows_the_tissue_while_the_operator_wants_it() {
     let driver = Driver::start();
     let data = Arc::new(tempfile::tempdir().unwrap());
-    let server = Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "20"]);
+    let server = Server::on(data, &["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "20"]);
     let operator = operator(&driver, &server).await;
     // A policy keeps the phantom in focus, without which no tissue is recognised.
     operator.select("#policy", "mgm-hill-climber").await;

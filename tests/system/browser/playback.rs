@@ -98,7 +98,7 @@ pub async fn unblind(page: &Browser) {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     session(&theatre).await;
     let page = &theatre.operator;
 

@@ -1,13 +1,11 @@
 //! Pointing at what is to be in focus, and holding it, on the real pages: by taps, mouse and keys, on two tablets.
 
-use std::sync::Arc;
-
 use serde_json::{Value, json};
 
 use super::accessible;
 use super::driver::{Browser, Driver};
 use super::screenshots::{resize, shoot};
-use super::theatre::{Theatre, database, kill, operator, server, start_again};
+use super::theatre::{Theatre, database, kill, operator, seeing_server, start_again};
 use super::wait::until;
 use crate::support::Server;
 
@@ -107,7 +105,7 @@ async fn surgeon(driver: &Driver, server: &Server) -> Browser {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_tap_puts_the_focus_there_on_every_page_and_a_double_tap_still_zooms() {
     let driver = Driver::start();
-    let server = server();
+    let server = seeing_server();
     let (one, other) = (surgeon(&driver, &server).await, surgeon(&driver, &server).await);
     assert_eq!(marked(&one).await, 0);
 
@@ -175,7 +173,7 @@ fn key(kind: &str, name: &str, modifiers: u32) -> Value {
 #[tokio::test(flavor = "multi_thread")]
 async fn in_a_session_each_tap_and_each_hold_is_an_event_and_outlives_a_reload() {
     let driver = Driver::start();
-    let mut theatre = Theatre::on(&driver, Arc::new(tempfile::tempdir().unwrap())).await;
+    let mut theatre = Theatre::seeing(&driver).await;
     theatre.begin("P-01", "pointing").await;
     theatre.tap_notice(1).await;
     point(&theatre.surgeon).await;
@@ -224,7 +222,7 @@ async fn in_a_session_each_tap_and_each_hold_is_an_event_and_outlives_a_reload()
 #[tokio::test(flavor = "multi_thread")]
 async fn the_papers_trial_has_neither_button_and_a_tap_changes_nothing() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     theatre.begin("P-02", "short").await;
     theatre.tap_notice(1).await;
     is_live(&theatre.surgeon).await;
@@ -239,7 +237,7 @@ async fn the_papers_trial_has_neither_button_and_a_tap_changes_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn with_text_of_twice_the_size_the_buttons_stay_in_reach() {
     let driver = Driver::start();
-    let mut theatre = Theatre::open(&driver).await;
+    let mut theatre = Theatre::seeing(&driver).await;
     let link = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
     theatre.surgeon = driver.browser_with_large_text().await;
     theatre.surgeon.open(&link).await;

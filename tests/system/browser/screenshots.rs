@@ -19,7 +19,7 @@ pub async fn shoot(browser: &Browser, name: &str) {
     for (width, height) in SIZES {
         resize(browser, width, height).await;
         accessible::check_targets(browser, name).await;
-        if std::env::var_os(WANTED).is_some() {
+        if are_wanted() {
             take(browser, &format!("{name}-{width}x{height}.png")).await;
         }
     }
@@ -27,6 +27,11 @@ pub async fn shoot(browser: &Browser, name: &str) {
     let (width, height) = SIZES[0];
     resize(browser, width, height).await;
     accessible::check(browser, name).await;
+}
+
+/// Whether pictures are to be taken.
+pub fn are_wanted() -> bool {
+    std::env::var_os(WANTED).is_some()
 }
 
 async fn take(browser: &Browser, file: &str) {

@@ -19,7 +19,7 @@ use super::pointing;
 use super::screenshots::{resize, shoot};
 use super::theatre::{Theatre, database, operator};
 use super::wait::until;
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// A row of the table that the page copies; empty cells are none.
 type Row = BTreeMap<String, Option<f64>>;
@@ -162,7 +162,7 @@ fn recording(theatre: &Theatre) -> Recording {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_researcher_sees_spectra_at_places_of_a_recording() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     recorded(&theatre).await;
     let page = &theatre.operator;
     let recording = recording(&theatre);
@@ -333,7 +333,7 @@ async fn corners(theatre: &Theatre, page: &Browser, recording: &Recording) {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_operator_sees_live_spectra_outside_sessions_and_never_in_one() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     let page = &theatre.operator;
     until("a live picture", || async { page.is(".viewer-stale", "hidden").await }).await;
     page.sees_no("#spectra").await;
@@ -438,7 +438,7 @@ async fn with_a_white_reference_and_text_of_twice_the_size_reflectance_can_be_re
     };
     calibration::save(folder.path(), &white, &[]).unwrap();
     let file = folder.path().join("calibration.toml");
-    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "5", "--calibration", file.to_str().unwrap()]);
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--calibration", file.to_str().unwrap()]);
 
     let driver = Driver::start();
     let page = driver.browser_with_large_text().await;

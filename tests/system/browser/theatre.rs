@@ -10,8 +10,9 @@ use tempfile::TempDir;
 
 use super::driver::{Area, Browser, Driver};
 use super::proxy::Proxy;
+use super::screenshots;
 use super::wait::until;
-use crate::support::Server;
+use crate::support::{BRAIN, DARK, Server};
 
 /// A server with the surgeon's and operator's browsers.
 pub struct Theatre {
@@ -25,9 +26,14 @@ pub struct Theatre {
     pub operator: Browser,
 }
 
-/// A server on the phantom and the simulated lens, with the test's protocol.
+/// A server with the simulated lens, the test's protocol, and a camera that sees nothing.
 pub fn server() -> Server {
-    start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0")
+    start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0", DARK)
+}
+
+/// The same with a camera that looks at the brain.
+pub fn seeing_server() -> Server {
+    start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0", BRAIN)
 }
 
 /// The database in a server's data folder, opened by another program than the server.
@@ -43,10 +49,11 @@ pub async fn operator(driver: &Driver, server: &Server) -> Browser {
     browser
 }
 
-fn start(data: Arc<TempDir>, address: &str) -> Server {
+fn start(data: Arc<TempDir>, address: &str, camera: &str) -> Server {
     let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/system/browser");
-    // Few frames, because the camera and two browsers share the machine.
-    Server::on(data, &["--bind", address, "--fps", "5", "--protocols", protocols.to_str().unwrap()])
+    // People look at the screenshots.
+    let camera = if screenshots::are_wanted() { BRAIN } else { camera };
+    Server::on(data, &["--bind", address, "--camera", camera, "--protocols", protocols.to_str().unwrap()])
 }
 
 /// Ends `server` as a power cut would.
@@ -56,7 +63,7 @@ pub fn kill(server: &mut Server) {
 
 /// Starts `server` again, on the same data and address.
 pub fn start_again(server: &mut Server) {
-    *server = start(Arc::clone(&server.data), &server.address.to_string());
+    *server = start(Arc::clone(&server.data), &server.address.to_string(), &server.camera);
 }
 
 impl Browser {
@@ -96,9 +103,14 @@ impl Browser {
 }
 
 impl Theatre {
-    /// Starts a server and both browsers, which enter by their links.
+    /// Starts a server and both browsers, which enter by their links. The camera sees nothing.
     pub async fn open(driver: &Driver) -> Self {
         Self::on(driver, Arc::new(tempfile::tempdir().unwrap())).await
+    }
+
+    /// The same with a camera that looks at the brain, for tests that look at its pictures.
+    pub async fn seeing(driver: &Driver) -> Self {
+        Self::before(driver, seeing_server(), &[]).await
     }
 
     /// The same on the data folder `data`.
@@ -108,7 +120,10 @@ impl Theatre {
 
     /// The same, with `arguments` for the surgeon's browser, for example the sound in its microphone.
     pub async fn heard(driver: &Driver, data: Arc<TempDir>, arguments: &[String]) -> Self {
-        let server = start(data, "127.0.0.1:0");
+        Self::before(driver, start(data, "127.0.0.1:0", DARK), arguments).await
+    }
+
+    async fn before(driver: &Driver, server: Server, arguments: &[String]) -> Self {
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser_with(arguments), driver.browser());
         surgeon.open(&format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"))).await;

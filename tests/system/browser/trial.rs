@@ -12,7 +12,7 @@ use super::wait::until;
 #[tokio::test(flavor = "multi_thread")]
 async fn a_surgeon_completes_a_blinded_trial() {
     let driver = Driver::start();
-    let mut theatre = Theatre::open(&driver).await;
+    let mut theatre = Theatre::seeing(&driver).await;
     prepare(&theatre).await;
     first_setting_typed_comments(&theatre).await;
     second_setting_quick_comments_and_double_taps(&theatre).await;

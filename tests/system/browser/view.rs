@@ -7,7 +7,7 @@ use super::driver::{Area, Browser, Driver};
 use super::screenshots::{resize, set_screen, shoot};
 use super::theatre::{Theatre, operator};
 use super::wait::until;
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// Selector of the canvas with the picture.
 const PICTURE: &str = ".viewer-picture";
@@ -29,7 +29,7 @@ async fn is_live(browser: &Browser) {
 }
 
 fn server() -> Server {
-    Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
+    Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "10"])
 }
 
 /// Waits until the page shows pictures of one pixel per cell, or larger ones. How large they get depends on how fast
@@ -103,7 +103,7 @@ const NOTE: &str = "const canvas = document.querySelector('.viewer-picture');
 #[tokio::test(flavor = "multi_thread")]
 async fn a_finer_screen_gets_larger_pictures_at_the_same_place_without_a_flash() {
     let driver = Driver::start();
-    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "5"]);
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "5"]);
     let surgeon = surgeon(&driver, &server).await;
     set_screen(&surgeon, 640, 480, 1).await;
     gets(&surgeon, false).await;
@@ -201,7 +201,7 @@ async fn the_operator_zooms_by_the_wheel_and_drags() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_zoom_stays_from_one_setting_to_the_next() {
     let driver = Driver::start();
-    let theatre = Theatre::open(&driver).await;
+    let theatre = Theatre::seeing(&driver).await;
     theatre.begin("Z-01", "short").await;
     theatre.tap_notice(1).await;
     is_live(&theatre.surgeon).await;

@@ -16,7 +16,9 @@ use tokio_tungstenite::{connect_async, tungstenite};
 use uuid::Uuid;
 
 use super::live::{Page, upgrade};
-use super::studies::{act, ask, new_session, open, post, refused, server, sign_in_as_lead, take_session_link};
+use super::studies::{
+    act, ask, new_session, open, post, refused, server, server_within, sign_in_as_lead, take_session_link,
+};
 use crate::support::{PASSPHRASE, Server, account, client};
 
 async fn sign_in(server: &Server, name: &str, passphrase: &str) -> Response {
@@ -30,7 +32,7 @@ async fn status(server: &Server, path: &str, cookie: &str) -> u16 {
 
 #[tokio::test]
 async fn a_person_who_signs_in_has_the_pages_of_the_role_until_the_sign_in_ends() {
-    let server = Server::start();
+    let server = Server::within();
     server.add_account("lead", "lead", "Dr Lead");
     server.add_account("operator", "operator", "Nurse Op");
 
@@ -78,7 +80,7 @@ async fn the_command_line_keeps_accounts_and_refuses_what_does_not_fit() {
     let (done, said) = account(nothing.path(), &["add", "lead", "--role", "lead"]);
     assert!(!done && said.contains("start `parfocal serve` once"), "{said}");
 
-    let server = Server::start();
+    let server = Server::within();
     let on = |arguments: &[&str]| account(server.data.path(), arguments);
     assert_eq!(on(&["list"]), (true, "no accounts yet\n".to_owned()));
     server.add_account("lead", "lead", "Dr Lead");
@@ -142,7 +144,7 @@ fn doors(session: &str) -> Vec<(&'static str, String, Option<Value>)> {
 
 #[tokio::test]
 async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
-    let (_protocols, mut server) = server();
+    let (_protocols, mut server) = server_within();
     let links = ["operator", "researcher"].map(|role| (role, server.key(role).to_owned()));
     sign_in_as_lead(&mut server).await;
     open(&server).await;
@@ -211,7 +213,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
 
 #[tokio::test]
 async fn locking_and_unblinding_ask_for_the_passphrase_once_more() {
-    let (_protocols, mut server) = server();
+    let (_protocols, mut server) = server_within();
     sign_in_as_lead(&mut server).await;
     open(&server).await;
     let changes = "/api/researcher/studies/scope-2026/changes";
@@ -235,7 +237,7 @@ async fn locking_and_unblinding_ask_for_the_passphrase_once_more() {
 
 #[tokio::test]
 async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
-    let (_protocols, mut server) = server();
+    let (_protocols, mut server) = server_within();
     let shared = server.key("surgeon").to_owned();
     sign_in_as_lead(&mut server).await;
     open(&server).await;
@@ -306,7 +308,7 @@ async fn change(server: &Server, name: &str, mut change: Value, passphrase: &str
 
 #[tokio::test]
 async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
-    let mut server = Server::start();
+    let mut server = Server::within();
     sign_in_as_lead(&mut server).await;
     let accounts = "/api/researcher/accounts";
     let new = json!({"account": "n.op", "display": "Nurse Op", "role": "operator",
@@ -368,7 +370,7 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
 
 #[tokio::test]
 async fn a_lead_changes_accounts_and_nobody_else_does() {
-    let mut server = Server::start();
+    let mut server = Server::within();
     let link = server.key("researcher").to_owned();
     sign_in_as_lead(&mut server).await;
     server.add_account("m", "monitor", "Monitor");
@@ -461,7 +463,7 @@ fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> St
 
 #[test]
 fn a_terminal_shows_nothing_of_a_passphrase() {
-    let server = Server::start();
+    let server = Server::within();
     let typed = [("passphrase (10", "battery staple"), ("repeat the passphrase", "battery staple")];
     let shown = at_a_terminal(&server, "add lead --role lead", &typed);
     assert!(shown.contains("account lead (lead): lead"), "{shown}");

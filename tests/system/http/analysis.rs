@@ -16,7 +16,7 @@ use uuid::Uuid;
 
 use super::live::Page;
 use super::studies::take_session_link;
-use crate::support::{PASSPHRASE, Server, client};
+use crate::support::{BRAIN, PASSPHRASE, Server, client};
 
 const PROTOCOL: &str = include_str!("analysed.toml");
 /// Name of the study.
@@ -58,7 +58,7 @@ impl Study {
         std::fs::write(protocols.path().join("analysed.toml"), PROTOCOL).unwrap();
         let folder = protocols.path().to_str().unwrap();
         let data = Arc::new(tempfile::tempdir().unwrap());
-        let mut server = Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", folder]);
+        let mut server = Server::on(data, &["--bind", "127.0.0.1:0", "--camera", BRAIN, "--protocols", folder]);
         server.add_account("statistician", "lead", "Trial statistician");
         let token = server.sign_in("statistician").await;
         server.use_key("operator", &token);

@@ -93,7 +93,7 @@ impl<'a> Session<'a> {
 
 #[tokio::test]
 async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut session = Session::of(&server);
     let mut page = Page::open(&server, "surgeon").await;
 
@@ -144,7 +144,7 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 
 #[tokio::test]
 async fn during_a_session_the_operator_sees_nothing_that_distinguishes_policies() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut session = Session::of(&server);
     let mut page = Page::open(&server, "operator").await;
 

@@ -50,7 +50,7 @@ async fn the_operator_sees_the_checks_of_machine_devices_and_tablet() {
 
 #[tokio::test]
 async fn only_the_operator_sees_the_checks() {
-    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
+    let server = Server::within();
     for role in ["surgeon", "researcher"] {
         let answer = server.get_as(role, "/api/operator/checks").send().await.unwrap();
         assert_eq!(answer.status().as_u16(), 403, "{role}");

@@ -13,7 +13,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async, tungstenite};
 use tungstenite::Message;
 
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// What does not come in this time never comes.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -182,7 +182,7 @@ fn unpack(message: &[u8]) -> Frame {
 
 #[tokio::test]
 async fn frames_are_whole_pictures_with_their_metadata() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut page = Page::open(&server, "surgeon").await;
     let frame = page.frame().await;
     let picture = image::load_from_memory_with_format(&frame.jpeg, image::ImageFormat::Jpeg).unwrap();
@@ -194,7 +194,7 @@ async fn frames_are_whole_pictures_with_their_metadata() {
 
 #[tokio::test]
 async fn who_does_not_answer_gets_no_second_frame_and_then_the_latest() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut slow = Page::open(&server, "operator").await;
     let mut quick = Page::open(&server, "operator").await;
     let first = slow.frame().await;
@@ -212,7 +212,7 @@ async fn who_does_not_answer_gets_no_second_frame_and_then_the_latest() {
 
 #[tokio::test]
 async fn a_hidden_page_gets_nothing_until_it_is_seen_again() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut hidden = Page::open(&server, "surgeon").await;
     let mut other = Page::open(&server, "surgeon").await;
     let frame = hidden.frame().await;
@@ -227,7 +227,7 @@ async fn a_hidden_page_gets_nothing_until_it_is_seen_again() {
 
 #[tokio::test]
 async fn surgeons_get_no_field_that_could_tell_a_policy() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut surgeon = Page::open(&server, "surgeon").await;
     let frame = surgeon.frame().await;
     assert_eq!(
@@ -266,7 +266,7 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
 
 #[tokio::test]
 async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
-    let server = Server::start();
+    let server = Server::seeing();
     let focus = crate::support::client().post(server.url("/api/operator/focus")).bearer_auth(server.key("operator"));
     assert!(focus.json(&json!({"policy": "parfocal"})).send().await.unwrap().status().is_success());
     let mut surgeon = Page::open(&server, "surgeon").await;
@@ -283,7 +283,7 @@ async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
 
 #[tokio::test]
 async fn a_role_that_is_not_held_is_not_served() {
-    let server = Server::with(&["--bind", "0.0.0.0:0", "--insecure"]);
+    let server = Server::with(&["--bind", "0.0.0.0:0", "--insecure", "--camera", BRAIN]);
     let error =
         connect_async(upgrade(&server, "/live?role=operator", "surgeon")).await.expect_err("a surgeon is no operator");
     assert!(matches!(error, tungstenite::Error::Http(response) if response.status() == 403));
@@ -291,7 +291,7 @@ async fn a_role_that_is_not_held_is_not_served() {
 
 #[tokio::test]
 async fn nonsense_closes_the_connection_with_a_reason() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut page = Page::open(&server, "operator").await;
     page.socket.send(Message::text("{\"type\":\"drawn\"}")).await.unwrap();
     let code = loop {
@@ -307,7 +307,7 @@ async fn nonsense_closes_the_connection_with_a_reason() {
 
 #[tokio::test]
 async fn pages_learn_when_the_server_ends() {
-    let mut server = Server::start();
+    let mut server = Server::seeing();
     let mut page = Page::open(&server, "surgeon").await;
     page.frame().await;
     assert!(server.end(rustix::process::Signal::TERM));
@@ -325,7 +325,7 @@ async fn pages_learn_when_the_server_ends() {
 #[tokio::test]
 async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
     const PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
-    let server = Server::start();
+    let server = Server::seeing();
     let mut response = server.get_as("surgeon", "/stream.mjpeg").send().await.unwrap();
     assert_eq!(response.headers()["content-type"], "multipart/x-mixed-replace; boundary=parfocal-frame");
     let mut stream = Vec::new();
@@ -351,7 +351,7 @@ async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
 
 #[tokio::test]
 async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers_setting() {
-    let server = Server::start();
+    let server = Server::seeing();
     let mut operator = Page::open(&server, "operator").await;
     operator.until(|told| told["tablet"]["presence"] == "never-seen").await;
     let mut surgeon = Page::open(&server, "surgeon").await;
@@ -405,7 +405,7 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
 /// The emergency: pause, then the lens by hand. Neither asks for anything.
 #[tokio::test]
 async fn two_requests_lead_from_a_running_setting_to_focus_by_hand() {
-    let server = Server::start();
+    let server = Server::seeing();
     post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
     let new = json!({"participant": "S-01", "protocol": "practice"});
     let view = post(&server, "operator", "/api/operator/sessions", new).await;

@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 
 use super::blinding::{Session, TELLING, form, without_header_names};
 use super::live::{Heard, Page};
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// A server that knows the protocol "pointing".
 pub fn server() -> Server {
     let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/browser");
-    Server::with(&["--bind", "127.0.0.1:0", "--fps", "20", "--protocols", protocols])
+    Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "20", "--protocols", protocols])
 }
 
 /// The middle of a header's patch, in cells.

@@ -12,14 +12,14 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 
 use super::live::{Heard, Page};
-use crate::support::Server;
 use crate::support::disk::SmallDisk;
+use crate::support::{BRAIN, Server};
 
 const PATH: &str = "/api/operator/recording";
 
 pub fn start(data: Arc<tempfile::TempDir>) -> Server {
     let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/http");
-    Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "10", "--protocols", protocols])
+    Server::on(data, &["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "10", "--protocols", protocols])
 }
 
 pub async fn post(server: &Server, path: &str, body: Value) -> (StatusCode, Value) {

@@ -37,7 +37,7 @@ async fn a_session(server: &Server) -> (String, &'static str) {
 
 #[tokio::test]
 async fn records_are_put_right_by_the_researcher_alone() {
-    let server = Server::start();
+    let server = Server::within();
     let (session, comment) = a_session(&server).await;
     let base = format!("/api/researcher/sessions/{session}");
     let note = json!({"field": "note", "record": comment, "old": "", "new": "of the monitor", "reason": "for clarity"});
@@ -92,7 +92,7 @@ async fn records_are_put_right_by_the_researcher_alone() {
 
 #[tokio::test]
 async fn a_consent_that_makes_no_sense_is_refused_with_words() {
-    let server = Server::start();
+    let server = Server::within();
     let (session, _) = a_session(&server).await;
     let good = json!({
         "session": session, "text_version": "2.1", "given_on": "2026-03-01", "obtained_by": "KM", "medium": "paper",

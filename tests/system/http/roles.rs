@@ -1,5 +1,8 @@
 //! Roles: each gives access to its own pages and no others, links become cookies, other sites get nothing.
 
+use std::net::Ipv4Addr;
+use std::sync::Arc;
+
 use reqwest::header::{COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
@@ -24,9 +27,12 @@ const OPEN: [&str; 10] = [
     "/trust/check",
 ];
 
+/// Arguments of a server that others can reach.
+const OPEN_TO_ALL: [&str; 3] = ["--bind", "0.0.0.0:0", "--insecure"];
+
 /// A server that others can reach.
 fn open_server() -> Server {
-    Server::with(&["--bind", "0.0.0.0:0", "--insecure"])
+    Server::within_on(Arc::new(tempfile::tempdir().unwrap()), Ipv4Addr::UNSPECIFIED, None)
 }
 
 async fn enter(server: &Server, key: &str) -> Response {
@@ -71,7 +77,8 @@ async fn ask(server: &Server, path: &str, method: Method, cookie: &str) -> Statu
 async fn nothing_but_the_door_is_open_without_a_key() {
     // On a loopback address too: a request from there may come through a proxy, which by default sends it to 127.0.0.1
     // under that name, without saying where it comes from.
-    for server in [open_server(), Server::start()] {
+    // Processes, because the health of a server without a control loop is bad.
+    for server in [Server::with(&OPEN_TO_ALL), Server::start()] {
         let endpoints = endpoints(&server).await;
         assert!(endpoints.len() > 8, "{endpoints:?}");
         for (path, method, _) in endpoints.iter().filter(|(path, ..)| !OPEN.contains(&path.as_str())) {
@@ -86,7 +93,7 @@ async fn nothing_but_the_door_is_open_without_a_key() {
 
 #[tokio::test]
 async fn a_visitor_without_a_key_learns_where_to_find_one() {
-    let server = Server::start();
+    let server = Server::within();
     for (path, page_words) in [
         ("/", "the server prints all three when it starts"),
         ("/stream.mjpeg", "the server prints all three when it starts"),
@@ -156,16 +163,16 @@ async fn a_link_becomes_a_strict_cookie_and_leaves_the_address() {
 
 #[tokio::test]
 async fn a_cookie_outlives_a_restart() {
-    let mut server = open_server();
+    let mut server = Server::with(&OPEN_TO_ALL);
     let cookie = cookie(&server, "surgeon").await;
     assert!(server.end(rustix::process::Signal::TERM));
-    let again = Server::on(server.data.clone(), &["--bind", "0.0.0.0:0", "--insecure"]);
+    let again = Server::on(server.data.clone(), &OPEN_TO_ALL);
     assert_eq!(ask(&again, "/surgeon", Method::GET, &cookie).await, StatusCode::OK);
 }
 
 #[tokio::test]
 async fn a_loopback_server_answers_to_its_own_names_alone() {
-    let server = Server::start();
+    let server = Server::within();
     let status = async |host: &str| {
         let request = server.get_as("operator", "/operator").header(HOST, host);
         request.send().await.unwrap().status()
@@ -180,7 +187,7 @@ async fn a_loopback_server_answers_to_its_own_names_alone() {
 
 #[tokio::test]
 async fn other_sites_change_nothing_and_hear_nothing() {
-    let server = Server::start();
+    let server = Server::within();
     let post = |name: &'static str, value: String| {
         let request = client().post(server.url("/healthz")).header(name, value);
         async { request.send().await.unwrap().status() }
@@ -220,7 +227,7 @@ async fn a_page_opened_from_another_site_is_asked_for_once_more() {
 
 #[tokio::test]
 async fn the_start_page_is_that_of_the_link_that_let_one_in() {
-    let server = Server::start();
+    let server = Server::within();
     let start = async |cookie: &str| {
         let response = server.get("/").header(COOKIE, cookie).send().await.unwrap();
         response.headers()[LOCATION].to_str().unwrap().to_owned()

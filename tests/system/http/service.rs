@@ -121,7 +121,7 @@ fn one_data_folder_has_one_server() {
 
 #[tokio::test]
 async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
-    let server = Server::start();
+    let server = Server::within();
     let mut nonces = Vec::new();
     for _ in 0..2 {
         let response = server.get_as("operator", "/operator").send().await.unwrap();
@@ -146,7 +146,7 @@ async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
 
 #[tokio::test]
 async fn failures_are_pages_for_browsers_and_json_for_programs() {
-    let server = Server::start();
+    let server = Server::within();
     let page = server.get("/nowhere").header("accept", "text/html,*/*").send().await.unwrap();
     assert_eq!(page.status(), StatusCode::NOT_FOUND);
     let text = page.text().await.unwrap();
@@ -179,7 +179,7 @@ async fn failures_are_pages_for_browsers_and_json_for_programs() {
 
 #[tokio::test]
 async fn static_files_are_kept_for_ever_by_their_hash() {
-    let server = Server::start();
+    let server = Server::within();
     let page = server.get_as("operator", "/operator").send().await.unwrap().text().await.unwrap();
     let address = page.split('"').find(|part| part.starts_with("/static/") && part.ends_with("style.css")).unwrap();
     let file = server.get(address).send().await.unwrap();
@@ -208,7 +208,7 @@ async fn static_files_are_kept_for_ever_by_their_hash() {
 /// these there are its link, the page, the session, the worker and the page for it, and the live connection.
 #[tokio::test]
 async fn the_surgeons_page_needs_few_files_and_they_are_small() {
-    let server = Server::start();
+    let server = Server::within();
     for language in ["en", "de", "fr", "es"] {
         let request = server.get_as("surgeon", "/surgeon").header(COOKIE, format!("parfocal-language={language}"));
         let page = request.send().await.unwrap().text().await.unwrap();
@@ -250,7 +250,7 @@ async fn needs_few_small_files(server: &Server, page: &str) {
 
 #[tokio::test]
 async fn every_endpoint_is_described() {
-    let server = Server::start();
+    let server = Server::within();
     let document: Value = server.get_as("operator", "/api/openapi.json").send().await.unwrap().json().await.unwrap();
     let paths = document["paths"].as_object().unwrap();
     for path in
@@ -264,7 +264,7 @@ async fn every_endpoint_is_described() {
 
 #[tokio::test]
 async fn what_the_layers_answer_and_what_the_server_refuses_is_described() {
-    let server = Server::start();
+    let server = Server::within();
     let request = server.get_as("operator", "/api/openapi.json");
     let document: Value = request.send().await.unwrap().json().await.unwrap();
     let post = &document["paths"]["/api/operator/participants"]["post"];
@@ -291,7 +291,7 @@ async fn what_the_layers_answer_and_what_the_server_refuses_is_described() {
 
 #[tokio::test]
 async fn a_whole_number_may_be_written_with_a_point() {
-    let server = Server::start();
+    let server = Server::within();
     let unknown = "00000000-0000-4000-8000-000000000000";
     let send = async |frame: &str| {
         let comment = format!(r#"{{"key": "{unknown}", "session": "{unknown}", "frame": {frame}, "kind": "mark"}}"#);
@@ -306,7 +306,7 @@ async fn a_whole_number_may_be_written_with_a_point() {
 
 #[tokio::test]
 async fn prometheus_gets_the_counters_without_a_policys_name() {
-    let server = Server::start();
+    let server = Server::within();
     let response = server.get_as("operator", "/metrics").send().await.unwrap();
     assert!(response.headers()[CONTENT_TYPE].to_str().unwrap().starts_with("application/openmetrics-text"));
     let text = response.text().await.unwrap();
@@ -329,7 +329,7 @@ async fn prometheus_gets_the_counters_without_a_policys_name() {
 
 #[tokio::test]
 async fn a_camera_without_settings_offers_none() {
-    let server = Server::start();
+    let server = Server::within();
     let offer: Value = server.get_as("operator", "/api/operator/camera").send().await.unwrap().json().await.unwrap();
     assert_eq!(offer["settings"], serde_json::json!([]));
     let change = serde_json::json!({"setting": "gain", "value": 3});
@@ -342,7 +342,7 @@ async fn a_camera_without_settings_offers_none() {
 #[tokio::test]
 async fn the_pages_are_checked_against_the_present_description() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/web/types/openapi.json");
-    let server = Server::start();
+    let server = Server::within();
     let document: Value = server.get_as("operator", "/api/openapi.json").send().await.unwrap().json().await.unwrap();
 
     if std::env::var_os("PARFOCAL_WRITE_DESCRIPTION").is_some() {

@@ -11,11 +11,11 @@ use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::live::Page;
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// Few frames, because the camera shares the machine with other tests.
 fn server() -> Server {
-    Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
+    Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "10"])
 }
 
 /// The value of the counter or gauge `name` for pictures of size `size`.

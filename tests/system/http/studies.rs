@@ -43,6 +43,13 @@ pub fn server() -> (TempDir, Server) {
     (protocols, server)
 }
 
+/// The same within the test program.
+pub fn server_within() -> (TempDir, Server) {
+    let protocols = protocols();
+    let server = Server::within_by(Some(protocols.path()));
+    (protocols, server)
+}
+
 /// A server on a data folder that another server may have used before.
 pub fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
     Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", protocols.to_str().unwrap()])
@@ -193,7 +200,7 @@ async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
 
 #[tokio::test]
 async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_not_fit() {
-    let (_protocols, mut server) = server();
+    let (_protocols, mut server) = server_within();
     sign_in_as_lead(&mut server).await;
     let studies = "/api/researcher/studies";
     let changes = "/api/researcher/studies/scope-2026/changes";

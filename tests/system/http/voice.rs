@@ -13,7 +13,7 @@ const OPUS: &str = "audio/webm;codecs=opus";
 
 fn server() -> Server {
     let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/browser");
-    Server::with(&["--bind", "127.0.0.1:0", "--protocols", protocols])
+    Server::within_by(Some(Path::new(protocols)))
 }
 
 async fn post(server: &Server, role: &str, path: &str, body: &Value) -> Value {

@@ -1,20 +1,34 @@
 //! Starts the real server as its users do, with its own port and folder.
 
+#[path = "../../trial/app.rs"]
+mod app;
 pub mod disk;
 #[cfg(feature = "aravis")]
 pub mod fake_camera;
+#[path = "../../trial/fixture.rs"]
+#[allow(dead_code, reason = "the trial's tests use more of it")]
+mod fixture;
+mod in_process;
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
+use parfocal_base::clock::SystemClock;
+use parfocal_records::accounts::{Accounts, Cost, Passphrase};
+use parfocal_trial::account::{AccountName, AccountRole};
 use reqwest::{Client, RequestBuilder, redirect};
 use tempfile::TempDir;
+use tokio::runtime::Builder;
 
-/// A running server; killed when dropped.
+use self::in_process::{InProcess, on_a_thread};
+use crate::browser::screenshots::are_wanted as screenshots_are_wanted;
+
+/// A running server; ends when dropped, if it is a process by a kill.
 pub struct Server {
-    process: Child,
+    runs: Runs,
     /// Address at which it is reached.
     pub address: SocketAddr,
     /// Everything that it printed until it was ready.
@@ -22,6 +36,15 @@ pub struct Server {
     keys: Vec<(String, String)>,
     /// Data folder.
     pub data: Arc<TempDir>,
+    /// The camera with which it was started.
+    pub camera: String,
+}
+
+/// How a server runs.
+enum Runs {
+    Process(Child),
+    /// Within this program; it ends when dropped.
+    Within(#[allow(dead_code, reason = "it is dropped")] Box<InProcess>),
 }
 
 impl Server {
@@ -30,7 +53,12 @@ impl Server {
         Self::with(&["--bind", "127.0.0.1:0"])
     }
 
-    /// The same, encrypted with a certificate of its own local authority.
+    /// The same, with a camera whose pictures show something. See [`command`].
+    pub fn seeing() -> Self {
+        Self::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN])
+    }
+
+    /// The same as [`Self::start`], encrypted with a certificate of its own local authority.
     pub fn encrypted() -> Self {
         Self::with(&["--bind", "127.0.0.1:0", "--tls"])
     }
@@ -38,6 +66,34 @@ impl Server {
     /// A server with these arguments and a new data folder.
     pub fn with(arguments: &[&str]) -> Self {
         Self::on(Arc::new(tempfile::tempdir().unwrap()), arguments)
+    }
+
+    /// A server within the test program that only this machine can reach, with a new data folder. It has the same pages
+    /// and rules as the others and starts at once; no pictures come, and its clock stands still.
+    pub fn within() -> Self {
+        Self::within_by(None)
+    }
+
+    /// The same with the protocols in a folder.
+    pub fn within_by(protocols: Option<&Path>) -> Self {
+        Self::within_on(Arc::new(tempfile::tempdir().unwrap()), Ipv4Addr::LOCALHOST, protocols)
+    }
+
+    /// The same on a data folder, listening on `address`.
+    pub fn within_on(data: Arc<TempDir>, address: Ipv4Addr, protocols: Option<&Path>) -> Self {
+        let server = InProcess::start(data.path(), address.into(), protocols);
+        let keys: toml::Table = std::fs::read_to_string(data.path().join("keys.toml")).unwrap().parse().unwrap();
+        let key = |role: &str| (role.to_owned(), keys[role].as_str().expect("a key is text").to_owned());
+        let keys = ["surgeon", "operator", "researcher"].map(key).to_vec();
+        let address = SocketAddr::from(([127, 0, 0, 1], server.address.port()));
+        Self {
+            runs: Runs::Within(Box::new(server)),
+            address,
+            said: String::new(),
+            keys,
+            data,
+            camera: "none".to_owned(),
+        }
     }
 
     /// A server on a data folder that another server may have used before.
@@ -48,6 +104,9 @@ impl Server {
 
     /// The server that `command` starts on `data`.
     pub fn run(data: Arc<TempDir>, mut command: Command) -> Self {
+        let camera = command.get_args().skip_while(|argument| *argument != "--camera").nth(1).expect("a camera");
+        let camera = camera.to_str().expect("a camera's name is text").to_owned();
+
         let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
         let mut said = String::new();
@@ -63,7 +122,14 @@ impl Server {
         let keys: Vec<_> = said.lines().filter_map(link).collect();
         assert_eq!(keys.len(), 3, "the server did not start:\n{said}");
         let port = said.split("/enter").next().unwrap().rsplit(':').next().unwrap().parse().unwrap();
-        Self { process, address: SocketAddr::from(([127, 0, 0, 1], port)), said, keys, data }
+        Self {
+            runs: Runs::Process(process),
+            address: SocketAddr::from(([127, 0, 0, 1], port)),
+            said,
+            keys,
+            data,
+            camera,
+        }
     }
 
     /// Key of `role`.
@@ -77,11 +143,18 @@ impl Server {
         key.clone_into(&mut known.1);
     }
 
-    /// Makes an account in the server's data folder while it runs, as `parfocal account add` does.
+    /// Makes an account in the server's data folder while it runs, as `parfocal account add` does, but with a hash that
+    /// costs little.
     pub fn add_account(&self, name: &str, role: &str, display: &str) {
-        let arguments = ["add", name, "--role", role, "--display", display];
-        let (done, said) = account(self.data.path(), &arguments);
-        assert!(done, "{said}");
+        let added = async {
+            let accounts = Accounts::open(self.data.path(), Arc::new(SystemClock), CHEAP).await.unwrap();
+            let (name, role) = (AccountName::new(name).unwrap(), AccountRole::named(role).unwrap());
+            accounts.add(name, display, role, Passphrase::new(PASSPHRASE).unwrap(), None).await.unwrap();
+            accounts.close().await;
+        };
+
+        // A test's runtime, within which this is called, must not wait for it.
+        on_a_thread(|| Builder::new_current_thread().enable_all().build().unwrap().block_on(added));
     }
 
     /// Signs in to account `name`. Returns the token.
@@ -115,41 +188,61 @@ impl Server {
 
     /// Process of the server, for signals.
     pub fn pid(&self) -> rustix::process::Pid {
-        rustix::process::Pid::from_child(&self.process)
+        rustix::process::Pid::from_child(self.process())
     }
 
     /// Process number of the server.
     pub fn id(&self) -> u32 {
-        self.process.id()
+        self.process().id()
     }
 
     /// Ends the server with `signal`, as Ctrl-C or a service manager would, and waits. Returns whether it succeeded.
     pub fn end(&mut self, signal: rustix::process::Signal) -> bool {
         rustix::process::kill_process(self.pid(), signal).unwrap();
-        self.process.wait().unwrap().success()
+        let Runs::Process(process) = &mut self.runs else { unreachable!("it has a process") };
+        process.wait().unwrap().success()
+    }
+
+    fn process(&self) -> &Child {
+        match &self.runs {
+            Runs::Process(process) => process,
+            Runs::Within(_) => panic!("a server within the test program has no process of its own"),
+        }
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        if let Runs::Process(process) = &mut self.runs {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
     }
 }
 
-/// `parfocal serve` with `arguments`. Unless they set it, the frame rate is lower than usual, because tests that run at
-/// the same time share the machine, and the phantom takes a core of it.
-pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
+/// The phantom's brain under a camera in a hand: what a server shows unless it is told otherwise.
+pub const BRAIN: &str = "phantom";
+
+/// The phantom under the lens cap.
+pub const DARK: &str = "phantom:dark";
+
+/// `parfocal serve` with `arguments`. Tests that run at the same time share the machine, and drawing the brain takes a
+/// core of it. So the camera is dark and slow, unless they say otherwise: a test that looks at a picture says so.
+pub fn command(data: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.arg("serve").args(arguments).arg("--data-dir").arg(data).stdin(Stdio::null()).env("RUST_LOG", "warn");
     if !arguments.contains(&"--fps") {
         command.args(["--fps", "5"]);
     }
+    if !arguments.contains(&"--camera") {
+        // People look at the screenshots.
+        command.args(["--camera", if screenshots_are_wanted() { BRAIN } else { DARK }]);
+    }
     command
 }
 
 /// Runs `parfocal serve`, which must fail. Returns exit code and standard error.
-pub fn refused(data: &std::path::Path, arguments: &[&str]) -> (Option<i32>, String) {
+pub fn refused(data: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     refusal(command(data, arguments))
 }
 
@@ -161,12 +254,16 @@ pub fn refusal(mut command: Command) -> (Option<i32>, String) {
     (process.wait().unwrap().code(), said)
 }
 
+/// A cheap cost of passphrases' hashes, because most tests sign in to test something else. A hash says what it cost, so
+/// the server spends no more when somebody signs in.
+const CHEAP: Cost = Cost { memory_kib: 64, passes: 1 };
+
 /// The passphrase of every account.
 pub const PASSPHRASE: &str = "correct horse battery staple";
 
 /// Runs `parfocal account` with `arguments` on `data`, with the passphrase on standard input. Returns whether it
 /// succeeded, and its output.
-pub fn account(data: &std::path::Path, arguments: &[&str]) -> (bool, String) {
+pub fn account(data: &Path, arguments: &[&str]) -> (bool, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.arg("account").args(arguments).arg("--data-dir").arg(data);
     let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -9,7 +9,7 @@ use super::client::certificate;
 use super::trust::Trust;
 use crate::browser::driver::{Browser, Driver};
 use crate::browser::screenshots::shoot;
-use crate::support::Server;
+use crate::support::{BRAIN, Server};
 
 /// The Chromium option that makes it trust the server's key. It replaces the steps on a device, which a test cannot
 /// perform.
@@ -56,7 +56,7 @@ async fn a_device_that_does_not_trust_the_server_gets_the_steps_and_one_that_doe
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_live_view_runs_encrypted() {
-    let server = Server::encrypted();
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--tls", "--camera", BRAIN]);
     let driver = Driver::start();
     let tablet = driver.browser_with(&[trusting(&server).await]).await;
     tablet.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
