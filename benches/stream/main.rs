@@ -3,8 +3,9 @@
 //! without.
 //!
 //! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` (or `recorded`) for the rows of that name.
-//! `-- tap` measures instead how long a tap takes to move the patch. Prints one table. Compare only figures of the same run. Ages are exact: the server's record of each frame's exposure
-//! and the viewers' clock are the same monotonic clock.
+//! `-- tap` measures instead how long a tap takes to move the patch. Prints one table. Compare only figures of the same
+//! run. Ages are exact: the server's record of each frame's exposure and the viewers' clock are the same monotonic
+//! clock.
 
 mod link;
 mod process;

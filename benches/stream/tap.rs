@@ -41,8 +41,8 @@ pub async fn report() {
     let frames = sorted(waits.iter().map(|wait| wait.0 as f64));
     let times = sorted(waits.iter().map(|wait| wait.1 as f64 / 1e6));
     println!(
-        "{} of {TAPS} taps: first step on the new patch with the frame (after the tap) no. {} / {} (p50 / most), whose exposure \
-         ended {:.1} / {:.1} ms after the tap",
+        "{} of {TAPS} taps: the first step on the new patch was with frame {} / {} after the tap (p50 / most), whose \
+         exposure ended {:.1} / {:.1} ms after it",
         waits.len(),
         quantile(&frames, 0.5),
         quantile(&frames, 1.0),

@@ -47,8 +47,8 @@ fn a_policy_steps_over_a_recording_and_says_what_it_saw_and_asked() {
         last_metric = metric;
     }
 
-    // `recording record` looks for no circle, so its loop had the patch at the middle of 512x272 cells. The metric is that
-    // of the patch there.
+    // `recording record` looks for no circle, so its loop had the patch at the middle of 512x272 cells. The metric is
+    // that of the patch there.
     let reconstructor = Reconstructor::new(&camera::calibration::read(&frames.calibration()).unwrap());
     let area = PatchArea { x: 240, y: 120, width: 32, height: 32 };
     for frame in [0, rows.len() - 1] {

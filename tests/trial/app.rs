@@ -17,8 +17,8 @@ use tokio::sync::watch;
 
 use super::fixture::Trial;
 
-/// The pages of `trial`, whose data are in `folder`, until `shutdown` turns true. Threads that wait for pictures end when
-/// the trial's `control.frames` is closed.
+/// The pages of `trial`, whose data are in `folder`, until `shutdown` turns true. Threads that wait for pictures end
+/// when the trial's `control.frames` is closed.
 pub fn app(trial: &Trial, folder: &Path, reach: Reach, shutdown: watch::Receiver<bool>) -> Arc<App> {
     let clock: Arc<dyn Clock> = trial.clock.clone();
     let control = trial.control.clone();

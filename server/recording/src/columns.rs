@@ -35,8 +35,8 @@ pub struct FrameRow {
 pub struct PatchRow {
     /// Its left column and top row, in mosaic cells.
     pub corner: (u64, u64),
-    /// How often the policy had been made to forget what it saw, because the patch had jumped or the focus had been held.
-    /// What was seen before a change is not comparable with what was seen after it.
+    /// How often the policy had been made to forget what it saw, because the patch had jumped or the focus had been
+    /// held. What was seen before a change is not comparable with what was seen after it.
     pub jumps: u64,
 }
 

@@ -76,7 +76,8 @@ const TROUBLES: [Trouble; 8] = [
     Trouble::Both,
 ];
 
-/// What fails without `PARFOCAL_KILLS`: a whole session of a disk, a database, a camera, a network and a lens in trouble.
+/// What fails without `PARFOCAL_KILLS`: a whole session of a disk, a database, a camera, a network and a lens in
+/// trouble.
 const FEW: [Trouble; 4] = [Trouble::FullDisk, Trouble::LockedDatabase, Trouble::Camera, Trouble::Both];
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,5 +1,5 @@
-//! Chromiums for all tests of this program. One chromedriver starts them. A test borrows a browser and gives it back, and
-//! what the test left in it is removed before the next one gets it.
+//! Chromiums for all tests of this program. One chromedriver starts them. A test borrows a browser and gives it back,
+//! and what the test left in it is removed before the next one gets it.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};

@@ -1,5 +1,5 @@
-//! A server within the test program, for what needs neither a process of its own nor a camera: HTTP on a port, the rules,
-//! and the records on a disk. Its clock stands still.
+//! A server within the test program, for what needs neither a process of its own nor a camera: HTTP on a port, the
+//! rules, and the records on a disk. Its clock stands still.
 
 use std::net::{IpAddr, SocketAddr};
 use std::path::Path;

@@ -1,5 +1,6 @@
-// Says the pages' messages in one language. The messages lie in `web/languages/`, one file a language, in Mozilla's format
-// Fluent. The server makes a script of each, which every page loads for its own language before its other scripts.
+// Says the pages' messages in one language. The messages lie in `web/languages/`, one file a language, in Mozilla's
+// format Fluent. The server makes a script of each, which every page loads for its own language before its other
+// scripts.
 
 import { FluentBundle } from "../fluent/bundle.js";
 import { FluentResource } from "../fluent/resource.js";

@@ -1,5 +1,5 @@
-// A button for what cannot be undone: pressed twice, or held down. Its two labels, `.first` and `.second`, lie on top of
-// each other, so that nothing moves when they change.
+// A button for what cannot be undone: pressed twice, or held down. Its two labels, `.first` and `.second`, lie on top
+// of each other, so that nothing moves when they change.
 
 import { setText } from "../shared/dom.js";
 import { Confirmation, FORGOTTEN_MS } from "./confirm.js";

@@ -37,8 +37,8 @@ const BUNDLED: &str = "surgeon/page.js";
 /// What else the surgeon's page loads.
 const WITH_BUNDLE: [&str; 4] = ["shared/style.css", "shared/viewer.css", "shared/icon.svg", "surgeon/page.css"];
 
-/// The script of the surgeon's page in one file; as it is in the repository if the scripts cannot be put together, which
-/// a test rules out.
+/// The script of the surgeon's page in one file; as it is in the repository if the scripts cannot be put together,
+/// which a test rules out.
 static BUNDLE: LazyLock<Vec<u8>> = LazyLock::new(|| match bundle(BUNDLED, &source) {
     Ok(text) => text.into_bytes(),
     Err(error) => {
@@ -99,7 +99,8 @@ fn page_messages(language: Language) -> String {
 }
 
 /// The languages' files as scripts. Each gives its text to
-/// `web/static/shared/language.js` by a variable of the page, because the surgeon's page has that file in one with others.
+/// `web/static/shared/language.js` by a variable of the page, because the surgeon's page has that file in one with
+/// others.
 fn languages() -> impl Iterator<Item = Asset> {
     Language::ALL.into_iter().map(|language| {
         let text = serde_json::Value::from(page_messages(language));

@@ -1,5 +1,5 @@
-//! The language of an answer. A surgeon's pages speak that of the session under way. A tablet remembers it in a cookie that
-//! its page sets, so that it also reads in it what comes before and after. All other pages are in English.
+//! The language of an answer. A surgeon's pages speak that of the session under way. A tablet remembers it in a cookie
+//! that its page sets, so that it also reads in it what comes before and after. All other pages are in English.
 
 use axum::extract::Request;
 use axum::http::HeaderMap;

@@ -416,7 +416,8 @@ fn absences(events: &[(f64, &EventKind)]) -> Vec<PauseSpan> {
     spans(events, begins, ends).into_iter().map(span).collect()
 }
 
-/// The spans of time from each event that `begins` one to the next that `ends` it, if there is one, with the first event.
+/// The spans of time from each event that `begins` one to the next that `ends` it, if there is one, with the first
+/// event.
 fn spans<'a>(
     events: &[(f64, &'a EventKind)],
     begins: impl Fn(&EventKind) -> bool,

@@ -7,9 +7,9 @@ use super::workload;
 use crate::question::{QuestionKind, Scale};
 use parfocal_language::Language;
 
-/// The question with its six scales in `language`. `None` where we have no published translation whose wording is certain:
-/// the French one (Cegarra & Morgado 2009) and the Spanish one (Arquer & Nogareda 2001, INSST, NTP 544) are published, but
-/// we have not seen all of their scales in print.
+/// The question with its six scales in `language`. `None` where we have no published translation whose wording is
+/// certain: the French one (Cegarra & Morgado 2009) and the Spanish one (Arquer & Nogareda 2001, INSST, NTP 544) are
+/// published, but we have not seen all of their scales in print.
 #[must_use]
 pub fn question(language: Language) -> Option<QuestionKind> {
     let scales = match language {

@@ -14,8 +14,8 @@ pub fn fits(point: u8) -> bool {
     (1..=WORDS.len()).contains(&usize::from(point))
 }
 
-/// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether the
-/// recognition question `id` is about all settings.
+/// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether
+/// the recognition question `id` is about all settings.
 #[must_use]
 pub fn follow_up(id: &str, closing: bool, language: Language) -> Question {
     let text = if closing { "recognised-which" } else { "recognised-this" };

@@ -70,8 +70,9 @@ const FRENCH: Wording = Wording {
     high: "Tout à fait d'accord",
 };
 
-/// The question in `language`. `None` where we have no published translation whose wording is certain: there are several
-/// Spanish ones (such as Sevilla-Gonzalez et al. 2020, JMIR Human Factors 7:e21161), which we have not seen in print.
+/// The question in `language`. `None` where we have no published translation whose wording is certain: there are
+/// several Spanish ones (such as Sevilla-Gonzalez et al. 2020, JMIR Human Factors 7:e21161), which we have not seen in
+/// print.
 #[must_use]
 pub fn question(language: Language) -> Option<QuestionKind> {
     let Wording { items, low, high } = match language {

@@ -242,8 +242,8 @@ mod tests {
         assert!(unknown.contains("key 'patch_follows': must be \"screen\", not \"vessel\""), "{unknown}");
     }
 
-    /// The paper's protocol in `language`, with one question of `kind` at the end. Its own instrument, the SUS, becomes a
-    /// text, because there is no Spanish one.
+    /// The paper's protocol in `language`, with one question of `kind` at the end. Its own instrument, the SUS, becomes
+    /// a text, because there is no Spanish one.
     fn asking(language: &str, kind: &str) -> Result<Protocol, String> {
         let source = PAPER.replace("kind = \"sus\"", "kind = \"text\"");
         let source = source.replace("repeats = 2", &format!("repeats = 2\nlanguage = \"{language}\""));

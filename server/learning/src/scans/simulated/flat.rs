@@ -60,8 +60,8 @@ impl FlatLook {
         patch
     }
 
-    /// The recorded `patch` with the light of the wider patches and of what is around them, which stay within the usable
-    /// part of the picture.
+    /// The recorded `patch` with the light of the wider patches and of what is around them, which stay within the
+    /// usable part of the picture.
     pub fn light_around(&mut self, course: &Course, patch: &Patch, focal_power: FocalPower) -> View {
         let sigma = self.sigma(course, focal_power);
         let mut view = self.blurred_around(course.time, course.corner(), sigma, patch);
