@@ -142,7 +142,9 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
             f"{folder} was made by {attributes.get('software', 'another version')} in version {version} of the "
             f"layout; this package reads up to {_NEWEST_VERSION}. Update it: pip install --upgrade parfocal."
         )
-    missing = {"mosaic", "wavelength", "cell_row", "cell_column", "red", "green", "blue"} - set(dataset.variables)
+    missing = {"mosaic", "wavelength", "cell_row", "cell_column", "red", "green", "blue"} - set(
+        dataset.variables
+    )
     if missing:
         raise BadRecording(f"{folder} lacks its array '{min(missing)}'. Copy the recording again.")
 

@@ -152,7 +152,8 @@ async fn the_surgeon_zooms_by_taps_pinches_and_keys_and_gets_larger_pictures() {
     surgeon.touch("touchMove", &[(x + 60.0, y + 30.0)]).await;
     surgeon.touch("touchEnd", &[]).await;
     let after = surgeon.area(PICTURE).await;
-    assert!((after.left - before.left - 60.0).abs() < 1.0 && (after.top - before.top - 30.0).abs() < 1.0);
+    let moved = (after.left - before.left, after.top - before.top);
+    assert!((moved.0 - 60.0).abs() < 1.0 && (moved.1 - 30.0).abs() < 1.0, "{moved:?}");
 
     surgeon.double_click("#view").await;
     is_enlarged(&surgeon, fitted, 1.0).await;
