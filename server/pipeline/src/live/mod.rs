@@ -10,11 +10,13 @@ mod outlet;
 mod picture;
 mod studio;
 mod thread;
+mod viewer;
 
 pub use counts::Counts;
 pub use follow::Follower;
 pub use picture::{EncodedFrame, Insight, Picture};
 pub use thread::start;
+pub use viewer::Viewer;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -44,12 +46,6 @@ impl LiveHandle {
     #[must_use]
     pub fn watch(&self, size: Size) -> Watcher {
         self.join(size, false)
-    }
-
-    /// Joins the viewers of `size` as a leading one: a [`Follower`] gets the largest size that any leading viewer has.
-    #[must_use]
-    pub fn lead(&self, size: Size) -> Watcher {
-        self.join(size, true)
     }
 
     fn join(&self, size: Size, leads: bool) -> Watcher {

@@ -4,14 +4,17 @@
 //! Text messages are JSON with a `type`: `session` when the session changes, `status` when the devices' state
 //! does, and `beat` every few seconds, so that a page can tell a silently broken link from one with nothing to
 //! say. The page acknowledges each frame that it has drawn. Only as many are under way as the round trip needs (see
-//! `pace.rs`), and what is sent next is the latest at that time. So no queue forms anywhere, however slow the link. A
-//! page that says it is hidden gets no frames.
+//! `pace.rs` and `pictures.rs`), and what is sent next is the latest at that time. So no queue forms anywhere, however
+//! slow the link. A page that says it is hidden gets no frames.
 
+mod admission;
 mod audience;
+mod heartbeat;
 mod link;
 mod message;
 mod operator;
 mod pace;
+mod pictures;
 mod surgeon;
 mod tablet_reports;
 mod tablets;
@@ -19,7 +22,6 @@ mod tablets;
 pub(super) use tablet_reports::report_tablets;
 pub use tablets::OpenTablets;
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -28,12 +30,9 @@ use axum::extract::{Query, State};
 use axum::http::HeaderMap;
 use axum::http::header::USER_AGENT;
 use axum::response::Response;
-use bytes::Bytes;
-use futures_util::FutureExt;
-use futures_util::future::BoxFuture;
 use serde::Deserialize;
 use tokio::sync::watch;
-use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+use tokio::time::timeout;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -43,30 +42,18 @@ use super::error::Error;
 use super::people::SignedIn;
 use super::roles::Roles;
 use super::shutdown::ended;
-use super::tablets::{admit, no_longer_admitted};
+use admission::Admission;
 use audience::Audience;
-use link::Link;
+use heartbeat::Heartbeat;
 use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis, whole_tens};
 use operator::ForOperator;
-use pace::Pace;
-use parfocal_base::clock::Moment;
-use parfocal_imaging::Size;
 use parfocal_pipeline::control::ControlStatus;
-use parfocal_pipeline::live::{EncodedFrame, Picture, Watcher};
+use parfocal_pipeline::live::EncodedFrame;
 use parfocal_records::accounts::Token;
 use parfocal_trial::role::Role;
-use parfocal_trial::tablet::PictureSize;
+use pictures::Pictures;
 use surgeon::ForSurgeon;
 use tablets::OpenTablet;
-
-/// Interval of pings. Browsers answer them by themselves, and the time of the answer is the network's round trip.
-const PING: Duration = Duration::from_secs(1);
-
-/// Pings from one heartbeat to the next. Pages do not hear of pings, so they get this message as well.
-const PINGS_A_BEAT: u64 = 5;
-
-/// A page that stays silent through this many pings is gone.
-const PATIENT_PINGS: u32 = 10;
 
 /// A connection is dropped if sending a message takes longer than this.
 const SEND_LIMIT: Duration = Duration::from_secs(10);
@@ -123,74 +110,28 @@ async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
     }
 }
 
-/// Resolves when a page with `pass` is no longer admitted; never for a page without a pass.
-fn is_over(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
-    let app = AppState::clone(app);
-    match pass {
-        Some(pass) => async move { no_longer_admitted(&app, pass).await }.boxed(),
-        None => std::future::pending().boxed(),
-    }
-}
-
 /// Error: the page has left or is silent.
 struct PageGone;
 
-/// A frame that was sent and is not yet acknowledged.
-struct InFlight {
-    number: u64,
-    size: Size,
-    pixels: PictureSize,
-    sent_at: Moment,
-}
-
-/// The connection to one page: what is known about the page, and what must still be sent to it.
+/// The connection to one page: what the page was told, and what must still be sent to it.
 struct Desk<A: Audience> {
     app: AppState,
-    /// Set while the page is visible.
-    watcher: Option<Watcher>,
-    /// The viewers of a larger size, until its first frame arrives.
-    coming: Option<Watcher>,
-    /// The frames sent and not yet acknowledged, the oldest first.
-    in_flight: VecDeque<InFlight>,
-    /// How many of them there may be.
-    pace: Pace,
-    /// Before this, no further picture is sent.
-    not_before: Instant,
-    /// Pings sent so far, and when the last one was.
-    pings: u64,
-    pinged_at: Moment,
-    /// Number of the last frame sent. Frames of a larger size take longer, and none may follow a later frame.
-    last: u64,
-    /// Width in cells of the last frame sent, and (`screen`) pixels of the screen that it covers; `None` until known.
-    cells: Option<usize>,
-    screen: Option<u32>,
-    link: Link,
-    /// Deadline for the next frame of a larger size.
-    due: Instant,
+    pictures: Pictures,
+    heartbeat: Heartbeat,
+    admission: Admission,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
     /// The last status sent, so that only changes are sent.
     sent_status: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
-    ping: tokio::time::Interval,
-    /// Resolves when a surgeon's page is no longer admitted.
-    over: BoxFuture<'static, Error>,
-    /// The link by which a surgeon's page was let in.
-    pass: Option<Pass>,
-    /// The sign-in of a page that holds its role only by a personal account.
-    token: Option<Token>,
     /// The operator's entry for a surgeon's tablet.
     tablet: Option<OpenTablet>,
-    /// Pings since the page last sent anything.
-    silent: u32,
     /// The message to send next, before any other.
     next: Option<Message>,
 }
 
 impl<A: Audience> Desk<A> {
     fn new(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Self {
-        let mut ping = interval(PING);
-        ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
 
@@ -198,28 +139,14 @@ impl<A: Audience> Desk<A> {
         statuses.mark_changed();
 
         Self {
-            watcher: Some(join::<A>(&app, Size::Cell)),
-            coming: None,
-            in_flight: VecDeque::new(),
-            pace: Pace::new(app.clock.now()),
-            not_before: Instant::now(),
-            pings: 0,
-            pinged_at: app.clock.now(),
-            last: 0,
-            cells: None,
-            screen: None,
-            link: Link::new(app.live.largest(), app.clock.now()),
-            due: Instant::now() + link::PATIENCE,
+            pictures: Pictures::new(&app.live, A::LEADS, &app.clock),
+            heartbeat: Heartbeat::new(app.clock.now()),
+            admission: Admission::new(&app, pass, token),
             sessions,
             statuses,
             sent_status: None,
             shutdown: app.shutdown.clone(),
-            ping,
-            over: is_over(&app, pass),
-            pass,
-            token,
             tablet: None,
-            silent: 0,
             next: None,
             app,
         }
@@ -239,7 +166,7 @@ impl<A: Audience> Desk<A> {
 
         loop {
             let message = tokio::select! {
-                _ = &mut self.over => Some(close(LINK_OVER, "the link is no longer valid")),
+                _ = &mut self.admission.over => Some(close(LINK_OVER, "the link is no longer valid")),
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
                 heard = socket.recv() => match heard {
                     Some(Ok(message)) => {
@@ -252,11 +179,9 @@ impl<A: Audience> Desk<A> {
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
                 // The first ping goes before the first picture: it then tells the round trip of an empty link.
-                _ = self.ping.tick() => self.ping().await?,
-                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.not_before, self.due),
-                    if self.pings > 0 && self.in_flight.len() < self.pace.window() =>
-                {
-                    self.take(next)
+                _ = self.heartbeat.due.tick() => self.ping().await?,
+                frame = self.pictures.next(), if self.heartbeat.has_begun() && self.pictures.may_send() => {
+                    frame.and_then(|frame| self.picture(&frame))
                 }
             };
 
@@ -267,33 +192,29 @@ impl<A: Audience> Desk<A> {
     }
 
     fn hear(&mut self, message: &Message) -> Result<Option<Message>, PageGone> {
-        self.silent = 0;
+        self.heartbeat.heard();
         let text = match message {
             Message::Text(text) => text.as_str(),
             Message::Close(_) => return Err(PageGone),
             Message::Binary(_) => return Ok(Some(close(close_code::UNSUPPORTED, "text is expected"))),
             Message::Pong(payload) => {
-                self.answered(payload);
+                if let Some(took) = self.heartbeat.answered(payload, self.app.clock.now()) {
+                    self.pictures.answered(took);
+                }
                 return Ok(None);
             }
             Message::Ping(_) => return Ok(None),
         };
 
         match serde_json::from_str(text) {
-            Ok(PageMessage::Drawn { frame, held, shown }) => self.drawn(frame, held, shown),
-            Ok(PageMessage::Visible { visible: false }) => {
-                self.watcher = None;
-                self.coming = None;
+            Ok(PageMessage::Drawn { frame, held, shown }) => {
+                let pixels = self.pictures.drawn(frame, held).filter(|_| shown);
+                if let Some((tablet, pixels)) = self.tablet.as_ref().zip(pixels) {
+                    tablet.drawn(pixels);
+                }
             }
-            Ok(PageMessage::Visible { visible: true }) => {
-                self.in_flight.clear();
-                self.due = Instant::now() + link::PATIENCE;
-                self.watcher.get_or_insert_with(|| join::<A>(&self.app, self.link.size()));
-            }
-            Ok(PageMessage::Screen { width }) => {
-                self.screen = Some(width);
-                self.look_at_screen();
-            }
+            Ok(PageMessage::Visible { visible }) => self.pictures.visible(visible),
+            Ok(PageMessage::Screen { width }) => self.pictures.screen(width),
             Err(_) => return Ok(Some(close(close_code::POLICY, "unknown message"))),
         }
 
@@ -303,75 +224,13 @@ impl<A: Audience> Desk<A> {
     /// Updates the operator's entry for the surgeon's tablet.
     fn note_tablet(&self) {
         if let Some(tablet) = &self.tablet {
-            let now = self.app.clock.now();
-            tablet.note(self.screen, self.watcher.is_some(), self.link.carries_all(), now);
+            let (width, visible) = self.pictures.on_screen();
+            tablet.note(width, visible, self.pictures.carries_all(), self.app.clock.now());
         }
-    }
-
-    /// Notes the answer to a ping.
-    fn answered(&mut self, payload: &[u8]) {
-        // The answer to an earlier ping, or to none, says nothing.
-        if payload == self.pings.to_be_bytes() {
-            let now = self.app.clock.now();
-            self.pace.answered(now, now.since(self.pinged_at));
-        }
-    }
-
-    /// Notes that the page is done with `frame`, which it had for `held` milliseconds and has `shown` or left out. It
-    /// may then get the next one.
-    fn drawn(&mut self, frame: u64, held: f64, shown: bool) {
-        let full = self.in_flight.len() >= self.pace.window();
-        let Some(place) = self.in_flight.iter().position(|sent| sent.number == frame) else { return };
-        // Pages answer in order.
-        let Some(sent) = self.in_flight.drain(..=place).next_back() else { return };
-
-        let now = self.app.clock.now();
-        let took = now.since(sent.sent_at);
-        // What the page says need not be true.
-        let held = Duration::try_from_secs_f64(held / 1e3).unwrap_or_default().min(took);
-        if let Some(tablet) = self.tablet.as_ref().filter(|_| shown) {
-            tablet.drawn(sent.pixels);
-        }
-        // While a larger size is coming, a frame of the previous size says nothing about it.
-        if sent.size == self.link.size() {
-            self.pace.drawn(now, took, held, full);
-            self.link.drawn(now, took.saturating_sub(self.pace.round_trip()));
-        }
-        if self.coming.is_none() {
-            self.due = Instant::now() + link::PATIENCE;
-        }
-        self.follow_link();
-    }
-
-    fn look_at_screen(&mut self) {
-        if let Some((width, cells)) = self.screen.zip(self.cells) {
-            self.link.screen(width, cells);
-            self.follow_link();
-        }
-    }
-
-    /// Joins the viewers of the size that suits the page now. Until the first frame of a larger size arrives, the page
-    /// gets frames of the previous size. A smaller size replaces the previous one at once: it arrives soon, and the
-    /// previous one was too slow.
-    fn follow_link(&mut self) {
-        let size = self.link.size();
-        let Some(watcher) = &mut self.watcher else { return };
-        if self.coming.as_ref().unwrap_or(watcher).size() == size {
-            return;
-        }
-
-        tracing::debug!(size = size.name(), "a viewer's pictures change size");
-        self.pace.resize(self.app.clock.now());
-        self.coming = (size > watcher.size()).then(|| join::<A>(&self.app, size));
-        if size < watcher.size() {
-            *watcher = join::<A>(&self.app, size);
-        }
-        self.due = Instant::now() + link::PATIENCE;
     }
 
     fn session(&mut self) -> Option<Message> {
-        // The tablet may not see this session; its connection is about to be closed.
-        if self.pass.is_some_and(|pass| admit(&self.app, pass).is_err()) {
+        if !self.admission.may_see_session(&self.app) {
             return None;
         }
 
@@ -392,126 +251,31 @@ impl<A: Audience> Desk<A> {
         message
     }
 
-    /// Waits for the next frame for a visible page; waits forever for a hidden one. A frame of a larger size must come
-    /// before `due`. Dropping the future loses nothing.
-    async fn next_frame(
-        watcher: &mut Option<Watcher>,
-        coming: &mut Option<Watcher>,
-        not_before: Instant,
-        due: Instant,
-    ) -> Next {
-        let Some(watcher) = watcher else { return std::future::pending().await };
-        sleep_until(not_before).await;
-        let waits = coming.as_ref().unwrap_or(watcher).size() != Size::Cell;
-
-        tokio::select! {
-            biased;
-            frame = next_of(coming) => frame.map_or(Next::Ended, Next::Changed),
-            frame = watcher.next() => frame.map_or(Next::Ended, Next::Frame),
-            () = sleep_until(due), if waits => Next::Missed,
-        }
-    }
-
-    fn take(&mut self, next: Next) -> Option<Message> {
-        match next {
-            Next::Frame(frame) => self.frame(&frame),
-            Next::Changed(frame) => {
-                self.watcher = self.coming.take();
-                self.frame(&frame)
-            }
-            Next::Missed => {
-                self.link.missed(self.app.clock.now());
-                self.follow_link();
-                None
-            }
-            Next::Ended => {
-                self.watcher = None;
-                self.coming = None;
-                None
-            }
-        }
-    }
-
-    fn frame(&mut self, frame: &EncodedFrame) -> Option<Message> {
+    fn picture(&mut self, frame: &EncodedFrame) -> Option<Message> {
         let picture = &frame.picture;
-        let size = self.watcher.as_ref()?.size();
-        if picture.number <= self.last {
-            return None;
-        }
+        let age = tenth_millis(self.app.clock.now().since(picture.exposed_at));
+        let travel = whole_tens(self.pictures.travel());
+        let header = A::header(frame, age, travel, self.pictures.is_reduced(), &self.app);
+        let message = pack(&header, &picture.jpeg)?;
 
-        let now = self.app.clock.now();
-        let age = now.since(picture.exposed_at);
-        let travel = whole_tens(self.pace.travel());
-        let message =
-            pack(&A::header(frame, tenth_millis(age), travel, self.link.is_reduced(), &self.app), &picture.jpeg)?;
-
-        self.last = picture.number;
-        self.not_before = Instant::now() + self.pace.gap();
-        self.in_flight.push_back(InFlight { number: picture.number, size, pixels: pixels(picture), sent_at: now });
+        self.pictures.sent(picture);
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);
-
-        let cells = Some(picture.width / picture.per_cell);
-        if self.cells != cells {
-            self.cells = cells;
-            self.look_at_screen();
-        }
         Some(Message::Binary(message))
     }
 
     async fn ping(&mut self) -> Result<Option<Message>, PageGone> {
-        self.silent += 1;
-        if self.silent > PATIENT_PINGS {
-            return Err(PageGone);
+        let (ping, beats) = self.heartbeat.ping(self.app.clock.now()).ok_or(PageGone)?;
+        if beats {
+            if let Some(token) = &self.admission.token
+                && self.app.accounts.has_ended(token).await.unwrap_or(false)
+            {
+                return Ok(Some(close(close_code::POLICY, "the sign-in has ended")));
+            }
+            self.next = tell(&ServerMessage::<&A::Session, &A::Status>::Beat);
         }
-
-        let beats = self.pings.is_multiple_of(PINGS_A_BEAT);
-        self.pings += 1;
-        self.pinged_at = self.app.clock.now();
-        let ping = Message::Ping(Bytes::copy_from_slice(&self.pings.to_be_bytes()));
-        if !beats {
-            return Ok(Some(ping));
-        }
-
-        if let Some(token) = &self.token
-            && self.app.accounts.has_ended(token).await.unwrap_or(false)
-        {
-            return Ok(Some(close(close_code::POLICY, "the sign-in has ended")));
-        }
-
-        self.next = tell(&ServerMessage::<&A::Session, &A::Status>::Beat);
         Ok(Some(ping))
     }
-}
-
-/// The size of `picture`.
-fn pixels(picture: &Picture) -> PictureSize {
-    let pixels = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
-    PictureSize { width: pixels(picture.width), height: pixels(picture.height) }
-}
-
-/// Joins the viewers of `size`.
-fn join<A: Audience>(app: &AppState, size: Size) -> Watcher {
-    if A::LEADS { app.live.lead(size) } else { app.live.watch(size) }
-}
-
-/// The next frame of the size `coming`; waits forever if there is none.
-async fn next_of(coming: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
-    match coming {
-        Some(coming) => coming.next().await,
-        None => std::future::pending().await,
-    }
-}
-
-/// Result of waiting for a frame.
-enum Next {
-    Frame(Arc<EncodedFrame>),
-    /// The first frame of a larger size.
-    Changed(Arc<EncodedFrame>),
-    /// A larger size did not come in time.
-    Missed,
-    /// No more frames will come.
-    Ended,
 }
 
 /// The routes of this file.
