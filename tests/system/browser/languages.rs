@@ -105,6 +105,17 @@ async fn tap_until(page: &Browser, css: &str, shown: &str) {
     .await;
 }
 
+/// A setting is inspected: what is said of it is in the language, and a comment is kept.
+async fn comments_while_inspecting(theatre: &Theatre, spoken: &Spoken) {
+    let surgeon = &theatre.surgeon;
+    surgeon.sees("#remaining", spoken.left.trim()).await;
+    surgeon.sees("#hold", spoken.hold).await;
+    assert_eq!(surgeon.attribute("#comment", "placeholder").await.as_deref(), Some(spoken.placeholder));
+    theatre.write("µ").await;
+    surgeon.click("#send").await;
+    surgeon.sees("#comment-state", spoken.saved).await;
+}
+
 /// Finishes the setting, and waits for the questions with this heading.
 async fn finish(theatre: &Theatre, heading: &str) {
     theatre.finish().await;
@@ -156,12 +167,7 @@ async fn a_trial(spoken: &Spoken, large: bool) {
         surgeon.text("#change-title").await != title
     })
     .await;
-    surgeon.sees("#remaining", spoken.left.trim()).await;
-    surgeon.sees("#hold", spoken.hold).await;
-    assert_eq!(surgeon.attribute("#comment", "placeholder").await.as_deref(), Some(spoken.placeholder));
-    theatre.write("µ").await;
-    surgeon.click("#send").await;
-    surgeon.sees("#comment-state", spoken.saved).await;
+    comments_while_inspecting(&theatre, spoken).await;
     look(surgeon, &named("3-inspecting")).await;
     surgeon.click("#overlays summary").await;
     look(surgeon, &named("4-display")).await;
@@ -243,12 +249,7 @@ async fn a_page_changes_from_the_language_of_one_session_to_that_of_the_next() {
         theatre.operator.click("#session-actions .primary").await;
         surgeon.sees("#change-title", spoken.notice).await;
         tap_until(surgeon, "#change-tap", "#remaining").await;
-        surgeon.sees("#remaining", spoken.left.trim()).await;
-        surgeon.sees("#hold", spoken.hold).await;
-        assert_eq!(surgeon.attribute("#comment", "placeholder").await.as_deref(), Some(spoken.placeholder));
-        theatre.write("µ").await;
-        surgeon.click("#send").await;
-        surgeon.sees("#comment-state", spoken.saved).await;
+        comments_while_inspecting(&theatre, spoken).await;
         finish(&theatre, spoken.questions).await;
         theatre.abort("the language was seen").await;
         surgeon.sees("#panel", spoken.ended).await;
