@@ -1,6 +1,8 @@
 //! Errors as people and programs get them: for a browser a page that says what to do next, for a program
 //! `{"error": "…"}`.
 
+use std::fmt;
+
 use askama::Template;
 use axum::Json;
 use axum::body::to_bytes;
@@ -22,76 +24,53 @@ use parfocal_trial::refusal::RefusalKind;
 use parfocal_trial::role::Role;
 
 /// The reason why a request was not done. The text is written for people.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, Clone)]
 pub enum Error {
     /// What was asked for does not exist.
-    #[error("{0}")]
     NotFound(String),
     /// The request does not fit the current state; nothing was changed.
-    #[error("{0}")]
     Conflict(String),
     /// The request is invalid.
-    #[error("{0}")]
     Invalid(String),
     /// What was asked for does not exist, does not fit the current state, or is invalid. A surgeon reads it in the
     /// session's language.
-    #[error("{1}")]
     Said(RefusalKind, Message),
     /// The browser does not hold this role.
-    #[error("{}", needs_role(*.0))]
     NeedsRole(Role),
     /// The browser holds no role.
-    #[error("{}", Message::new("error-no-role"))]
     NoRole,
     /// The key in the link is not one of this server's.
-    #[error("{}", Message::new("error-wrong-key"))]
     WrongKey,
     /// The surgeon's link is to a session that has ended.
-    #[error("{}", Message::new("error-session-over"))]
     SessionOver,
     /// The surgeon's shared link was used in a session of a study.
-    #[error("{}", Message::new("error-needs-session-link"))]
     NeedsSessionLink,
     /// In a study, this needs a sign-in under an account with this role.
-    #[error(
-        "This belongs to a study, where everybody but the surgeon acts under a personal account. The link of the \
-         {role} is not enough: sign in at /sign-in with an account that may act as {role}.",
-        role = role_name(*.0)
-    )]
     NeedsAccount(Role),
     /// Too many attempts to sign in failed.
-    #[error("{0}")]
     TooMany(String),
     /// This role or account may not do this.
-    #[error("{0}")]
     Forbidden(String),
     /// The request was made by another site.
-    #[error("{}", Message::new("error-cross-site"))]
     CrossSite,
     /// The server was asked for by a name that it does not accept.
-    #[error(
-        "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, \
-         start it with --bind 0.0.0.0:8080 --tls."
-    )]
     WrongHost,
-    /// A request that changes something was sent unencrypted.
-    #[error(
-        "This server takes encrypted requests alone. Send this one to https://{0} instead. A key or passphrase in it \
-         could be read on the way: change it if others use this network."
-    )]
+    /// A request that changes something was sent unencrypted to this host.
     Unencrypted(String),
     /// Members have no place left.
-    #[error("{}", Message::new("error-busy"))]
     Busy,
     /// The disk or the database failed; nothing was acknowledged.
-    #[error("{}", not_saved(.0))]
     Storage(String),
     /// Something in the database comes from another version of parfocal.
-    #[error("{0}")]
     Unreadable(String),
     /// The server itself failed.
-    #[error("{}", Message::new("error-internal"))]
     Internal,
+}
+
+/// What an error says. What a surgeon can meet is there in every language, the rest in English.
+enum Sentence {
+    Translated(Message),
+    English(String),
 }
 
 /// An error as programs get it.
@@ -134,33 +113,60 @@ impl Error {
     /// The error in `language`, as far as a surgeon can meet it; otherwise in English.
     #[must_use]
     pub fn say_in(&self, language: Language) -> String {
-        let message = match self {
-            Self::Said(_, message) => message.clone(),
-            Self::NeedsRole(Role::Surgeon) => Message::new("error-needs-surgeon"),
-            Self::NoRole => Message::new("error-no-role"),
-            Self::WrongKey => Message::new("error-wrong-key"),
-            Self::SessionOver => Message::new("error-session-over"),
-            Self::NeedsSessionLink => Message::new("error-needs-session-link"),
-            Self::CrossSite => Message::new("error-cross-site"),
-            Self::Busy => Message::new("error-busy"),
-            Self::Storage(reason) => not_saved(reason),
-            Self::Internal => Message::new("error-internal"),
-            other => return other.to_string(),
-        };
-        message.say_in(language)
+        match self.sentence() {
+            Sentence::Translated(message) => message.say_in(language),
+            Sentence::English(text) => text,
+        }
+    }
+
+    fn sentence(&self) -> Sentence {
+        use Sentence::{English, Translated};
+
+        match self {
+            Self::Said(_, message) => Translated(message.clone()),
+            Self::NeedsRole(Role::Surgeon) => Translated(Message::new("error-needs-surgeon")),
+            Self::NoRole => Translated(Message::new("error-no-role")),
+            Self::WrongKey => Translated(Message::new("error-wrong-key")),
+            Self::SessionOver => Translated(Message::new("error-session-over")),
+            Self::NeedsSessionLink => Translated(Message::new("error-needs-session-link")),
+            Self::CrossSite => Translated(Message::new("error-cross-site")),
+            Self::Busy => Translated(Message::new("error-busy")),
+            Self::Storage(reason) => Translated(Message::new("error-storage").words("reason", reason)),
+            Self::Internal => Translated(Message::new("error-internal")),
+            Self::NotFound(text)
+            | Self::Conflict(text)
+            | Self::Invalid(text)
+            | Self::TooMany(text)
+            | Self::Forbidden(text)
+            | Self::Unreadable(text) => English(text.clone()),
+            Self::NeedsRole(role) => English(format!(
+                "This page is for the {role}. Open it with the {role}'s link, which the server prints when it starts.",
+                role = role_name(*role)
+            )),
+            Self::NeedsAccount(role) => English(format!(
+                "This belongs to a study, where everybody but the surgeon acts under a personal account. The link of \
+                 the {role} is not enough: sign in at /sign-in with an account that may act as {role}.",
+                role = role_name(*role)
+            )),
+            Self::WrongHost => English(
+                "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, start it with --bind \
+                 0.0.0.0:8080 --tls."
+                    .to_owned(),
+            ),
+            Self::Unencrypted(host) => English(format!(
+                "This server takes encrypted requests alone. Send this one to https://{host} instead. A key or \
+                 passphrase in it could be read on the way: change it if others use this network."
+            )),
+        }
     }
 }
 
-fn needs_role(role: Role) -> String {
-    if role == Role::Surgeon {
-        return Message::new("error-needs-surgeon").to_string();
-    }
-    let role = role_name(role);
-    format!("This page is for the {role}. Open it with the {role}'s link, which the server prints when it starts.")
-}
+impl std::error::Error for Error {}
 
-fn not_saved(reason: &str) -> Message {
-    Message::new("error-storage").words("reason", reason)
+impl fmt::Display for Error {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.say_in(Language::English))
+    }
 }
 
 impl From<ConductError> for Error {
