@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::pace::Pace;
 use super::pool::MosaicPool;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Frame, FrameImage, Truth};
-use crate::simulation::phantom::{Hand, Phantom, Pose, SENSOR_HEIGHT, SENSOR_WIDTH};
+use crate::simulation::phantom::{Hand, Phantom, Pose, SENSOR_HEIGHT, SENSOR_WIDTH, Tile};
 use parfocal_base::clock::Moment;
 
 /// What the phantom's camera looks at, and how it is held.
@@ -46,13 +46,23 @@ const EXPOSURE_FOUND: u64 = 20;
 /// it is centred on the computation's start, when the lens is looked through, and ends when the frame is
 /// handed over.
 pub struct PhantomCamera {
-    phantom: Phantom,
-    hand: Hand,
+    view: View,
     settings: CameraSettings,
     pace: Pace,
     pool: MosaicPool,
     start: Moment,
-    before: PhantomScene,
+}
+
+/// What is before the camera.
+enum View {
+    Brain { phantom: Box<Phantom>, hold: Hold },
+    Tile(Box<Tile>),
+}
+
+/// What holds the camera.
+enum Hold {
+    Hand(Box<Hand>),
+    Clamp,
 }
 
 impl PhantomCamera {
@@ -62,48 +72,51 @@ impl PhantomCamera {
         Self::looking(PhantomScene::Hand, settings)
     }
 
-    /// The phantom of the settings' seed, with the scene `before`.
+    /// The phantom of the settings' seed, with the scene `before`. To draw the brain takes about a fifth of a second.
     #[must_use]
     pub fn looking(before: PhantomScene, settings: CameraSettings) -> Self {
-        let phantom = Phantom::new(settings.seed);
+        let seed = settings.seed;
+        let brain = |hold| View::Brain { phantom: Box::new(Phantom::new(seed)), hold };
+        let view = match before {
+            PhantomScene::Hand => brain(Hold::Hand(Box::new(Hand::new(seed)))),
+            PhantomScene::Clamp => brain(Hold::Clamp),
+            PhantomScene::WhiteTile => View::Tile(Box::new(Tile::new(seed, WHITE))),
+            PhantomScene::Cap => View::Tile(Box::new(Tile::new(seed, 0.0))),
+        };
+
         let start = settings.clock.now();
         Self {
-            phantom,
-            hand: Hand::new(settings.seed),
+            view,
             pace: Pace::new(settings.fps, start),
             pool: MosaicPool::new(SENSOR_WIDTH, SENSOR_HEIGHT),
             start,
-            before,
             settings,
         }
     }
-}
 
-impl PhantomCamera {
     /// Takes exposure `number`, looking through the lens at `looked`. Returns the truth about it, if it
     /// shows the brain.
     fn expose(&mut self, number: u64, looked: Moment, samples: &mut [u16]) -> Option<Truth> {
-        let pose = match self.before {
-            PhantomScene::Hand => self.hand.pose_at(looked.since(self.start)),
-            PhantomScene::Clamp => CLAMPED,
-            PhantomScene::WhiteTile => {
-                self.phantom.expose_tile(WHITE, samples);
-                return None;
-            }
-            PhantomScene::Cap => {
-                self.phantom.expose_tile(0.0, samples);
+        let (phantom, hold) = match &mut self.view {
+            View::Brain { phantom, hold } => (phantom, hold),
+            View::Tile(tile) => {
+                tile.expose(samples);
                 return None;
             }
         };
 
         let exposed = self.settings.optics.focal_power_at(looked);
-        self.phantom.expose(&pose, exposed, samples);
+        let (pose, adjusts) = match hold {
+            Hold::Hand(hand) => (hand.pose_at(looked.since(self.start)), true),
+            Hold::Clamp => (CLAMPED, number <= EXPOSURE_FOUND),
+        };
 
-        if self.before == PhantomScene::Hand || number <= EXPOSURE_FOUND {
-            self.phantom.adjust_exposure(samples);
+        phantom.expose(&pose, exposed, samples);
+        if adjusts {
+            phantom.adjust_exposure(samples);
         }
 
-        Some(Truth { optimal: self.phantom.optimal(&pose), exposed })
+        Some(Truth { optimal: phantom.optimal(&pose), exposed })
     }
 }
 

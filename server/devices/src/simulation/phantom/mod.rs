@@ -10,6 +10,7 @@ mod scene;
 mod sensor;
 pub mod spectra;
 mod still;
+mod tile;
 mod vessels;
 mod view;
 
@@ -17,6 +18,7 @@ pub use field::SIDE;
 pub use hand::{Hand, Haste, Pose};
 pub use scene::Scene;
 pub use still::{Still, Trajectory};
+pub use tile::Tile;
 
 use defocus::Stack;
 use field::Field;
@@ -106,21 +108,6 @@ impl Phantom {
                 self.bands.expose(expected, lines, row, (columns.start, columns.end), gain);
                 self.sensor.read_row(out, CELL * y + row, CELL * columns.start, expected, noise[CELL * y + row]);
             }
-        }
-    }
-
-    /// Takes one exposure of a white tile under even light. The light brings the content area's centre to `level` of
-    /// full scale; 0 is with the lens cap on.
-    pub fn expose_tile(&mut self, level: f32, samples: &mut [u16]) {
-        let noise = self.sensor.fresh_noise();
-
-        for (y, row) in samples.chunks_exact_mut(SENSOR_WIDTH).enumerate().take(SENSOR_HEIGHT) {
-            let (first, last) = self.optics.span(y / CELL);
-            let columns = if first <= last { first..last + 1 } else { 0..0 };
-
-            let light = columns.clone().map(|x| level * sensor::FULL_SCALE * self.optics.light(x, y / CELL));
-            let expected: Vec<f32> = light.flat_map(|counts| [counts; CELL]).collect();
-            self.sensor.read_row(row, y, CELL * columns.start, &expected, noise[y]);
         }
     }
 
