@@ -4,6 +4,7 @@
 //! Of the surgeon's page all scripts are one file, and every file is compressed where the browser takes that: a tablet
 //! at the end of a slow link opens the page several times sooner.
 
+use std::borrow::Cow;
 use std::io::Write;
 use std::sync::{LazyLock, OnceLock};
 
@@ -15,6 +16,7 @@ use axum::http::header::{
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use rust_embed::RustEmbed;
 use sha2::{Digest, Sha256};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -24,9 +26,9 @@ use super::error::Error;
 use parfocal_language::Language;
 
 struct Asset {
-    name: &'static str,
+    name: Cow<'static, str>,
     /// The file as it is in the repository.
-    body: &'static [u8],
+    body: Cow<'static, [u8]>,
     /// What a browser gets, compressed; made when it is first asked for.
     packed: OnceLock<Vec<u8>>,
 }
@@ -53,9 +55,13 @@ fn source(name: &str) -> Option<&'static str> {
 }
 
 impl Asset {
+    const fn new(name: Cow<'static, str>, body: Cow<'static, [u8]>) -> Self {
+        Self { name, body, packed: OnceLock::new() }
+    }
+
     /// What a browser gets.
-    fn content(&self) -> &'static [u8] {
-        if self.name == BUNDLED { &BUNDLE } else { self.body }
+    fn content(&'static self) -> &'static [u8] {
+        if self.name == BUNDLED { &BUNDLE } else { &self.body }
     }
 
     /// The same, compressed.
@@ -69,18 +75,19 @@ impl Asset {
     }
 }
 
-macro_rules! assets {
-    ($($name:literal),* $(,)?) => {
-        [$(Asset {
-            name: $name,
-            body: include_bytes!(concat!("../../../../web/static/", $name)),
-            packed: OnceLock::new(),
-        }),*]
-    };
-}
+/// All files of `web/static/`, by folder and name.
+#[derive(RustEmbed)]
+#[folder = "../../web/static"]
+struct Files;
 
 /// All static files: those of `web/static/` and the languages' scripts.
-static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| files().into_iter().chain(languages()).collect());
+static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    let files = Files::iter().filter_map(|name| {
+        let file = Files::get(&name)?;
+        Some(Asset::new(name, file.data))
+    });
+    files.chain(languages()).collect()
+});
 
 /// Beginnings of the names of messages that the server alone says. Pages get their words with the server's answers.
 const SAID_BY_SERVER: [&str; 2] = ["error-", "refused-"];
@@ -104,179 +111,18 @@ fn page_messages(language: Language) -> String {
 fn languages() -> impl Iterator<Item = Asset> {
     Language::ALL.into_iter().map(|language| {
         let text = serde_json::Value::from(page_messages(language));
-        // They live as long as the program.
-        Asset {
-            name: Box::leak(format!("languages/{language}.js").into_boxed_str()),
-            body: Box::leak(
-                format!("(globalThis.parfocalLanguages ??= {{}}).{language} = {text};\n")
-                    .into_bytes()
-                    .into_boxed_slice(),
-            ),
-            packed: OnceLock::new(),
-        }
+        let script = format!("(globalThis.parfocalLanguages ??= {{}}).{language} = {text};\n");
+        Asset::new(format!("languages/{language}.js").into(), script.into_bytes().into())
     })
-}
-
-/// All files of `web/static/`, by folder and name. A test compares this table with the folder.
-#[allow(clippy::too_many_lines, reason = "a table")]
-fn files() -> Vec<Asset> {
-    Vec::from(assets![
-        "accounts/backup.js",
-        "accounts/people.js",
-        "accounts/sign_in.js",
-        "fluent/builtins.js",
-        "fluent/bundle.js",
-        "fluent/memoizer.js",
-        "fluent/resolver.js",
-        "fluent/resource.js",
-        "fluent/scope.js",
-        "fluent/types.js",
-        "offline/worker.js",
-        "operator/camera_card.js",
-        "operator/camera_settings.js",
-        "operator/checks_card.js",
-        "operator/checks_words.js",
-        "operator/choices.js",
-        "operator/consent.js",
-        "operator/device_words.js",
-        "operator/devices.js",
-        "operator/focus_card.js",
-        "operator/focus_sign.js",
-        "operator/live_spectra.js",
-        "operator/now.js",
-        "operator/orders.js",
-        "operator/page.css",
-        "operator/page.js",
-        "operator/recording_card.js",
-        "operator/recording_words.js",
-        "operator/session_card.js",
-        "operator/session_words.js",
-        "operator/surgeon_link.js",
-        "operator/traces.js",
-        "researcher/analysis.css",
-        "researcher/correction_words.js",
-        "researcher/corrections.js",
-        "researcher/deeds.js",
-        "researcher/definition.js",
-        "researcher/metric_drawing.js",
-        "researcher/page.css",
-        "researcher/pictures.js",
-        "researcher/player.js",
-        "researcher/player_spectra.js",
-        "researcher/player_words.js",
-        "researcher/playhead.js",
-        "researcher/playhead_line.js",
-        "researcher/session.js",
-        "researcher/studies.js",
-        "researcher/study.js",
-        "researcher/study_export.js",
-        "researcher/study_export_words.js",
-        "researcher/timeline.js",
-        "researcher/timeline_drawing.js",
-        "researcher/timeline_words.js",
-        "researcher/track.js",
-        "researcher/voice.js",
-        "shared/api.js",
-        "shared/canvas.js",
-        "shared/contact.js",
-        "shared/copy.js",
-        "shared/dialogs.js",
-        "shared/dom.js",
-        "shared/fit.js",
-        "shared/focus_buttons.js",
-        "shared/framing.js",
-        "shared/gestures.js",
-        "shared/hold.js",
-        "shared/icon.svg",
-        "shared/language.js",
-        "shared/live.js",
-        "shared/overlay.js",
-        "shared/overlay_boxes.js",
-        "shared/pacing.js",
-        "shared/peaking.js",
-        "shared/pointing.js",
-        "shared/reconnection.js",
-        "shared/save.js",
-        "shared/sight.js",
-        "shared/sign_in.js",
-        "shared/storage.js",
-        "shared/style.css",
-        "shared/svg.js",
-        "shared/text.js",
-        "shared/trouble.js",
-        "shared/uuid.js",
-        "shared/viewer.css",
-        "shared/viewer.js",
-        "shared/zooming.js",
-        "spectra/asking.js",
-        "spectra/circles.js",
-        "spectra/cross.js",
-        "spectra/looks.js",
-        "spectra/panel.css",
-        "spectra/panel.js",
-        "spectra/places.js",
-        "spectra/plot.js",
-        "spectra/saving.js",
-        "spectra/scale.js",
-        "spectra/table.js",
-        "spectra/words.js",
-        "surgeon/answers.js",
-        "surgeon/awake.js",
-        "surgeon/choices.js",
-        "surgeon/comment_box.js",
-        "surgeon/comments.js",
-        "surgeon/confirm.js",
-        "surgeon/confirm_button.js",
-        "surgeon/device.js",
-        "surgeon/dimmer.js",
-        "surgeon/disk_store.js",
-        "surgeon/drafts.js",
-        "surgeon/grip.js",
-        "surgeon/holding.js",
-        "surgeon/instrument_form.js",
-        "surgeon/languages.js",
-        "surgeon/last_view.js",
-        "surgeon/microphone.js",
-        "surgeon/notice.js",
-        "surgeon/notice_dialog.js",
-        "surgeon/now.js",
-        "surgeon/offline.js",
-        "surgeon/origin.js",
-        "surgeon/outbox.js",
-        "surgeon/over.js",
-        "surgeon/page.css",
-        "surgeon/page.js",
-        "surgeon/panel.js",
-        "surgeon/question_form.js",
-        "surgeon/question_panel.js",
-        "surgeon/questions.js",
-        "surgeon/ranking.js",
-        "surgeon/room.js",
-        "surgeon/storage_words.js",
-        "surgeon/talk.js",
-        "surgeon/talk_button.js",
-        "surgeon/talk_keys.js",
-        "surgeon/tap_guard.js",
-        "surgeon/track.js",
-        "surgeon/voice_outbox.js",
-        "surgeon/words.js",
-        "tablet/device.js",
-        "tablet/page.js",
-        "tablet/trials.js",
-        "tablet/words.js",
-        "trust/page.css",
-        "trust/page.js",
-        "trust/verdict.js",
-    ])
 }
 
 /// Hash of all files: the first 8 bytes of a SHA-256, in hexadecimal.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let mut hash = Sha256::new();
     for asset in ASSETS.iter() {
-        hash.update(asset.name);
+        hash.update(&*asset.name);
         hash.update(asset.body.len().to_le_bytes());
-        hash.update(asset.body);
+        hash.update(&asset.body);
     }
     // How the scripts are put together may change, too.
     hash.update(&*BUNDLE);
@@ -320,7 +166,7 @@ fn asset_of(name: &str) -> Option<&'static Asset> {
 /// Static file `name` as it is in the repository; `None` if there is no such file.
 #[must_use]
 pub fn body(name: &str) -> Option<&'static [u8]> {
-    asset_of(name).map(|asset| asset.body)
+    asset_of(name).map(|asset| &*asset.body)
 }
 
 /// A static file: a script, a style sheet, an icon.
@@ -399,33 +245,29 @@ mod tests {
     use axum::http::header::{ACCEPT_ENCODING, HeaderMap};
     use flate2::read::GzDecoder;
 
-    use super::{ASSETS, asset_of, bundle, content, content_type, files, source, takes_gzip};
+    use super::{ASSETS, asset_of, bundle, content, content_type, source, takes_gzip};
 
     #[test]
-    fn every_file_of_the_folder_is_part_of_the_program() {
+    fn every_file_of_the_folder_is_part_of_the_program_and_has_a_type() {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/static");
-        let mut found = 0;
 
         for folder in std::fs::read_dir(root).unwrap() {
             let folder = folder.unwrap();
             for file in std::fs::read_dir(folder.path()).unwrap() {
                 let name = Path::new(&folder.file_name()).join(file.unwrap().file_name());
                 let name = name.to_str().unwrap().to_owned();
-                assert!(files().iter().any(|asset| asset.name == name), "{name} is missing from the table");
+                assert!(asset_of(&name).is_some(), "{name} is not in the program");
                 assert_ne!(content_type(&name), "application/octet-stream", "{name}");
-                found += 1;
             }
         }
-
-        assert_eq!(found, files().len(), "a file stands in the table twice");
     }
 
     #[test]
     fn the_scripts_of_every_page_can_be_put_together() {
         for asset in ASSETS.iter().filter(|asset| {
-            content_type(asset.name).starts_with("text/javascript") && asset.name != "offline/worker.js"
+            content_type(&asset.name).starts_with("text/javascript") && asset.name != "offline/worker.js"
         }) {
-            bundle(asset.name, &source).unwrap();
+            bundle(&asset.name, &source).unwrap();
         }
         let page = std::str::from_utf8(content("surgeon/page.js").unwrap()).unwrap();
         assert!(page.contains("// shared/live.js") && !page.contains("\nimport ") && !page.contains("\nexport "));

@@ -3,6 +3,8 @@
 
 use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, COOKIE};
+use cookie::time::Duration;
+use cookie::{Cookie, SameSite};
 use sha2::{Digest, Sha256};
 
 use super::keys::Keys;
@@ -66,13 +68,19 @@ pub(super) const fn cookie_name(role: Role) -> &'static str {
 /// The header that sets cookie `name` for `seconds`. Browsers send it only with this site's own requests, and if the
 /// server is `encrypted` only over TLS.
 pub(super) fn set_cookie(name: &str, value: &str, seconds: u64, encrypted: bool) -> String {
-    let secure = if encrypted { "; Secure" } else { "" };
-    format!("{name}={value}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict{secure}")
+    let cookie = Cookie::build((name, value))
+        .path("/")
+        .max_age(Duration::seconds(seconds.cast_signed()))
+        .http_only(true)
+        .same_site(SameSite::Strict);
+    let cookie = if encrypted { cookie.secure(true) } else { cookie };
+    cookie.to_string()
 }
 
 pub(super) fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
-    let cookies = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
-    cookies.flat_map(|header| header.split(';')).find_map(|pair| pair.trim().strip_prefix(name)?.strip_prefix('='))
+    let sent = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
+    let mut cookies = sent.flat_map(Cookie::split_parse).filter_map(Result::ok);
+    cookies.find(|cookie| cookie.name() == name)?.value_raw()
 }
 
 pub(super) fn bearer(headers: &HeaderMap) -> Option<&str> {
