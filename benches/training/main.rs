@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::process::Command;
 use std::sync::Arc;
 
-use parfocal_autofocus::learned::Sight;
+use parfocal_autofocus::learned::Input;
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_imaging::{PATCH_SIDE, Patch};
@@ -49,13 +49,13 @@ fn environment(clips: &[Arc<Clip>]) {
     }
 }
 
-fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u32) {
+fn updates(clips: &[Arc<Clip>], name: &str, input: Input, batch: usize, times: u32) {
     let mut recipe = Recipe::parse(shipped(name).unwrap()).unwrap().dqn.unwrap();
     // A window's first seven frames have no full history, its last no successor.
     (recipe.windows, recipe.window) = (batch / TRANSITIONS, TRANSITIONS + 8);
     // As in `peer.py` the memory is filled once and no frame is played meanwhile.
     (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (0, 20_000, 20_000);
-    let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
+    let mut trainer = DqnTrainer::new(input, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
     trainer.update();
     let rate = rate(times, || {
         black_box(trainer.update());
@@ -70,7 +70,7 @@ fn trainings(clips: &[Arc<Clip>]) {
         let (rate, threads) = pool.install(|| {
             compute_on_this_thread();
             let recipe = Recipe::parse(shipped("cnn-learned").unwrap()).unwrap().dqn.unwrap();
-            let mut trainer = DqnTrainer::new(Sight::Patch, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
+            let mut trainer = DqnTrainer::new(Input::Patch, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
             let update = || {
                 black_box(trainer.update());
             };
@@ -102,8 +102,8 @@ fn main() {
         environment(&clips);
         // The batches of `peer.py`.
         for batch in [32, 256] {
-            updates(&clips, "mgm-learned-paper", Sight::Mgm, batch, 300);
-            updates(&clips, "cnn-learned-paper", Sight::Patch, batch, 60);
+            updates(&clips, "mgm-learned-paper", Input::Mgm, batch, 300);
+            updates(&clips, "cnn-learned-paper", Input::Patch, batch, 60);
         }
     });
     trainings(&clips);

@@ -12,7 +12,7 @@ use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::{CameraHealth, CameraOffer};
 use parfocal_devices::lens::LensHealth;
 use parfocal_imaging::ContentArea;
-use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, Sight as Sighted, Tap};
+use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, PictureGeometry, Tap};
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
 use parfocal_records::store::{Recorder, Run, Store};
 use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
@@ -281,7 +281,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         lock: parfocal_pipeline::control::FocusLock::default(),
         following: parfocal_pipeline::control::Following::default(),
         // A circle of radius 100 in a picture of 512 x 272 cells.
-        sight: Sighted {
+        geometry: PictureGeometry {
             cells: (512, 272),
             content_area: Some(ContentArea { x: 256.0, y: 136.0, radius: 100.0, confidence: 1.0 }),
         },

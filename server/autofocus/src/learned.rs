@@ -13,7 +13,7 @@ use parfocal_imaging::Patch;
 /// What a learned policy sees of each frame besides the focal power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Sight {
+pub enum Input {
     /// The mean gradient magnitude.
     Mgm,
     /// The mean local ratio.
@@ -22,7 +22,7 @@ pub enum Sight {
     Patch,
 }
 
-impl Sight {
+impl Input {
     /// Numbers per frame in the head's input, without the focal power.
     #[must_use]
     pub const fn width(self) -> usize {
@@ -32,7 +32,7 @@ impl Sight {
         }
     }
 
-    /// The focus metric of `patch`; `None` if this sight is the whole patch.
+    /// The focus metric of `patch`; `None` if this input is the whole patch.
     #[must_use]
     pub fn metric(self, patch: &Patch) -> Option<f64> {
         match self {
@@ -72,7 +72,7 @@ pub const fn scaled_focal_power(focal_power: f64) -> f32 {
 #[derive(Debug)]
 pub struct ValueNetwork {
     /// What the policy sees of each frame.
-    pub sight: Sight,
+    pub input: Input,
     encoder: Option<Encoder>,
     /// Computes action values from the histories.
     pub head: ValueHead,
@@ -81,10 +81,10 @@ pub struct ValueNetwork {
 impl ValueNetwork {
     /// A network with random weights under `path`.
     #[must_use]
-    pub fn new(path: &nn::Path<'_>, sight: Sight) -> Self {
-        let encoder = (sight == Sight::Patch).then(|| Encoder::new(&(path / "encoder")));
-        let head = ValueHead::new(&(path / "head"), HISTORY * (sight.width() + 1));
-        Self { sight, encoder, head }
+    pub fn new(path: &nn::Path<'_>, input: Input) -> Self {
+        let encoder = (input == Input::Patch).then(|| Encoder::new(&(path / "encoder")));
+        let head = ValueHead::new(&(path / "head"), HISTORY * (input.width() + 1));
+        Self { input, encoder, head }
     }
 
     /// Encodes frames, `[N, 1024]` (gray) or `[N, 1]` (scaled metric), as inputs of the head: `[N, width]`.
@@ -114,16 +114,16 @@ impl Learned {
     ///
     /// # Errors
     /// If the weights are damaged or belong to another network.
-    pub fn new(sight: Sight, bytes: &[u8]) -> Result<Self, WeightsError> {
+    pub fn new(input: Input, bytes: &[u8]) -> Result<Self, WeightsError> {
         let store = nn::VarStore::new(Device::Cpu);
-        let network = ValueNetwork::new(&store.root(), sight);
+        let network = ValueNetwork::new(&store.root(), input);
         weights::load(&store, bytes)?;
         Ok(Self { network, encodings: VecDeque::new(), focal_powers: VecDeque::new(), _store: store })
     }
 
     fn encode(&self, patch: &Patch, metric: Option<f64>) -> Vec<f32> {
         if let Some(metric) = metric {
-            return vec![self.network.sight.scaled(metric)];
+            return vec![self.network.input.scaled(metric)];
         }
 
         let encoding = self.network.encode(&Tensor::from_slice(&patch.0).view([1, -1]));
@@ -153,7 +153,7 @@ impl Policy for Learned {
 
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         tch::no_grad(|| {
-            let metric = self.network.sight.metric(&seen.view.patch);
+            let metric = self.network.input.metric(&seen.view.patch);
             let encoding = self.encode(&seen.view.patch, metric);
             self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
 

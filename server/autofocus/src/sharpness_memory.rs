@@ -18,11 +18,11 @@ const WEIGHT: f32 = 10.0;
 pub struct SharpnessMemory {
     /// Frames seen so far.
     frame: u32,
-    seen: [Option<Sight>; BINS],
+    seen: [Option<Measurement>; BINS],
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Sight {
+struct Measurement {
     frame: u32,
     /// The logarithm of the mean gradient magnitude.
     sharpness: f32,
@@ -39,7 +39,7 @@ impl SharpnessMemory {
     pub fn see(&mut self, focal_power: f32, sharpness: f32) {
         self.frame += 1;
         let bin = (focal_power.clamp(0.0, 1.0) * (BINS - 1) as f32).round() as usize;
-        self.seen[bin] = Some(Sight { frame: self.frame, sharpness });
+        self.seen[bin] = Some(Measurement { frame: self.frame, sharpness });
     }
 
     /// Makes the places that were less sharp than others less likely under `belief`: one value per bin, with sum 1
@@ -47,8 +47,8 @@ impl SharpnessMemory {
     pub fn weigh(&self, belief: &mut [f32]) {
         let mut total = 0.0;
         for (share, seen) in belief.iter_mut().zip(&self.seen) {
-            if let Some(sight) = seen {
-                *share *= (-WEIGHT * self.evidence_against(*sight)).exp();
+            if let Some(measurement) = seen {
+                *share *= (-WEIGHT * self.evidence_against(*measurement)).exp();
             }
             total += *share;
         }
@@ -58,16 +58,17 @@ impl SharpnessMemory {
         }
     }
 
-    /// By how much another place was sharper than this `sight`, beyond [`FLOOR`], weighted by the freshness of both.
-    fn evidence_against(&self, sight: Sight) -> f32 {
-        let freshness = self.freshness(sight);
-        let against = |other: Sight| freshness * self.freshness(other) * (other.sharpness - sight.sharpness - FLOOR);
+    /// By how much another place was sharper than this `measurement`, beyond [`FLOOR`], weighted by the freshness of both.
+    fn evidence_against(&self, measurement: Measurement) -> f32 {
+        let freshness = self.freshness(measurement);
+        let against =
+            |other: Measurement| freshness * self.freshness(other) * (other.sharpness - measurement.sharpness - FLOOR);
         self.seen.iter().flatten().map(|&other| against(other)).fold(0.0, f32::max)
     }
 
-    /// Weight of a sight by its age: 1 in its own frame, 0 after more than [`SPAN`] frames.
-    fn freshness(&self, sight: Sight) -> f32 {
-        let age = self.frame - sight.frame;
+    /// Weight of a measurement by its age: 1 in its own frame, 0 after more than [`SPAN`] frames.
+    fn freshness(&self, measurement: Measurement) -> f32 {
+        let age = self.frame - measurement.frame;
         1.0 - age.min(SPAN + 1) as f32 / (SPAN + 1) as f32
     }
 }

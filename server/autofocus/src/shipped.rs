@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::belief::BeliefTracker;
-use super::learned::{Learned, Sight};
+use super::learned::{Input, Learned};
 use super::weights::WeightsError;
 use super::{Bisection, Fixed, HillClimber, Policy, Registry, mgm, mlr};
 
@@ -12,7 +12,7 @@ use super::{Bisection, Fixed, HillClimber, Policy, Registry, mgm, mlr};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Design {
     /// The paper's value networks.
-    Values(Sight),
+    Values(Input),
     /// The belief tracker.
     Belief,
 }
@@ -29,19 +29,19 @@ const SHIPPED: [Shipped; 4] = [
     Shipped {
         name: "mgm-learned",
         summary: "learned optimiser of the mean gradient magnitude",
-        design: Design::Values(Sight::Mgm),
+        design: Design::Values(Input::Mgm),
         weights: include_bytes!("../../../policies/mgm-learned.safetensors"),
     },
     Shipped {
         name: "mlr-learned",
         summary: "learned optimiser of the mean local ratio",
-        design: Design::Values(Sight::Mlr),
+        design: Design::Values(Input::Mlr),
         weights: include_bytes!("../../../policies/mlr-learned.safetensors"),
     },
     Shipped {
         name: "cnn-learned",
         summary: "learned end to end from the last eight patches",
-        design: Design::Values(Sight::Patch),
+        design: Design::Values(Input::Patch),
         weights: include_bytes!("../../../policies/cnn-learned.safetensors"),
     },
     Shipped {
@@ -145,7 +145,7 @@ fn put(registry: Registry, name: &str, summary: &'static str, design: Design, by
 /// If the weights are damaged or belong to another network.
 pub fn build(design: Design, bytes: &[u8]) -> Result<Box<dyn Policy>, WeightsError> {
     Ok(match design {
-        Design::Values(sight) => Box::new(Learned::new(sight, bytes)?),
+        Design::Values(input) => Box::new(Learned::new(input, bytes)?),
         Design::Belief => Box::new(BeliefTracker::new(bytes)?),
     })
 }

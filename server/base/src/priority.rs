@@ -22,10 +22,10 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use rustix::thread::{CapabilitySet, Pid, capabilities};
 use serde::Serialize;
 
-/// A thread's place on the way from camera to lens: its real-time priority of 1 to 99, each below the 50
+/// A thread's role on the way from camera to lens: its real-time priority of 1 to 99, each below the 50
 /// of the kernel's own threads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum ThreadRole {
     /// Talks to a device: little work, but urgent.
     Wire = 30,
     /// The control loop.
@@ -92,12 +92,12 @@ static WITHDRAWN: AtomicBool = AtomicBool::new(false);
 /// `rtprio` limit), otherwise to a lower niceness (root, or a raised limit). Threads that it starts do not
 /// inherit the real-time priority.
 #[allow(clippy::must_use_candidate, reason = "only the loop reads the result")]
-pub fn raise(place: Place) -> Standing {
+pub fn raise(role: ThreadRole) -> Standing {
     if withdrawn() {
         return Standing::Withdrawn;
     }
 
-    if set(None, libc::SCHED_FIFO | ALONE, place as i32) {
+    if set(None, libc::SCHED_FIFO | ALONE, role as i32) {
         return Standing::RealTime;
     }
 
@@ -106,8 +106,8 @@ pub fn raise(place: Place) -> Standing {
 
 /// Like [`raise`], but threads that the calling one starts inherit the priority. For a library's own threads, whose
 /// priority nobody else can set.
-pub fn raise_with_children(place: Place) {
-    if withdrawn() || !set(None, libc::SCHED_FIFO, place as i32) {
+pub fn raise_with_children(role: ThreadRole) {
+    if withdrawn() || !set(None, libc::SCHED_FIFO, role as i32) {
         nice(PREFERRED);
     }
 }
@@ -128,10 +128,10 @@ pub fn lower_further() {
     nice(FURTHER_BEHIND);
 }
 
-/// Gives `thread`, a thread of this process, the real-time priority of `place`; returns whether that was allowed.
+/// Gives `thread`, a thread of this process, the real-time priority of `role`; returns whether that was allowed.
 #[must_use]
-pub fn raise_thread(thread: Pid, place: Place) -> bool {
-    !withdrawn() && set(Some(thread), libc::SCHED_FIFO | ALONE, place as i32)
+pub fn raise_thread(thread: Pid, role: ThreadRole) -> bool {
+    !withdrawn() && set(Some(thread), libc::SCHED_FIFO | ALONE, role as i32)
 }
 
 /// Takes `thread`'s real-time priority away.
@@ -189,10 +189,10 @@ pub fn may_lock_memory() -> bool {
     getrlimit(Resource::Memlock).current.is_none() || has(CapabilitySet::IPC_LOCK)
 }
 
-/// Whether this process may put a thread at the real-time priority of each [`Place`].
+/// Whether this process may put a thread at the real-time priority of each [`ThreadRole`].
 #[must_use]
 pub fn may_run_first() -> bool {
-    let highest = Place::Wire as u64;
+    let highest = ThreadRole::Wire as u64;
     getrlimit(Resource::Rtprio).current.is_none_or(|most| most >= highest) || has(CapabilitySet::SYS_NICE)
 }
 

@@ -17,7 +17,7 @@ const ABSENT: u64 = u64::MAX;
 const CHECKSUM: usize = 4;
 
 /// Offset and length of a frame in its shard, bytes.
-pub type Place = (u64, u64);
+pub type ByteRange = (u64, u64);
 
 /// Encodes and reads the index of shards with a given number of frames.
 pub struct Index {
@@ -56,7 +56,7 @@ impl Index {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<Place>>>> {
+    pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<ByteRange>>>> {
         let length = 16 * self.frames + CHECKSUM;
         let whole = shard.metadata()?.len();
         let Some(start) = whole.checked_sub(length as u64) else { return Ok(None) };

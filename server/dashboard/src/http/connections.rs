@@ -1,4 +1,4 @@
-//! Accepts connections, as many as there are places, and prevents queues behind slow ones.
+//! Accepts connections, as many as there are permits, and prevents queues behind slow ones.
 
 use std::io;
 use std::net::SocketAddr;
@@ -20,7 +20,7 @@ use tokio::time::timeout;
 use tower::ServiceExt;
 
 use super::door::Door;
-use super::places::Places;
+use super::permits::Permits;
 use super::shutdown::ended;
 
 /// Bytes that one connection may buffer in this process: about half a frame, so that a stream gets a new frame only
@@ -48,7 +48,7 @@ const STILL_THERE: Duration = Duration::from_secs(20);
 /// Accepts connections on `listener` and opens them with `door` until `shutdown` turns true. Each connection then ends
 /// once its requests under way are answered, and holds a clone of `shutdown` until then.
 pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch::Receiver<bool>) {
-    let places = Places::default();
+    let permits = Permits::default();
     loop {
         let accepted = tokio::select! {
             () = ended(&mut shutdown) => return,
@@ -57,7 +57,7 @@ pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch
 
         match accepted {
             Ok((stream, peer)) => {
-                tokio::spawn(serve_one(stream, peer, places.clone(), door.clone(), shutdown.clone()));
+                tokio::spawn(serve_one(stream, peer, permits.clone(), door.clone(), shutdown.clone()));
             }
             Err(error) if is_the_peers_fault(&error) => {}
             Err(error) => {
@@ -71,7 +71,7 @@ pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch
 async fn serve_one(
     stream: TcpStream,
     peer: SocketAddr,
-    places: Places,
+    permits: Permits,
     door: Door,
     mut shutdown: watch::Receiver<bool>,
 ) {
@@ -79,11 +79,11 @@ async fn serve_one(
     let _ = stream.set_nodelay(true);
     let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
 
-    let (place, mut give_way) = places.take(peer.ip());
-    let place = Arc::new(place);
+    let (permit, mut give_way) = permits.take(peer.ip());
+    let permit = Arc::new(permit);
 
     let opened = tokio::select! {
-        opened = timeout(HANDSHAKE_WITHIN, door.open(stream, Arc::clone(&place), BUFFER)) => opened,
+        opened = timeout(HANDSHAKE_WITHIN, door.open(stream, Arc::clone(&permit), BUFFER)) => opened,
         _ = &mut give_way => return,
         () = ended(&mut shutdown) => return,
     };
@@ -102,7 +102,7 @@ async fn serve_one(
     };
 
     let service = opened.pages.map_request(move |mut request: Request<Incoming>| {
-        request.extensions_mut().insert(Arc::clone(&place));
+        request.extensions_mut().insert(Arc::clone(&permit));
         name_host(&mut request);
         request.map(Body::new)
     });

@@ -13,7 +13,7 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio_rustls::TlsAcceptor;
 
-use super::places::Place;
+use super::permits::Permit;
 
 /// The first byte of a TLS handshake (RFC 8446, 5.1); no method of HTTP begins with it.
 const HANDSHAKE: u8 = 22;
@@ -42,11 +42,16 @@ pub(super) struct ReadyConnection {
 impl Door {
     /// Finds out which protocol `stream` speaks, and does the handshake. There is no time limit here. Encryption
     /// buffers at most `buffer` bytes.
-    pub(super) async fn open(self, stream: TcpStream, place: Arc<Place>, buffer: usize) -> io::Result<ReadyConnection> {
+    pub(super) async fn open(
+        self,
+        stream: TcpStream,
+        permit: Arc<Permit>,
+        buffer: usize,
+    ) -> io::Result<ReadyConnection> {
         let (tls, pages, plain) = match self {
             Self::Plain { pages } => {
                 return Ok(ReadyConnection {
-                    line: Box::new(PlacedConnection { stream, _place: place }),
+                    line: Box::new(PermittedConnection { stream, _permit: permit }),
                     http2: false,
                     pages,
                 });
@@ -56,13 +61,13 @@ impl Door {
 
         let mut first = [0];
         let is_handshake = stream.peek(&mut first).await? == 1 && first[0] == HANDSHAKE;
-        let placed = PlacedConnection { stream, _place: place };
+        let permitted = PermittedConnection { stream, _permit: permit };
         if !is_handshake {
-            return Ok(ReadyConnection { line: Box::new(placed), http2: false, pages: plain });
+            return Ok(ReadyConnection { line: Box::new(permitted), http2: false, pages: plain });
         }
 
         // A picture that waits in this buffer would be seen late.
-        let stream = tls.accept_with(placed, |connection| connection.set_buffer_limit(Some(buffer))).await?;
+        let stream = tls.accept_with(permitted, |connection| connection.set_buffer_limit(Some(buffer))).await?;
         let http2 = stream.get_ref().1.alpn_protocol() == Some(HTTP2);
         Ok(ReadyConnection { line: Box::new(stream), http2, pages })
     }
@@ -73,25 +78,25 @@ pub(super) trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
 
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
 
-/// A connection with its place. It keeps the place when it becomes a WebSocket.
-struct PlacedConnection {
+/// A connection with its permit. It keeps the permit when it becomes a WebSocket.
+struct PermittedConnection {
     stream: TcpStream,
-    _place: Arc<Place>,
+    _permit: Arc<Permit>,
 }
 
-impl PlacedConnection {
+impl PermittedConnection {
     fn stream(self: Pin<&mut Self>) -> Pin<&mut TcpStream> {
         Pin::new(&mut self.get_mut().stream)
     }
 }
 
-impl AsyncRead for PlacedConnection {
+impl AsyncRead for PermittedConnection {
     fn poll_read(self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         self.stream().poll_read(cx, buffer)
     }
 }
 
-impl AsyncWrite for PlacedConnection {
+impl AsyncWrite for PermittedConnection {
     fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         self.stream().poll_write(cx, bytes)
     }

@@ -26,7 +26,7 @@ mod offline;
 mod openapi;
 mod operator;
 mod people;
-mod places;
+mod permits;
 mod plain;
 mod playback;
 mod ranges;

@@ -14,7 +14,7 @@ use axum::http::request::Parts;
 use super::App;
 use super::credentials::{ACCOUNT_COOKIE, bearer, cookie};
 use super::error::Error;
-use super::places::Place;
+use super::permits::Permit;
 use parfocal_base::ids::SessionId;
 use parfocal_records::accounts::Token;
 use parfocal_trial::account::{Account, Actor};
@@ -47,8 +47,8 @@ impl<S: Sync> FromRequestParts<S> for PeerAddress {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
-        let place = parts.extensions.get::<Arc<Place>>();
-        Ok(Self(place.map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |place| place.host())))
+        let permit = parts.extensions.get::<Arc<Permit>>();
+        Ok(Self(permit.map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |permit| permit.host())))
     }
 }
 

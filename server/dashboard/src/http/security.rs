@@ -17,7 +17,7 @@ use axum::response::{IntoResponse, Response};
 use super::AppState;
 use super::error::Error;
 use super::people;
-use super::places::Place;
+use super::permits::Permit;
 
 /// The header that says which features of the device a page may use.
 pub const PERMISSIONS_POLICY: HeaderName = HeaderName::from_static("permissions-policy");
@@ -88,7 +88,7 @@ fn content_security_policy(nonce: &str, plays_sound: bool, opens_offline: bool) 
     )
 }
 
-/// Gives the connection a member's place if the request shows a key or a sign-in. Rejects requests from other
+/// Gives the connection a member's permit if the request shows a key or a sign-in. Rejects requests from other
 /// sites and, on a loopback server, host names that are not this machine's own. A site whose name is made to point
 /// here (DNS rebinding) has no role's cookie anyway, and does not even get the page that says so.
 pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
@@ -99,8 +99,8 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
         return Error::WrongHost.into_response();
     }
 
-    let place = request.extensions().get::<Arc<Place>>();
-    if place.is_some_and(|place| place.admit(headers, &app.keys, person.is_some()).is_err()) {
+    let permit = request.extensions().get::<Arc<Permit>>();
+    if permit.is_some_and(|permit| permit.admit(headers, &app.keys, person.is_some()).is_err()) {
         return Error::Busy.into_response();
     }
 

@@ -144,7 +144,7 @@ pub struct ControlStatus {
     /// Scheduling priority of the loop's thread.
     pub priority: Standing,
     /// What people can point at.
-    pub sight: Sight,
+    pub geometry: PictureGeometry,
     /// What the policy's belief says of the focus.
     pub lock: FocusLock,
     /// Whether the patch follows the tissue.
@@ -168,7 +168,7 @@ pub enum Following {
 
 /// What a place in the picture means: the size of the picture, and the bright circle in it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Sight {
+pub struct PictureGeometry {
     /// Width and height of the latest picture, in mosaic cells; 0 before the first.
     pub cells: (usize, usize),
     /// The content area in use, in cells.

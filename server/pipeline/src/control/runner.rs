@@ -15,7 +15,7 @@ use parfocal_autofocus::{FieldOfView, Observation, Policy, PolicyError, Registry
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, Moment};
-use parfocal_base::priority::{self, Place};
+use parfocal_base::priority::{self, ThreadRole};
 use parfocal_imaging::View;
 
 /// A copy of an observation for the policy's thread.
@@ -128,7 +128,7 @@ impl Runner {
         if !self.urgent
             && let Some(thread) = self.running()
         {
-            self.urgent = priority::raise_thread(thread, Place::Policy);
+            self.urgent = priority::raise_thread(thread, ThreadRole::Policy);
         }
     }
 

@@ -10,7 +10,7 @@ use arc_swap::ArcSwap;
 
 use super::LatestSlot;
 use super::runner::guarded;
-use parfocal_base::priority::{self, Place};
+use parfocal_base::priority::{self, ThreadRole};
 use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame};
 
 /// Longest wait for one frame. After it the thread checks whether it should stop, and asks the camera again.
@@ -67,7 +67,7 @@ struct Feed {
 impl Feed {
     fn run(self, mut camera: Box<dyn Camera>) {
         if !camera.computes() {
-            priority::raise(Place::Wire);
+            priority::raise(ThreadRole::Wire);
         }
 
         let mut failing = false;

@@ -16,10 +16,10 @@ use super::source::Source;
 use super::stepper::Stepper;
 use super::tap::Tap;
 use super::window::LatencyWindow;
-use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Following, LatestSlot, Sight};
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Following, LatestSlot, PictureGeometry};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
-use parfocal_base::priority::{self, Place, Standing};
+use parfocal_base::priority::{self, Standing, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::{Camera, CameraOffer, Controls, Frame};
@@ -173,7 +173,7 @@ impl Worker {
             latency_p50_micros: 0,
             latency_p99_micros: 0,
             priority: Standing::Ordinary,
-            sight: Sight::default(),
+            geometry: PictureGeometry::default(),
             lock: FocusLock::default(),
             following: Following::default(),
         };
@@ -198,7 +198,7 @@ impl Worker {
     }
 
     fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
-        self.priority = priority::raise(Place::Loop);
+        self.priority = priority::raise(ThreadRole::Loop);
         while !stop.load(Ordering::Relaxed) {
             let frame = self.source.frames.take(TICK);
             while let Ok(command) = commands.try_recv() {
@@ -273,7 +273,7 @@ impl Worker {
             last.held != held
                 || last.message != message
                 || last.policy.as_ref() != self.stepper.policy()
-                || last.sight != self.stepper.sight()
+                || last.geometry != self.stepper.geometry()
                 || last.lock != self.lock.told()
                 || last.following != self.stepper.following()
         };
@@ -302,7 +302,7 @@ impl Worker {
             latency_p50_micros: figures.p50,
             latency_p99_micros: figures.p99,
             priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
-            sight: self.stepper.sight(),
+            geometry: self.stepper.geometry(),
             lock: self.lock.told(),
             following: self.stepper.following(),
         }));

@@ -8,7 +8,7 @@ use super::attribution::Attribution;
 use super::eye::{Eye, cells};
 use super::pilot::{HoldReason, Pilot};
 use super::runner::guarded;
-use super::{Aim, Command, ControlledFrame, Drive, Following, Sight};
+use super::{Aim, Command, ControlledFrame, Drive, Following, PictureGeometry};
 use parfocal_autofocus::tracking::{Tracked, Tracker};
 use parfocal_autofocus::{FieldOfView, Observation, Registry};
 use parfocal_base::PolicyName;
@@ -41,7 +41,7 @@ pub struct Stepper {
     /// How often the policy has been made to forget what it saw.
     jumps: u64,
     /// What people can point at.
-    sight: Sight,
+    geometry: PictureGeometry,
     /// The last focal power that the lens accepted.
     asked: FocalPower,
     /// The focal power to command next. Differs from `asked` only while the lens does not accept commands.
@@ -70,7 +70,7 @@ impl Stepper {
             tracker: None,
             following: Following::Screen,
             jumps: 0,
-            sight: Sight::default(),
+            geometry: PictureGeometry::default(),
             asked: start,
             wanted: start,
             lens_fault: None,
@@ -88,7 +88,7 @@ impl Stepper {
     /// Carries out `command`. Drive and segment change together, between two frames.
     pub fn obey(&mut self, command: Command) {
         match command {
-            Command::ContentArea(area) => self.sight.content_area = area,
+            Command::ContentArea(area) => self.geometry.content_area = area,
             Command::Aim(aim) => self.take_aim(aim),
             Command::Drive { drive, segment } => {
                 self.segment = segment;
@@ -123,13 +123,13 @@ impl Stepper {
         let around = self.eye.look(image, patch, FieldOfView::Surroundings).surroundings;
         let found = around.map_or(Tracked::Lost, |around| tracker.see(&around, (patch.x, patch.y)));
 
-        let content = self.sight.content_area;
+        let content = self.geometry.content_area;
         let why = match found {
             Tracked::Unsure => return Ok(patch),
             Tracked::Lost => Following::Lost,
             Tracked::At((x, y)) => {
                 let middle = (x as f64 + patch.width as f64 / 2.0, y as f64 + patch.height as f64 / 2.0);
-                if let Some(place) = place_of(middle, self.sight.cells, content.as_ref()) {
+                if let Some(place) = place_of(middle, self.geometry.cells, content.as_ref()) {
                     let moved = self.eye.find(image, place, content.as_ref())?;
                     // Outside the circle or at the picture's edge the patch would be moved.
                     if (moved.x.cast_signed(), moved.y.cast_signed()) == (x, y) {
@@ -173,8 +173,8 @@ impl Stepper {
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
         // While the lens is disconnected, its focal power is unknown.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
-        self.sight.cells = cells(&frame.image);
-        let content_area = self.sight.content_area;
+        self.geometry.cells = cells(&frame.image);
+        let content_area = self.geometry.content_area;
         let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;
         let patch = self.follow(&frame.image, patch)?;
 
@@ -297,8 +297,8 @@ impl Stepper {
 
     /// What people can point at.
     #[must_use]
-    pub const fn sight(&self) -> Sight {
-        self.sight
+    pub const fn geometry(&self) -> PictureGeometry {
+        self.geometry
     }
 
     /// Whether the patch follows the tissue.

@@ -76,14 +76,14 @@ pub(crate) struct Course {
     /// The operator's latest movement of the lens, until it is recorded.
     movement: Option<Movement>,
     /// What the surgeon sees, since the size of the picture last changed in this inspection.
-    sight: Option<Sight>,
+    seen_pictures: Option<SeenPictures>,
     /// Since when the surgeon's picture is smaller than the protocol allows.
     small_since: Option<Moment>,
 }
 
 /// Pictures of one size that the surgeon saw.
 #[derive(Debug, Clone, Copy)]
-struct Sight {
+struct SeenPictures {
     segment: SegmentId,
     size: PictureSize,
     since: Moment,
@@ -187,7 +187,7 @@ impl Course {
             interrupted_at: None,
             by_hand: None,
             movement: None,
-            sight: None,
+            seen_pictures: None,
             small_since: None,
         }
     }
@@ -374,7 +374,7 @@ impl Course {
     /// Notes the pictures of `report` that were seen during an inspection.
     fn see(&mut self, report: &Report, at: Moment, wall: Timestamp) {
         let Some(segment) = self.state.segment().filter(|_| self.state.running()) else {
-            self.sight = None;
+            self.seen_pictures = None;
             self.small_since = None;
             return;
         };
@@ -383,16 +383,16 @@ impl Course {
         let least = self.protocol.least_picture_width.unwrap_or(0);
         self.small_since = if size.width < least { self.small_since.or(Some(at)) } else { None };
 
-        if self.sight.is_some_and(|sight| sight.size != size) {
+        if self.seen_pictures.is_some_and(|seen_pictures| seen_pictures.size != size) {
             self.record_sight(at, wall);
         }
-        let sight = self.sight.get_or_insert(Sight { segment, size, since: at, pictures: 0 });
-        sight.pictures += report.pictures;
+        let seen_pictures = self.seen_pictures.get_or_insert(SeenPictures { segment, size, since: at, pictures: 0 });
+        seen_pictures.pictures += report.pictures;
     }
 
     /// Makes an event of what the surgeon saw until `at`.
     fn record_sight(&mut self, at: Moment, wall: Timestamp) {
-        let Some(Sight { segment, size, since, pictures }) = self.sight.take() else { return };
+        let Some(SeenPictures { segment, size, since, pictures }) = self.seen_pictures.take() else { return };
         if !self.state.running() || self.state.segment() != Some(segment) {
             return;
         }

@@ -42,8 +42,8 @@ impl Shared {
             return Ok(Choice { frame, at: None, place: PatchPlace::CENTRE });
         };
 
-        let sight = self.control.status.borrow().sight;
-        let place = place_of((x, y), sight.cells, sight.content_area.as_ref())
+        let geometry = self.control.status.borrow().geometry;
+        let place = place_of((x, y), geometry.cells, geometry.content_area.as_ref())
             .ok_or_else(|| ConductError::Said(RefusalKind::Invalid, Message::new("refused-outside")))?;
         Ok(Choice { frame, at: Some(Touch { x: hundredths(x), y: hundredths(y) }), place })
     }

@@ -37,12 +37,12 @@ pub struct List {
     /// Algorithm that drew the list.
     pub algorithm: Algorithm,
     /// Places of the list, in the order in which sessions take them.
-    pub places: Vec<Place>,
+    pub places: Vec<ListPlace>,
 }
 
 /// A place of a list.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct ListPlace {
     /// Seed of the place's set.
     pub seed: Seed,
     /// Index of the place in its set, from 0.
@@ -70,7 +70,7 @@ impl Lists {
 
     /// Place `number` (from 1) of the list for `site` and `protocol`; none if there is no such place.
     #[must_use]
-    pub fn place(&self, site: &str, protocol: &str, number: usize) -> Option<&Place> {
+    pub fn place(&self, site: &str, protocol: &str, number: usize) -> Option<&ListPlace> {
         let list = self.each.iter().find(|list| list.site == site && list.protocol == protocol)?;
         list.places.get(number.checked_sub(1)?)
     }
@@ -113,7 +113,7 @@ impl List {
             let index = place % in_a_set;
             let order = algorithm.draw(seed, protocol.policies.len(), protocol.repeats, index);
             let schedule = order.into_iter().map(|policy| protocol.policies[policy].clone()).collect();
-            Place { seed, index, schedule }
+            ListPlace { seed, index, schedule }
         };
 
         Self {

@@ -20,7 +20,7 @@ use self::device::{Device, DeviceError, Setup};
 use self::shared::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 use parfocal_base::clock::Moment;
-use parfocal_base::priority::Place;
+use parfocal_base::priority::ThreadRole;
 
 /// A machine vision camera.
 pub struct GigeCamera {
@@ -61,7 +61,7 @@ impl GigeCamera {
             .name("gige".into())
             .spawn(move || {
                 // Opened here, so that Aravis's thread that receives packets inherits the priority.
-                parfocal_base::priority::raise_with_children(Place::Wire);
+                parfocal_base::priority::raise_with_children(ThreadRole::Wire);
                 let named = |error: DeviceError| format!("{}: {error}; {}", setup.id, listing());
                 let (device, trouble) = match Device::open(&setup) {
                     Ok(device) => (Some(device), String::new()),

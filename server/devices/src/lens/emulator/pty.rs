@@ -16,7 +16,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::firmware::Firmware;
 use parfocal_base::clock::Clock;
-use parfocal_base::priority::{self, Place};
+use parfocal_base::priority::{self, ThreadRole};
 
 /// Interval for checking whether a program has opened the port: until then there is no event to wait for.
 const UNOPENED: Duration = Duration::from_millis(5);
@@ -49,7 +49,7 @@ impl Pty {
         let server = Server { port: File::from(driver), stop: stop.clone(), firmware, clock };
         let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || {
             // A real unit has its own processor.
-            priority::raise(Place::Wire);
+            priority::raise(ThreadRole::Wire);
             server.run();
         })?;
 

@@ -28,7 +28,7 @@ use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
-use parfocal_base::priority::{self, Place};
+use parfocal_base::priority::{self, ThreadRole};
 
 /// The simulated lens's figures, used until the lens is measured on the bench.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
@@ -113,7 +113,7 @@ impl OptotuneLens {
         let thread = std::thread::Builder::new()
             .name("lens".into())
             .spawn(move || {
-                priority::raise(Place::Wire);
+                priority::raise(ThreadRole::Wire);
                 worker::run(&theirs, &address, &settings);
                 theirs.ended();
             })

@@ -27,7 +27,7 @@ const SOBEL: f64 = 1.0 / 3.0;
 
 /// The focus curve of one place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub struct FocusCurve {
     /// Left end of its 32x32 pixels.
     pub x: usize,
     /// Upper end of its 32x32 pixels.
@@ -42,7 +42,7 @@ pub struct Place {
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Optics {
     /// Focus curves.
-    pub places: Vec<Place>,
+    pub places: Vec<FocusCurve>,
     /// Pixels of blur (standard deviation) a unit of position away from the sharpest picture.
     pub blur_per_unit: Option<f64>,
     /// Blur of the sharpest picture, pixels (standard deviation).
@@ -107,15 +107,15 @@ fn metric(picture: &GrayImage, x: usize, y: usize) -> f64 {
 }
 
 /// The focus curve at a place, and the index of its sharpest picture.
-fn curve(stack: &FocalStack, x: usize, y: usize) -> (Place, usize) {
+fn curve(stack: &FocalStack, x: usize, y: usize) -> (FocusCurve, usize) {
     let sharpness: Vec<f64> = stack.planes().iter().map(|plane| metric(&plane.picture, x, y)).collect();
     let best = (0..sharpness.len()).max_by(|&a, &b| sharpness[a].total_cmp(&sharpness[b])).unwrap_or(0);
-    (Place { x, y, best: stack.planes()[best].position, sharpness }, best)
+    (FocusCurve { x, y, best: stack.planes()[best].position, sharpness }, best)
 }
 
 /// Pixels of blur per unit of position, from each picture: the sharpest picture is blurred until it is as sharp as that
 /// one.
-fn rate(stack: &FocalStack, place: &Place, best: usize) -> Vec<f64> {
+fn rate(stack: &FocalStack, place: &FocusCurve, best: usize) -> Vec<f64> {
     let (around, x, y) = surroundings(&stack.planes()[best].picture, place.x, place.y);
     let blurred: Vec<f64> = BLURS.iter().map(|&blur| metric(&gaussian_blur(&around, blur), x, y)).collect();
 

@@ -22,7 +22,7 @@ use super::trainer::Trainer;
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
-use parfocal_autofocus::learned::{Sight, action_step, best_action, scaled_focal_power};
+use parfocal_autofocus::learned::{Input, action_step, best_action, scaled_focal_power};
 use parfocal_autofocus::networks::{ACTIONS, HISTORY};
 use parfocal_autofocus::weights::{self, WeightsError, floats};
 use replay::{CompactView, Frames, Replay, Transition};
@@ -56,11 +56,11 @@ struct Actor {
 impl DqnTrainer {
     /// A training from random weights on `scenery`, with its networks on `device`.
     #[must_use]
-    pub fn new(sight: Sight, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
+    pub fn new(input: Input, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        let online = Values::new(sight, device);
-        let mut target = Values::new(sight, device);
+        let online = Values::new(input, device);
+        let mut target = Values::new(input, device);
         target.store.freeze();
 
         let optimiser = Optimiser::new(recipe.optimiser, &online.store);
@@ -92,15 +92,15 @@ impl DqnTrainer {
 
     /// Lets every actor see a frame, act, and advance to the next frame.
     fn play_a_frame(&mut self) {
-        let sight = self.online.network.sight;
+        let input = self.online.network.input;
         let seen: Vec<CompactView> = self
             .actors
             .par_iter_mut()
             .map(|actor| {
                 let patch = actor.environment.observe();
-                sight
+                input
                     .metric(&patch)
-                    .map_or_else(|| CompactView::patch(&patch), |metric| CompactView::Metric(sight.scaled(metric)))
+                    .map_or_else(|| CompactView::patch(&patch), |metric| CompactView::Metric(input.scaled(metric)))
             })
             .collect();
 
@@ -111,7 +111,7 @@ impl DqnTrainer {
 
         let encodings = self.online.encode(&frames);
         let count = self.actors.len() as i64;
-        for (actor, encoding) in self.actors.iter_mut().zip(floats(&encodings).chunks_exact(sight.width())) {
+        for (actor, encoding) in self.actors.iter_mut().zip(floats(&encodings).chunks_exact(input.width())) {
             actor.remember(encoding);
         }
 

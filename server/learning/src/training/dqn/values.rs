@@ -8,7 +8,7 @@ use super::encoder::Encoder;
 use super::head::Pass;
 use super::replay::Frames;
 use crate::training::optimiser::{Flat, parts};
-use parfocal_autofocus::learned::{Sight, ValueNetwork};
+use parfocal_autofocus::learned::{Input, ValueNetwork};
 use parfocal_autofocus::networks::HISTORY;
 use parfocal_autofocus::weights::floats;
 use parfocal_imaging::PATCH_SIDE;
@@ -25,9 +25,9 @@ pub(super) struct Values {
 
 impl Values {
     /// A network with random weights on `device`.
-    pub fn new(sight: Sight, device: Device) -> Self {
+    pub fn new(input: Input, device: Device) -> Self {
         let store = nn::VarStore::new(device);
-        let network = ValueNetwork::new(&store.root(), sight);
+        let network = ValueNetwork::new(&store.root(), input);
         let by_hand = Encoder::of(&store, "encoder");
         Self { store, network, by_hand }
     }
@@ -35,7 +35,7 @@ impl Values {
     /// Encodings `[N, width]` of frames. Unless the encoder is by hand, libtorch records them for its own gradients.
     pub fn encode(&self, frames: &Frames) -> Tensor {
         if let Some(encoder) = &self.by_hand {
-            let width = self.network.sight.width() as i64;
+            let width = self.network.input.width() as i64;
             return Tensor::from_slice(&encoder.encode(&frames.patches)).view([-1, width]);
         }
 
@@ -71,7 +71,7 @@ impl Values {
             return gradient;
         }
 
-        let width = self.network.sight.width() as i64;
+        let width = self.network.input.width() as i64;
         let by_histories = by_states.narrow(1, 0, HISTORY as i64 * width).reshape([-1, width]);
         let by_encodings = encodings.zeros_like().index_add_(0, &batch.history, &by_histories);
 
@@ -119,7 +119,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let batch = batch(2, &mut rng);
         assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");
-        let mut values = Values::new(Sight::Patch, Device::Cpu);
+        let mut values = Values::new(Input::Patch, Device::Cpu);
         draw_variables(&values.store, &mut rng);
         let flat = Flat::of(&values.store);
         let grad_output = drawn(&mut rng, &[batch.states.len() as i64, 3]);
@@ -148,7 +148,7 @@ mod tests {
                 compute_on_this_thread();
                 let mut rng = ChaCha8Rng::seed_from_u64(3);
                 let batch = batch(80, &mut rng);
-                let values = Values::new(Sight::Patch, Device::Cpu);
+                let values = Values::new(Input::Patch, Device::Cpu);
                 draw_variables(&values.store, &mut rng);
                 let flat = Flat::of(&values.store);
                 let encodings = values.encode(&batch.frames);

@@ -30,7 +30,7 @@ struct OutlineSite {
 }
 
 /// The session's place in its study.
-struct Place {
+struct EnrolledPlace {
     site: String,
     protocol: String,
     number: String,
@@ -45,7 +45,7 @@ pub(super) fn study(export: &ExportFiles) -> Outcome {
         let cells = export.cells("study_sessions.csv", column)?;
         cells.into_iter().next().ok_or_else(|| format!("study_sessions.csv has no {column}"))
     };
-    let place = Place { site: cell("site")?, protocol: cell("protocol")?, number: cell("place")? };
+    let place = EnrolledPlace { site: cell("site")?, protocol: cell("protocol")?, number: cell("place")? };
     check_definition(export, &study, &place)?;
 
     let commitments = export.cells("study_events.csv", "commitment")?;
@@ -64,7 +64,7 @@ pub(super) fn study(export: &ExportFiles) -> Outcome {
     Ok(Verdict::Passed("the session has the order of its place, and all orders are those committed to".to_owned()))
 }
 
-fn check_definition(export: &ExportFiles, study: &str, place: &Place) -> Result<(), String> {
+fn check_definition(export: &ExportFiles, study: &str, place: &EnrolledPlace) -> Result<(), String> {
     let definition = export.text("study.toml")?;
     let planned = export.cells("studies.csv", "definition_sha256")?;
     if planned != [hex::encode(Sha256::digest(&definition))] {
@@ -97,7 +97,7 @@ fn statement(export: &ExportFiles) -> Result<Option<String>, String> {
 
 /// Checks that the session has the order of its place, and that the list with this place is the one drawn from the
 /// seed.
-fn check_order(export: &ExportFiles, statement: &str, place: &Place) -> Result<(), String> {
+fn check_order(export: &ExportFiles, statement: &str, place: &EnrolledPlace) -> Result<(), String> {
     let seed = statement.lines().find_map(|line| Seed::from_hex(line.strip_prefix("seed ")?));
     let seed = seed.ok_or("allocation.json: the study's orders have no seed")?;
 

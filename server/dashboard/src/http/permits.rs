@@ -1,9 +1,9 @@
-//! Places: the limits on the number of connections, per host and in total, and which connection gives way.
+//! Permits: the limits on the number of connections, per host and in total, and which connection gives way.
 //!
 //! A connection is a stranger until one of its requests shows a role's key or cookie, or the token of somebody who is
-//! signed in. From then on it is a member. Strangers and members have separate places, so that no number of strangers
-//! can take a member's place. If strangers have no place left, the newest gets the place of the oldest: a client with a
-//! key shows it at once, but one that only wants to fill the places waits.
+//! signed in. From then on it is a member. Strangers and members have permits of their own, so that no number of
+//! strangers can use up the members'. If strangers have none left, the newest gets that of the oldest: a client with a
+//! key shows it at once, but one that only wants to use them up waits.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -32,12 +32,12 @@ const STRANGERS: Room = Room { host: 32, all: 128 };
 /// usually have open.
 const MEMBERS: Room = Room { host: 128, all: 512 };
 
-/// All places.
+/// All permits.
 #[derive(Clone, Default)]
-pub struct Places(Arc<Mutex<TakenPlaces>>);
+pub struct Permits(Arc<Mutex<GivenPermits>>);
 
 #[derive(Default)]
-struct TakenPlaces {
+struct GivenPermits {
     /// By number, so the oldest comes first.
     connections: BTreeMap<u64, Connection>,
     next: u64,
@@ -50,19 +50,19 @@ struct Connection {
     _stay: oneshot::Sender<()>,
 }
 
-/// A connection's place; freed when dropped.
-pub struct Place {
+/// A connection's permit; freed when dropped.
+pub struct Permit {
     number: u64,
-    places: Places,
+    permits: Permits,
 }
 
-/// Error: there is no place left.
+/// Error: there is no permit left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoPlaceLeft;
+pub struct NoPermitLeft;
 
-impl Places {
-    /// Gives a connection from `address` a stranger's place. The receiver fails when the connection must give way.
-    pub fn take(&self, address: IpAddr) -> (Place, oneshot::Receiver<()>) {
+impl Permits {
+    /// Gives a connection from `address` a stranger's permit. The receiver fails when the connection must give way.
+    pub fn take(&self, address: IpAddr) -> (Permit, oneshot::Receiver<()>) {
         let host = host(address);
         let mut taken = self.taken();
         if taken.count(false, Some(host)) >= STRANGERS.host {
@@ -75,15 +75,15 @@ impl Places {
         taken.next += 1;
         let (stay, give_way) = oneshot::channel();
         taken.connections.insert(number, Connection { host, member: false, _stay: stay });
-        (Place { number, places: self.clone() }, give_way)
+        (Permit { number, permits: self.clone() }, give_way)
     }
 
-    fn taken(&self) -> MutexGuard<'_, TakenPlaces> {
+    fn taken(&self) -> MutexGuard<'_, GivenPermits> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl TakenPlaces {
+impl GivenPermits {
     fn count(&self, member: bool, host: Option<IpAddr>) -> usize {
         let counts = |there: &&Connection| there.member == member && host.is_none_or(|host| there.host == host);
         self.connections.values().filter(counts).count()
@@ -98,18 +98,18 @@ impl TakenPlaces {
     }
 }
 
-impl Place {
+impl Permit {
     /// The host that the connection came from.
     pub fn host(&self) -> IpAddr {
-        let taken = self.places.taken();
+        let taken = self.permits.taken();
         taken.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
     }
 
     /// Makes the connection a member if a request with `headers` shows one of `keys`, or if somebody is `signed_in`.
     ///
     /// # Errors
-    /// If members have no place left.
-    pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), NoPlaceLeft> {
+    /// If members have no permit left.
+    pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), NoPermitLeft> {
         if self.is_members() || !signed_in && !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
             return Ok(());
         }
@@ -117,14 +117,14 @@ impl Place {
     }
 
     fn is_members(&self) -> bool {
-        self.places.taken().connections.get(&self.number).is_some_and(|there| there.member)
+        self.permits.taken().connections.get(&self.number).is_some_and(|there| there.member)
     }
 
-    fn make_members(&self) -> Result<(), NoPlaceLeft> {
-        let mut taken = self.places.taken();
+    fn make_members(&self) -> Result<(), NoPermitLeft> {
+        let mut taken = self.permits.taken();
         let Some(there) = taken.connections.get(&self.number) else {
             // It has just given way.
-            return Err(NoPlaceLeft);
+            return Err(NoPermitLeft);
         };
 
         if there.member {
@@ -132,7 +132,7 @@ impl Place {
         }
 
         if taken.count(true, Some(there.host)) >= MEMBERS.host || taken.count(true, None) >= MEMBERS.all {
-            return Err(NoPlaceLeft);
+            return Err(NoPermitLeft);
         }
 
         if let Some(there) = taken.connections.get_mut(&self.number) {
@@ -142,9 +142,9 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
-        self.places.taken().connections.remove(&self.number);
+        self.permits.taken().connections.remove(&self.number);
     }
 }
 
@@ -164,44 +164,44 @@ mod tests {
 
     const HOST: IpAddr = IpAddr::V4(std::net::Ipv4Addr::new(192, 0, 2, 1));
 
-    fn gave_way(place: &mut (Place, oneshot::Receiver<()>)) -> bool {
-        place.1.try_recv() == Err(oneshot::error::TryRecvError::Closed)
+    fn gave_way(permit: &mut (Permit, oneshot::Receiver<()>)) -> bool {
+        permit.1.try_recv() == Err(oneshot::error::TryRecvError::Closed)
     }
 
     #[test]
     fn the_oldest_stranger_of_a_host_gives_way_and_a_member_never() {
-        let places = Places::default();
-        let mut member = places.take(HOST);
+        let permits = Permits::default();
+        let mut member = permits.take(HOST);
         member.0.make_members().unwrap();
-        let mut strangers: Vec<_> = (0..=STRANGERS.host).map(|_| places.take(HOST)).collect();
+        let mut strangers: Vec<_> = (0..=STRANGERS.host).map(|_| permits.take(HOST)).collect();
         assert!(gave_way(&mut strangers[0]) && !gave_way(&mut strangers[1]) && !gave_way(&mut member));
-        // A stranger that leaves frees its place.
+        // A stranger that leaves frees its permit.
         strangers.pop();
-        let _another = places.take(HOST);
+        let _another = permits.take(HOST);
         assert!(!gave_way(&mut strangers[1]));
     }
 
     #[test]
     fn strangers_of_many_hosts_have_room_for_so_many_in_all() {
-        let places = Places::default();
+        let permits = Permits::default();
         let host = |number: usize| IpAddr::from([10, 0, 0, u8::try_from(number / 30).unwrap()]);
-        let mut strangers: Vec<_> = (0..=STRANGERS.all).map(|number| places.take(host(number))).collect();
+        let mut strangers: Vec<_> = (0..=STRANGERS.all).map(|number| permits.take(host(number))).collect();
         assert!(gave_way(&mut strangers[0]) && !gave_way(&mut strangers[1]));
     }
 
     #[test]
-    fn members_have_places_up_to_a_number() {
-        let places = Places::default();
+    fn members_have_permits_up_to_a_number() {
+        let permits = Permits::default();
         let member = |_| {
-            let taken = places.take(HOST);
+            let taken = permits.take(HOST);
             taken.0.make_members().unwrap();
             taken
         };
 
         let _members: Vec<_> = (0..MEMBERS.host).map(member).collect();
-        let (one_more, _stay) = places.take(HOST);
-        assert_eq!(one_more.make_members(), Err(NoPlaceLeft));
-        let (elsewhere, _stay_too) = places.take("198.51.100.7".parse().unwrap());
+        let (one_more, _stay) = permits.take(HOST);
+        assert_eq!(one_more.make_members(), Err(NoPermitLeft));
+        let (elsewhere, _stay_too) = permits.take("198.51.100.7".parse().unwrap());
         assert_eq!(elsewhere.make_members(), Ok(()));
     }
 
