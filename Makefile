@@ -31,8 +31,10 @@ test:
 	@.ci/setup test
 	@$(MAKE) --no-print-directory check
 
-# The checks alone, on a machine that is already set up.
-check: lint web unit interface python readme packaged
+# The checks alone, on a machine that is already set up. Those of the finished program mostly wait for it, so two of them
+# run at a time.
+check: lint web unit
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target interface python readme packaged
 
 # Tests and program are one build, so all is checked as it is shipped and compiled once. `cargo test` alone makes a
 # development build, which is faster after a change.

@@ -1,6 +1,9 @@
 //! The picture on the page: fitted to the bright circle, at the size that the screen can show, and zoomed only by
 //! people.
 
+use std::cell::Cell;
+use std::time::{Duration, Instant};
+
 use serde_json::json;
 
 use super::driver::{Area, Browser, Driver};
@@ -20,7 +23,23 @@ async fn surgeon(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
     browser.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
     is_live(&browser).await;
+    is_fitted(&browser).await;
     browser
+}
+
+/// Waits until the view is fitted to the bright circle. It follows a circle that is seen for a second, the first time
+/// after the first pictures.
+async fn is_fitted(browser: &Browser) {
+    let fitted = Cell::new((Instant::now(), browser.area(PICTURE).await));
+    until("the view to stay where it is", || async {
+        let (since, before) = fitted.get();
+        let now = browser.area(PICTURE).await;
+        if now != before {
+            fitted.set((Instant::now(), now));
+        }
+        now == before && since.elapsed() > Duration::from_secs(2)
+    })
+    .await;
 }
 
 /// Waits for a picture.
@@ -122,6 +141,27 @@ async fn a_finer_screen_gets_larger_pictures_at_the_same_place_without_a_flash()
     assert!(lights.iter().all(|light| *light > 24.0), "the picture is black for a moment: {lights:?}");
     let places: std::collections::BTreeSet<&str> = notes.iter().filter_map(|note| note["place"].as_str()).collect();
     assert_eq!(places.len(), 1, "{places:?}");
+}
+
+/// The view's place and height with the badge about smaller pictures and without it. A page shows it only where they stay
+/// small for a while.
+const WITH_AND_WITHOUT_BADGE: &str = "const badge = document.getElementById('reduced');
+    return [false, true].map((hidden) => {
+        badge.hidden = hidden;
+        const { top, height } = document.getElementById('view').getBoundingClientRect();
+        return [top, height];
+    });";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_badge_that_comes_or_goes_does_not_move_the_picture() {
+    let driver = Driver::start();
+    let server = server();
+    let surgeon = surgeon(&driver, &server).await;
+    for (width, height) in [UPRIGHT, (1180, 820), (640, 480)] {
+        resize(&surgeon, width, height).await;
+        let places = surgeon.run(WITH_AND_WITHOUT_BADGE, &[]).await;
+        assert_eq!(places[0], places[1], "at {width}x{height}");
+    }
 }
 
 async fn turn_wheel(browser: &Browser, x: f64, y: f64, by: f64) {
