@@ -31,8 +31,8 @@ test:
 	@.ci/setup test
 	@$(MAKE) --no-print-directory check
 
-# The checks alone, on a machine that is already set up. Those of the finished program mostly wait for it, so two of them
-# run at a time.
+# The checks alone, on a machine that is already set up. Those of the finished program mostly wait for it, so two of
+# them run at a time.
 check: lint web unit
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target interface python readme packaged
 

@@ -58,7 +58,7 @@ impl SharpnessMemory {
         }
     }
 
-    /// By how much another place was sharper than this `measurement`, beyond [`FLOOR`], weighted by the freshness of both.
+    /// By how much another place was sharper than this one, beyond [`FLOOR`], weighted by the freshness of both.
     fn evidence_against(&self, measurement: Measurement) -> f32 {
         let freshness = self.freshness(measurement);
         let against =

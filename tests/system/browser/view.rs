@@ -2,7 +2,6 @@
 //! people.
 
 use std::cell::Cell;
-use std::time::{Duration, Instant};
 
 use serde_json::json;
 
@@ -30,14 +29,14 @@ async fn surgeon(driver: &Driver, server: &Server) -> Browser {
 /// Waits until the view is fitted to the bright circle. It follows a circle that is seen for a second, the first time
 /// after the first pictures.
 async fn is_fitted(browser: &Browser) {
-    let fitted = Cell::new((Instant::now(), browser.area(PICTURE).await));
+    // Every look takes 40 ms and more.
+    const LOOKS: u32 = 50;
+    let still = Cell::new((browser.area(PICTURE).await, 0));
     until("the view to stay where it is", || async {
-        let (since, before) = fitted.get();
+        let (before, looks) = still.get();
         let now = browser.area(PICTURE).await;
-        if now != before {
-            fitted.set((Instant::now(), now));
-        }
-        now == before && since.elapsed() > Duration::from_secs(2)
+        still.set((now, if now == before { looks + 1 } else { 0 }));
+        looks >= LOOKS
     })
     .await;
 }
@@ -143,8 +142,8 @@ async fn a_finer_screen_gets_larger_pictures_at_the_same_place_without_a_flash()
     assert_eq!(places.len(), 1, "{places:?}");
 }
 
-/// The view's place and height with the badge about smaller pictures and without it. A page shows it only where they stay
-/// small for a while.
+/// The view's place and height with the badge about smaller pictures and without it. A page shows it only where they
+/// stay small for a while.
 const WITH_AND_WITHOUT_BADGE: &str = "const badge = document.getElementById('reduced');
     return [false, true].map((hidden) => {
         badge.hidden = hidden;
