@@ -64,21 +64,21 @@ impl Permits {
     /// Gives a connection from `address` a stranger's permit. The receiver fails when the connection must give way.
     pub fn take(&self, address: IpAddr) -> (Permit, oneshot::Receiver<()>) {
         let host = host(address);
-        let mut taken = self.taken();
-        if taken.count(false, Some(host)) >= STRANGERS.host {
-            taken.remove_oldest_stranger(Some(host));
-        } else if taken.count(false, None) >= STRANGERS.all {
-            taken.remove_oldest_stranger(None);
+        let mut given = self.given();
+        if given.count(false, Some(host)) >= STRANGERS.host {
+            given.remove_oldest_stranger(Some(host));
+        } else if given.count(false, None) >= STRANGERS.all {
+            given.remove_oldest_stranger(None);
         }
 
-        let number = taken.next;
-        taken.next += 1;
+        let number = given.next;
+        given.next += 1;
         let (stay, give_way) = oneshot::channel();
-        taken.connections.insert(number, Connection { host, member: false, _stay: stay });
+        given.connections.insert(number, Connection { host, member: false, _stay: stay });
         (Permit { number, permits: self.clone() }, give_way)
     }
 
-    fn taken(&self) -> MutexGuard<'_, GivenPermits> {
+    fn given(&self) -> MutexGuard<'_, GivenPermits> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -101,8 +101,8 @@ impl GivenPermits {
 impl Permit {
     /// The host that the connection came from.
     pub fn host(&self) -> IpAddr {
-        let taken = self.permits.taken();
-        taken.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
+        let given = self.permits.given();
+        given.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
     }
 
     /// Makes the connection a member if a request with `headers` shows one of `keys`, or if somebody is `signed_in`.
@@ -117,12 +117,12 @@ impl Permit {
     }
 
     fn is_members(&self) -> bool {
-        self.permits.taken().connections.get(&self.number).is_some_and(|there| there.member)
+        self.permits.given().connections.get(&self.number).is_some_and(|there| there.member)
     }
 
     fn make_members(&self) -> Result<(), NoPermitLeft> {
-        let mut taken = self.permits.taken();
-        let Some(there) = taken.connections.get(&self.number) else {
+        let mut given = self.permits.given();
+        let Some(there) = given.connections.get(&self.number) else {
             // It has just given way.
             return Err(NoPermitLeft);
         };
@@ -131,11 +131,11 @@ impl Permit {
             return Ok(());
         }
 
-        if taken.count(true, Some(there.host)) >= MEMBERS.host || taken.count(true, None) >= MEMBERS.all {
+        if given.count(true, Some(there.host)) >= MEMBERS.host || given.count(true, None) >= MEMBERS.all {
             return Err(NoPermitLeft);
         }
 
-        if let Some(there) = taken.connections.get_mut(&self.number) {
+        if let Some(there) = given.connections.get_mut(&self.number) {
             there.member = true;
         }
         Ok(())
@@ -144,7 +144,7 @@ impl Permit {
 
 impl Drop for Permit {
     fn drop(&mut self) {
-        self.permits.taken().connections.remove(&self.number);
+        self.permits.given().connections.remove(&self.number);
     }
 }
 

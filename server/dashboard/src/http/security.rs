@@ -83,8 +83,8 @@ fn content_security_policy(nonce: &str, plays_sound: bool, opens_offline: bool) 
     let worker = if opens_offline { "'self'" } else { "'none'" };
     format!(
         "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'nonce-{nonce}'; \
-         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; {media}worker-src {worker}; \
-         form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; \
+         {media}worker-src {worker}; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     )
 }
 

@@ -46,7 +46,7 @@ const EXPOSURE_FOUND: u64 = 20;
 /// it is centred on the computation's start, when the lens is looked through, and ends when the frame is
 /// handed over.
 pub struct PhantomCamera {
-    view: View,
+    motif: Motif,
     settings: CameraSettings,
     pace: Pace,
     pool: MosaicPool,
@@ -54,13 +54,13 @@ pub struct PhantomCamera {
 }
 
 /// What is before the camera.
-enum View {
-    Brain { phantom: Box<Phantom>, hold: Hold },
+enum Motif {
+    Brain { phantom: Box<Phantom>, mount: Mount },
     Tile(Box<Tile>),
 }
 
 /// What holds the camera.
-enum Hold {
+enum Mount {
     Hand(Box<Hand>),
     Clamp,
 }
@@ -76,17 +76,17 @@ impl PhantomCamera {
     #[must_use]
     pub fn looking(before: PhantomScene, settings: CameraSettings) -> Self {
         let seed = settings.seed;
-        let brain = |hold| View::Brain { phantom: Box::new(Phantom::new(seed)), hold };
-        let view = match before {
-            PhantomScene::Hand => brain(Hold::Hand(Box::new(Hand::new(seed)))),
-            PhantomScene::Clamp => brain(Hold::Clamp),
-            PhantomScene::WhiteTile => View::Tile(Box::new(Tile::new(seed, WHITE))),
-            PhantomScene::Cap => View::Tile(Box::new(Tile::new(seed, 0.0))),
+        let brain = |mount| Motif::Brain { phantom: Box::new(Phantom::new(seed)), mount };
+        let motif = match before {
+            PhantomScene::Hand => brain(Mount::Hand(Box::new(Hand::new(seed)))),
+            PhantomScene::Clamp => brain(Mount::Clamp),
+            PhantomScene::WhiteTile => Motif::Tile(Box::new(Tile::new(seed, WHITE))),
+            PhantomScene::Cap => Motif::Tile(Box::new(Tile::new(seed, 0.0))),
         };
 
         let start = settings.clock.now();
         Self {
-            view,
+            motif,
             pace: Pace::new(settings.fps, start),
             pool: MosaicPool::new(SENSOR_WIDTH, SENSOR_HEIGHT),
             start,
@@ -97,18 +97,18 @@ impl PhantomCamera {
     /// Takes exposure `number`, looking through the lens at `looked`. Returns the truth about it, if it
     /// shows the brain.
     fn expose(&mut self, number: u64, looked: Moment, samples: &mut [u16]) -> Option<Truth> {
-        let (phantom, hold) = match &mut self.view {
-            View::Brain { phantom, hold } => (phantom, hold),
-            View::Tile(tile) => {
+        let (phantom, mount) = match &mut self.motif {
+            Motif::Brain { phantom, mount } => (phantom, mount),
+            Motif::Tile(tile) => {
                 tile.expose(samples);
                 return None;
             }
         };
 
         let exposed = self.settings.optics.focal_power_at(looked);
-        let (pose, adjusts) = match hold {
-            Hold::Hand(hand) => (hand.pose_at(looked.since(self.start)), true),
-            Hold::Clamp => (CLAMPED, number <= EXPOSURE_FOUND),
+        let (pose, adjusts) = match mount {
+            Mount::Hand(hand) => (hand.pose_at(looked.since(self.start)), true),
+            Mount::Clamp => (CLAMPED, number <= EXPOSURE_FOUND),
         };
 
         phantom.expose(&pose, exposed, samples);

@@ -116,8 +116,8 @@ impl Stepper {
         self.jumps += 1;
     }
 
-    /// Where the patch is that was at `patch` in the frame before, if it follows the tissue. It is the same tissue, so the
-    /// policy forgets nothing. Where the tissue is lost, the patch goes back to the centre.
+    /// Where the patch is that was at `patch` in the frame before, if it follows the tissue. It is the same tissue, so
+    /// the policy forgets nothing. Where the tissue is lost, the patch goes back to the centre.
     fn follow(&mut self, image: &FrameImage, patch: PatchArea) -> Result<PatchArea, HoldReason> {
         let Some(tracker) = &mut self.tracker else { return Ok(patch) };
         let around = self.eye.look(image, patch, FieldOfView::Surroundings).surroundings;

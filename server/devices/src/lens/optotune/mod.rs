@@ -94,7 +94,8 @@ impl OptotuneLens {
         first.map(|_| lens)
     }
 
-    /// Starts the thread that connects to the driver at `address`. Returns the lens and the outcome of the first attempt.
+    /// Starts the thread that connects to the driver at `address`. Returns the lens and the outcome of the first
+    /// attempt.
     fn start(
         address: Address,
         settings: Settings,

@@ -115,8 +115,8 @@ fn curve(stack: &FocalStack, x: usize, y: usize) -> (FocusCurve, usize) {
 
 /// Pixels of blur per unit of position, from each picture: the sharpest picture is blurred until it is as sharp as that
 /// one.
-fn rate(stack: &FocalStack, place: &FocusCurve, best: usize) -> Vec<f64> {
-    let (around, x, y) = surroundings(&stack.planes()[best].picture, place.x, place.y);
+fn rate(stack: &FocalStack, curve: &FocusCurve, best: usize) -> Vec<f64> {
+    let (around, x, y) = surroundings(&stack.planes()[best].picture, curve.x, curve.y);
     let blurred: Vec<f64> = BLURS.iter().map(|&blur| metric(&gaussian_blur(&around, blur), x, y)).collect();
 
     let blur = |sharpness: f64| {
@@ -128,9 +128,9 @@ fn rate(stack: &FocalStack, place: &FocusCurve, best: usize) -> Vec<f64> {
 
     // The pictures beside the sharpest one are hardly blurred, so rounding and noise would decide there.
     let far = |index: &usize| index.abs_diff(best) >= 2;
-    let numbers = (0..place.sharpness.len()).filter(far);
-    let pairs = numbers.filter_map(|index| Some((blur(place.sharpness[index])?, stack.planes()[index].position)));
-    pairs.map(|(blur, position)| blur / (position - place.best).abs()).collect()
+    let numbers = (0..curve.sharpness.len()).filter(far);
+    let pairs = numbers.filter_map(|index| Some((blur(curve.sharpness[index])?, stack.planes()[index].position)));
+    pairs.map(|(blur, position)| blur / (position - curve.best).abs()).collect()
 }
 
 /// The part of `picture` around the patch at (`x`, `y`), and where the patch is in it.
