@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use axum::Extension;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
+use serde::ser::Error as _;
 use utoipa::OpenApi;
 use utoipa::openapi::path::Operation;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
@@ -94,17 +95,21 @@ enum Limit {
 }
 
 /// The whole document as JSON.
+///
+/// # Errors
+/// If a type no longer has a place that a limit is for.
 pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String> {
     complete(&mut api);
     let mut document = serde_json::to_value(api)?;
-    for (schema, name, limit) in &LIMITS {
-        if let Some(schema) = document.pointer_mut(&format!("/components/schemas/{schema}")) {
-            schema[*name] = match limit {
-                Limit::None => false.into(),
-                Limit::Number(number) => (*number).into(),
-                Limit::Text(text) => (*text).into(),
-            };
-        }
+    for (place, keyword, limit) in &LIMITS {
+        let schema = document
+            .pointer_mut(&format!("/components/schemas/{place}"))
+            .ok_or_else(|| serde_json::Error::custom(format!("no schema has the place '{place}' that LIMITS names")))?;
+        schema[*keyword] = match limit {
+            Limit::None => false.into(),
+            Limit::Number(number) => (*number).into(),
+            Limit::Text(text) => (*text).into(),
+        };
     }
 
     serde_json::to_string(&document)
