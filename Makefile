@@ -24,7 +24,7 @@ container: package
 
 run:
 	@.ci/setup build
-	@cargo build --release --locked $(FEATURES)
+	@cargo $(CARGO_FLAGS) build --release --locked $(FEATURES)
 	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
 
 test:
@@ -36,12 +36,12 @@ test:
 check: lint web unit
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target interface python readme packaged
 
-# Tests and program are one build, so all is checked as it is shipped and compiled once. `cargo test` alone makes a
-# development build, which is faster after a change.
+# Tests and program are one build, so all is compiled once. `cargo test` alone makes a development build, which is
+# faster after a change. `CARGO_FLAGS` says how a check run builds (.ci/run).
 lint:
 	cargo fmt --check
-	cargo clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
-	[ -z "$(FEATURES)" ] || cargo clippy --release --locked -- --deny warnings
+	cargo $(CARGO_FLAGS) clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
+	[ -z "$(FEATURES)" ] || cargo $(CARGO_FLAGS) clippy --release --locked -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -56,7 +56,7 @@ web-types:
 
 # One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
 unit:
-	PARFOCAL_KILLS=8 cargo test --release --locked --no-fail-fast $(FEATURES)
+	PARFOCAL_KILLS=8 cargo $(CARGO_FLAGS) test --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:

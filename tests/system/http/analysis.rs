@@ -58,7 +58,10 @@ impl Study {
         std::fs::write(protocols.path().join("analysed.toml"), PROTOCOL).unwrap();
         let folder = protocols.path().to_str().unwrap();
         let data = Arc::new(tempfile::tempdir().unwrap());
-        let mut server = Server::on(data, &["--bind", "127.0.0.1:0", "--camera", BRAIN, "--protocols", folder]);
+        // Each setting is watched for twelve pictures.
+        let camera = ["--camera", BRAIN, "--fps", "25"];
+        let arguments = [&["--bind", "127.0.0.1:0", "--protocols", folder][..], &camera].concat();
+        let mut server = Server::on(data, &arguments);
         server.add_account("statistician", "lead", "Trial statistician");
         let token = server.sign_in("statistician").await;
         server.use_key("operator", &token);
