@@ -24,7 +24,7 @@ container: package
 
 run:
 	@.ci/setup build
-	@cargo $(CARGO_FLAGS) build --release --locked $(FEATURES)
+	@cargo build $(CARGO_FLAGS) --release --locked $(FEATURES)
 	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
 
 test:
@@ -40,8 +40,8 @@ check: lint web unit
 # faster after a change. `CARGO_FLAGS` says how a check run builds (.ci/run).
 lint:
 	cargo fmt --check
-	cargo $(CARGO_FLAGS) clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
-	[ -z "$(FEATURES)" ] || cargo $(CARGO_FLAGS) clippy --release --locked -- --deny warnings
+	cargo clippy $(CARGO_FLAGS) --release --all-targets --locked $(FEATURES) -- --deny warnings
+	[ -z "$(FEATURES)" ] || cargo clippy $(CARGO_FLAGS) --release --locked -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -56,7 +56,7 @@ web-types:
 
 # One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
 unit:
-	PARFOCAL_KILLS=8 cargo $(CARGO_FLAGS) test --release --locked --no-fail-fast $(FEATURES)
+	PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
