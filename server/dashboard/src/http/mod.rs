@@ -113,7 +113,10 @@ pub fn router(app: AppState) -> Router {
         .merge(openapi::routes())
         .split_for_parts();
 
-    let _ = document.set(openapi::document(api).unwrap_or_default());
+    match openapi::document(api) {
+        Ok(text) => document.set(text).unwrap_or_default(),
+        Err(error) => tracing::error!(%error, "the interface cannot be described"),
+    }
 
     // From the outside in.
     let layers = ServiceBuilder::new()
