@@ -59,8 +59,7 @@ impl Study {
         let folder = protocols.path().to_str().unwrap();
         let data = Arc::new(tempfile::tempdir().unwrap());
         // Each setting is watched for twelve pictures.
-        let camera = ["--camera", BRAIN, "--fps", "25"];
-        let arguments = [&["--bind", "127.0.0.1:0", "--protocols", folder][..], &camera].concat();
+        let arguments = ["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "25", "--protocols", folder];
         let mut server = Server::on(data, &arguments);
         server.add_account("statistician", "lead", "Trial statistician");
         let token = server.sign_in("statistician").await;

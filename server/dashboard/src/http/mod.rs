@@ -114,7 +114,7 @@ pub fn router(app: AppState) -> Router {
         .split_for_parts();
 
     match openapi::document(api) {
-        Ok(text) => document.set(text).unwrap_or_default(),
+        Ok(text) => _ = document.set(text),
         Err(error) => tracing::error!(%error, "the interface cannot be described"),
     }
 
