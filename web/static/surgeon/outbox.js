@@ -51,13 +51,6 @@ const LONGEST_WAIT_MS = 8000;
  */
 
 export class Outbox {
-  /**
-   * Why the last attempt to send failed; null if it succeeded.
-   *
-   * @type {string | null}
-   */
-  trouble = null;
-
   /** Resolves once the entries that only the spare copy has are restored. @type {Promise<void>} */
   ready;
 
@@ -69,6 +62,9 @@ export class Outbox {
   /** @type {Set<(change: Change) => void>} */
   #listeners = new Set();
   #flushing = false;
+  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
+  #failure = null;
+  #missed = false;
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
@@ -110,6 +106,24 @@ export class Outbox {
   subscribe(listener) {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
+  }
+
+  /**
+   * Call this often. While the server is missed, entries count as waiting at once: the request that sends them may take
+   * long to give up.
+   *
+   * @param {boolean} missed whether the server has been silent for too long
+   */
+  follow(missed) {
+    if (missed === this.#missed) return;
+    this.#missed = missed;
+    if (!missed) return;
+    for (const entry of this.waiting) this.#tell(entry, "waiting", this.trouble, false);
+  }
+
+  /** Why entries wait: why the last attempt to send failed, or that the server is missed. Null if neither is so. */
+  get trouble() {
+    return this.#failure ?? (this.#missed ? say("no-connection") : null);
   }
 
   /** Whether this device keeps every unsaved entry over a reload. */
@@ -179,7 +193,8 @@ export class Outbox {
     if (slot) this.#forgetRefused(slot);
     this.#entries.set(entry.id, entry);
     entry.stored = this.#store(entry);
-    this.#tell(entry, "saving");
+    if (this.#missed) this.#tell(entry, "waiting", this.trouble, false);
+    else this.#tell(entry, "saving");
     this.nudge();
     return entry;
   }
@@ -213,13 +228,14 @@ export class Outbox {
 
   /**
    * Waits until no entry for `path` is waiting, and returns true. Returns false as soon as such an entry could not be
-   * sent, or the server did not answer.
+   * sent, or the server does not answer.
    *
    * @param {string} path
    */
   async settled(path) {
     this.nudge();
     while (this.waiting.some((entry) => entry.path === path)) {
+      if (this.#missed) return false;
       const { entry, state, heard } = await this.#nextChange();
       if (state === "waiting" && (entry.path === path || !heard)) return false;
     }
@@ -264,7 +280,7 @@ export class Outbox {
     entry.sending = true;
     try {
       await this.#around.send(entry.path, { ...entry.body, ...this.#around.origins.tell(entry.given) });
-      this.trouble = null;
+      this.#failure = null;
       this.forget(entry);
       this.#tell(entry, "saved");
       return true;
@@ -295,9 +311,9 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, say("no-connection"));
+    this.#failure = inWords(error, say("no-connection"));
     const heard = error instanceof Refused;
-    this.#tell(entry, "waiting", this.trouble, heard);
+    this.#tell(entry, "waiting", this.#failure, heard);
     return heard;
   }
 
