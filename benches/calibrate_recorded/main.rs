@@ -10,7 +10,9 @@ use parfocal_base::PolicyName;
 use parfocal_devices::simulation::phantom::{Haste, Trajectory};
 use parfocal_learning::evaluation::{Outcome, evaluate};
 use parfocal_learning::scans::benchmark::SEED;
-use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, Recorded, RecordedScan};
+use parfocal_learning::scans::recorded::{
+    FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, RecordedScan, RecordedScans,
+};
 
 /// The paper's robotic column: policy and mean absolute error.
 const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];
@@ -35,7 +37,7 @@ fn scan(seed: u64, haste: Haste, poses: usize) -> Arc<RecordedScan> {
 }
 
 fn report(scans: Vec<Arc<RecordedScan>>, haste: Haste) {
-    let set = Recorded { scans, between: Interpolation::Nearest };
+    let set = RecordedScans { scans, between: Interpolation::Nearest };
     let policies = PAPER.map(|(name, _)| PolicyName::new(name));
     let outcomes = evaluate(&Registry::standard(), &policies, &set, &|_| ()).unwrap();
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();

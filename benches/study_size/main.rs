@@ -69,7 +69,7 @@ async fn bench(sessions: usize, steps: usize) {
 async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
     let what = if unblinded { "export with policies" } else { "export without policies" };
     let out = data.join(if unblinded { "unblinded" } else { "blinded" });
-    let recorder = made.trial.recorder();
+    let recorder = made.trial.access_log();
 
     // When the last session was exported, in nanoseconds from the start.
     let begun = SystemClock.now();

@@ -7,25 +7,25 @@ use std::net::SocketAddr;
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
-use parfocal_dashboard::http::Reach;
+use parfocal_dashboard::http::ServerAddress;
 use parfocal_dashboard::http::error::role_name;
 use parfocal_dashboard::http::keys::{Keys, ROLES};
 use parfocal_imaging::Calibration;
 use parfocal_pipeline::control::ControlStatus;
 use parfocal_trial::role::Role;
 
-/// The announcement of a server that is reachable at `reach`, and by OpenIGTLink at `linked`. On a `terminal` the QR
+/// The announcement of a server that is reachable at `address`, and by OpenIGTLink at `linked`. On a `terminal` the QR
 /// code has colours.
 pub fn announcement(
-    reach: &Reach,
+    address: &ServerAddress,
     keys: &Keys,
     status: &ControlStatus,
     calibration: &Calibration,
     linked: Option<SocketAddr>,
     terminal: bool,
 ) -> String {
-    let host = reach.host();
-    let link = |role| reach.link_by(&host, keys.of(role));
+    let host = address.host();
+    let link = |role| address.link_by(&host, keys.of(role));
     let mut text = String::new();
 
     // Writing to a string cannot fail.
@@ -62,20 +62,20 @@ pub fn announcement(
         let _ = writeln!(text, "OpenIGTLink: {address}. Whoever reaches that address sees the picture.");
     }
 
-    let _ = writeln!(text, "{}\nCtrl-C stops the server.", advice(reach));
+    let _ = writeln!(text, "{}\nCtrl-C stops the server.", advice(address));
     text
 }
 
 /// Advice about the connection to the server.
-fn advice(reach: &Reach) -> String {
+fn advice(address: &ServerAddress) -> String {
     let mut advice = Vec::new();
-    if reach.loopback_only() {
+    if address.loopback_only() {
         advice.push("Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 --tls.".to_owned());
-    } else if !reach.encrypted() {
+    } else if !address.encrypted() {
         advice.push("The connection is not encrypted (--insecure): use a network that you trust.".to_owned());
     }
 
-    if let (Some(page), Some(authority)) = (reach.trust_page_by(&reach.host()), reach.authority()) {
+    if let (Some(page), Some(authority)) = (address.trust_page_by(&address.host()), address.authority()) {
         advice.push(format!("Each tablet and laptop must trust this server once. To do so, open {page} on it."));
         advice.push(format!("Compare the fingerprint (SHA-256) there: {}", authority.fingerprint));
     }

@@ -20,14 +20,16 @@ use parfocal_devices::camera::recorded::ScanFolder;
 use parfocal_devices::simulation::phantom::Trajectory;
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::evaluation::evaluate;
-use parfocal_learning::evaluation::report::Subject;
+use parfocal_learning::evaluation::report::EvaluatedScans;
 use parfocal_learning::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
 use parfocal_learning::evaluation::stacks::{BlurKnowledge, FIRST_SEED, SEEDS, evaluate_stacks};
 use parfocal_learning::scans::ScanSet;
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
 use parfocal_learning::scans::detail::{warning, without_detail};
 use parfocal_learning::scans::footage;
-use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, Recorded, RecordedScan};
+use parfocal_learning::scans::recorded::{
+    FOCAL_POWERS, HASTE, Interpolation, Kept, POSES, RecordedScan, RecordedScans,
+};
 use parfocal_learning::scans::simulated::Scene;
 use parfocal_learning::scans::stack::source::StackSource;
 
@@ -221,7 +223,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
 
     let mut weights = registry.weights();
     weights.retain(|name, _| policies.contains(name));
-    let subject = Subject {
+    let subject = EvaluatedScans {
         scans: arguments.scans.clone(),
         seed,
         count,
@@ -343,7 +345,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     }
 
     let between = Some(arguments.between);
-    let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
+    let recorded = |scans| Box::new(RecordedScans { scans, between: arguments.between });
 
     if arguments.scans == "phantom" {
         if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {

@@ -9,7 +9,7 @@ use super::output::{Failure, Steps, print};
 use super::wait::wait_for;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::Recorder;
+use parfocal_records::store::AccessLog;
 use parfocal_records::store::export::export;
 use parfocal_results::package::{self, LeftOut, Sessions, Source, Summary};
 use parfocal_results::study_export::{Progress, export_study};
@@ -46,18 +46,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 async fn write(arguments: &Arguments) -> Result<(), Failure> {
-    let recorder = Recorder::open(&arguments.data_dir, Arc::new(SystemClock)).await?;
+    let access_log = AccessLog::open(&arguments.data_dir, Arc::new(SystemClock)).await?;
     let written = match (arguments.session, &arguments.study) {
-        (Some(session), _) => write_session(&recorder, session, arguments).await,
-        (None, Some(study)) => write_study(&recorder, study, arguments).await,
+        (Some(session), _) => write_session(&access_log, session, arguments).await,
+        (None, Some(study)) => write_study(&access_log, study, arguments).await,
         (None, None) => Err("name a session, or a study by --study".into()),
     };
-    recorder.close().await;
+    access_log.close().await;
     written
 }
 
-async fn write_session(recorder: &Recorder, session: SessionId, arguments: &Arguments) -> Result<(), Failure> {
-    let summary = export(recorder, session, &arguments.out, arguments.unblinded).await?;
+async fn write_session(access_log: &AccessLog, session: SessionId, arguments: &Arguments) -> Result<(), Failure> {
+    let summary = export(access_log, session, &arguments.out, arguments.unblinded).await?;
     if arguments.json {
         return print(&(serde_json::to_string(&summary)? + "\n"));
     }
@@ -68,7 +68,7 @@ async fn write_session(recorder: &Recorder, session: SessionId, arguments: &Argu
 }
 
 /// Exports all of `study`, and shows the progress.
-async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) -> Result<(), Failure> {
+async fn write_study(access_log: &AccessLog, study: &str, arguments: &Arguments) -> Result<(), Failure> {
     let steps = Arc::new(Steps::new());
     let report = {
         let steps = Arc::clone(&steps);
@@ -78,7 +78,7 @@ async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) ->
         }
     };
 
-    let exported = export_study(recorder, study, arguments.unblinded, &arguments.out, Arc::new(report)).await;
+    let exported = export_study(access_log, study, arguments.unblinded, &arguments.out, Arc::new(report)).await;
     steps.end();
     tell(&exported?, arguments.json)
 }

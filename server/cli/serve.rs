@@ -28,7 +28,7 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::priority;
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::health::device_log;
-use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, Reach, TabletTrials};
+use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, ServerAddress, TabletTrials};
 use parfocal_dashboard::openigtlink;
 use parfocal_dashboard::tls::{Certificates, keep_current};
 use parfocal_imaging::{Calibration, Developer, Size};
@@ -162,7 +162,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
-    let reach = Reach::new(address, certificates);
+    let address = ServerAddress::new(address, certificates);
     let app = Arc::new(App {
         accounts: Accounts::of_server(&store, Arc::clone(&clock), Cost::default()),
         clock,
@@ -180,7 +180,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         library,
         registry,
         keys: keys.clone(),
-        reach: reach.clone(),
+        address: address.clone(),
         equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
         tablets: OpenTablets::default(),
         tablet_trials: TabletTrials::default(),
@@ -193,7 +193,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let server = tokio::spawn(http::run(listener, app, settings));
 
     let announcement =
-        announcement(&reach, &keys, &control.status.borrow(), &calibration, linked, std::io::stdout().is_terminal());
+        announcement(&address, &keys, &control.status.borrow(), &calibration, linked, std::io::stdout().is_terminal());
 
     // The server serves whether or not anyone reads the announcement.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
@@ -285,7 +285,7 @@ async fn open_store(
     registry: &Registry,
     clock: &dyn Clock,
 ) -> Result<Store, Failure> {
-    let run = store::Run {
+    let run = store::ServerRun {
         wall: clock.wall(),
         at: clock.now(),
         camera: arguments.camera.clone(),

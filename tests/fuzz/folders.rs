@@ -16,8 +16,8 @@ use parfocal_dashboard::tls::Certificates;
 use parfocal_devices::camera::calibration::tables;
 use parfocal_imaging::{Calibration, MosaicFrame};
 use parfocal_recording::{
-    Ended, FORMAT, Header, PatchRow, Recorder, Recording, Shot, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader,
-    ViewRecording, ViewWriter, Writer, of_session,
+    CapturedFrame, Ended, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, VIEW_FORMAT, VIEW_VERSION,
+    ViewHeader, ViewRecording, ViewWriter, Writer, of_session,
 };
 use parfocal_records::store::export::verify::verify;
 use tempfile::TempDir;
@@ -205,7 +205,7 @@ fn make_recording(folder: &Path) {
     let writer = Writer::create(&folder.join("recording"), header, (SIZE, SIZE), &calibration).unwrap();
     let recorder = Recorder::start(writer, Moment::default()).unwrap();
     for number in 0..3 {
-        recorder.intake().offer(Shot {
+        recorder.intake().offer(CapturedFrame {
             number,
             exposed_at: Moment::from_nanos(number * 20_000_000),
             exposure: Duration::from_millis(2),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use parfocal_autofocus::weights;
 use parfocal_base::FocalPower;
-use parfocal_devices::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
+use parfocal_devices::camera::recorded::{FORMAT, Header, PictureOrder, ScanFolder, ScanRecording, TakenPose, VERSION};
 use parfocal_imaging::{GrayImage, PatchArea};
 use parfocal_learning::evaluation::shard::{Shard, merge};
 use parfocal_learning::scans::recorded::{Kept, RecordedScan, evenly_spread};
@@ -157,15 +157,15 @@ fn make_scan(folder: &Path) {
         simulated: true,
         calibration: None,
         seed: 1,
-        order: Order::Random,
+        order: PictureOrder::Random,
         poses: 1,
         focal_powers: focal_powers.clone(),
     };
 
-    let mut recording = Recording::open(folder, &header).unwrap();
+    let mut recording = ScanRecording::open(folder, &header).unwrap();
     let images = focal_powers.iter().map(|&power| (power, picture(power))).collect();
     let patch = PatchArea::central(SIDE, SIDE, None).unwrap();
-    recording.store(&Shot { pose: 1, images, patch, optimum: FocalPower::MIDDLE, truth: None }).unwrap();
+    recording.store(&TakenPose { pose: 1, images, patch, optimum: FocalPower::MIDDLE, truth: None }).unwrap();
 }
 
 /// The pictures of one pose, named as `scan import` expects them.

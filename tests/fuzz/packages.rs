@@ -147,7 +147,7 @@ async fn make(data: &Path, out: &Path) {
     change(&trial, Change::Close).await;
     change(&trial, Change::Lock { despite_outstanding: true }).await;
     change(&trial, Change::Unblind).await;
-    export_study(&trial.recorder(), STUDY, true, out, Arc::new(|_| ())).await.unwrap();
+    export_study(&trial.access_log(), STUDY, true, out, Arc::new(|_| ())).await.unwrap();
     trial.store.close().await;
 }
 

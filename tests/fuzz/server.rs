@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal_dashboard::http::{self, Reach};
+use parfocal_dashboard::http::{self, ServerAddress};
 use parfocal_dashboard::tls::Certificates;
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
@@ -402,7 +402,7 @@ async fn serve(trial: &Trial, folder: &TempDir, shutdown: &watch::Receiver<bool>
 
     let [in_the_clear, with_tls] =
         [(addresses[0], None), (addresses[1], Some(certificates))].map(|(address, certificates)| {
-            app::app(trial, folder.path(), Reach::new(address, certificates), shutdown.clone())
+            app::app(trial, folder.path(), ServerAddress::new(address, certificates), shutdown.clone())
         });
     tokio::spawn(http::run(open, in_the_clear, None));
     tokio::spawn(http::run(encrypted, with_tls, Some(settings)));

@@ -9,7 +9,7 @@ use std::time::Duration;
 use parfocal_base::FocalPower;
 use parfocal_base::clock::{Clock, Moment, SystemClock};
 use parfocal_devices::lens;
-use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, Model, Order};
+use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, LensCommand, Model};
 use rustix::process::{Pid, Signal, kill_process};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{Connection, SqliteConnection};
@@ -37,7 +37,7 @@ fn a_reply_that_is_outstanding_does_not_keep_the_lens_under_current() {
         until("something is asked", || emulator.requests() > asked);
         drop(lens);
         assert_eq!(emulator.mode_and_current(), AT_REST, "in round {round}");
-        assert_eq!(emulator.orders().last(), Some(&Order::Current(0)));
+        assert_eq!(emulator.orders().last(), Some(&LensCommand::Current(0)));
     }
 }
 
@@ -70,7 +70,7 @@ fn replies_that_never_come_or_cannot_be_read_do_not_keep_it_under_current() {
 fn a_lens_that_is_refused_once_its_driver_answered_is_let_go() {
     let emulator = emulator(quick());
     assert!(refused(open(&emulator, "?min=12")).contains("5.00 to 10.00 dpt"));
-    assert!(emulator.orders().contains(&Order::FocalPowerMode));
+    assert!(emulator.orders().contains(&LensCommand::FocalPowerMode));
     assert_eq!(emulator.mode_and_current(), AT_REST);
 }
 
@@ -163,7 +163,7 @@ fn a_server_releases_the_lens_on_every_signal() {
         let data = tempfile::tempdir().unwrap();
         assert!(end(server(&emulator, data.path()), signal).success());
         assert_eq!(emulator.mode_and_current(), AT_REST, "{signal:?}");
-        assert_eq!(emulator.orders().last(), Some(&Order::Current(0)));
+        assert_eq!(emulator.orders().last(), Some(&LensCommand::Current(0)));
     }
 }
 
@@ -177,7 +177,7 @@ fn after_a_kill_the_next_start_begins_without_current() {
     let lens = open(&emulator, "").unwrap();
     assert_eq!(
         emulator.orders()[before..],
-        [Order::CurrentMode, Order::Current(0), Order::FocalPowerMode],
+        [LensCommand::CurrentMode, LensCommand::Current(0), LensCommand::FocalPowerMode],
         "then it is under control again"
     );
 
@@ -197,9 +197,9 @@ fn a_server_that_fails_with_its_loop_running_lets_the_lens_go() {
         .wait()
         .unwrap();
     assert_eq!(status.code(), Some(1));
-    assert!(emulator.orders()[before..].contains(&Order::FocalPowerMode), "it had come so far");
+    assert!(emulator.orders()[before..].contains(&LensCommand::FocalPowerMode), "it had come so far");
     assert_eq!(emulator.mode_and_current(), AT_REST);
-    assert_eq!(emulator.orders().last(), Some(&Order::Current(0)));
+    assert_eq!(emulator.orders().last(), Some(&LensCommand::Current(0)));
 }
 
 /// Adds a running session to the database that no version can read.

@@ -17,7 +17,7 @@ use parfocal_base::clock::{Clock, Moment, SystemClock};
 use parfocal_devices::camera::{self, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
 use parfocal_imaging::{Calibration, MosaicFrame};
-use parfocal_recording::{CALIBRATION, FORMAT, Header, PatchRow, Recorder, Recording, Shot, VERSION, Writer};
+use parfocal_recording::{CALIBRATION, CapturedFrame, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, Writer};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -123,7 +123,7 @@ fn made_up_by(folder: &TempDir, frames: usize, size: (usize, usize), calibration
     let recorder = Recorder::start(writer, Moment::from_nanos(1_000_000_000)).unwrap();
     for frame in 0..frames {
         let number = (frame + frame / 9) as u64;
-        recorder.intake().offer(Shot {
+        recorder.intake().offer(CapturedFrame {
             number: 100 + number,
             exposed_at: Moment::from_nanos(1_000_000_000 + number * 20_000_000),
             exposure: Duration::from_micros(2500),
@@ -333,7 +333,7 @@ fn what_does_not_fit_into_a_recorder_is_lost_and_counted() {
     let writer = Writer::create(&path, header(), (2048, 1088), &Calibration::default()).unwrap();
     let recorder = Recorder::start(writer, Moment::default()).unwrap();
 
-    let shot = |number| Shot {
+    let shot = |number| CapturedFrame {
         number,
         exposed_at: Moment::from_nanos(number),
         exposure: Duration::ZERO,
@@ -343,7 +343,7 @@ fn what_does_not_fit_into_a_recorder_is_lost_and_counted() {
         patch: PatchRow { corner: (240, 120), jumps: 0 },
         mosaic: Arc::new(MosaicFrame::new(2048, 1088, vec![number as u16; 2048 * 1088]).unwrap()),
     };
-    let shots: Vec<Shot> = (1..=100).map(shot).collect();
+    let shots: Vec<CapturedFrame> = (1..=100).map(shot).collect();
     let intake = recorder.intake();
     for shot in shots {
         intake.offer(shot);

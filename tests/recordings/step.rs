@@ -92,7 +92,7 @@ fn slope(folder: &TempDir) -> PathBuf {
     let level = |place: usize| (100 + place % SIZE.0 / 4) as u16;
     let mosaic = Arc::new(MosaicFrame::new(SIZE.0, SIZE.1, (0..SIZE.0 * SIZE.1).map(level).collect()).unwrap());
     for frame in 0..12u64 {
-        recorder.intake().offer(Shot {
+        recorder.intake().offer(CapturedFrame {
             number: frame,
             exposed_at: Moment::from_nanos(frame * 20_000_000),
             exposure: Duration::from_millis(2),

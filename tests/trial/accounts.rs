@@ -6,7 +6,7 @@ use std::time::Duration;
 use parfocal_records::accounts::{AccountError, Cost, Passphrase, Token};
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
-use parfocal_records::store::{Access, Recorder, verify_database};
+use parfocal_records::store::{Access, AccessLog, verify_database};
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole, Actor};
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
@@ -159,8 +159,8 @@ async fn a_session(trial: &mut Trial) -> parfocal_base::ids::SessionId {
     // An abort stops the lens first, and is recorded after that.
     let abort = Action::Abort { reason: "the light failed".to_owned() };
     trial.conductor.act(operator, session, abort).await.unwrap();
-    let recorder = Recorder::of_server(&trial.store, researcher, trial.clock.clone());
-    recorder.record(&Access::PathViewed(session)).await.unwrap();
+    let access_log = AccessLog::of_server(&trial.store, researcher, trial.clock.clone());
+    access_log.record(&Access::PathViewed(session)).await.unwrap();
     session
 }
 
@@ -177,7 +177,7 @@ async fn records_name_the_account_that_made_them_in_the_log_and_in_exports() {
     assert_eq!(by("Setting 1 started"), None, "the surgeon has no account");
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let actors = rows(&out, "actors");
     let told: Vec<_> = actors.iter().map(|row| [row["kind"].as_str(), row["display"].as_str()]).collect();
     assert_eq!(

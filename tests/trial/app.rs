@@ -6,7 +6,7 @@ use std::sync::Arc;
 use parfocal_base::clock::Clock;
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::http::keys::Keys;
-use parfocal_dashboard::http::{App, Equipment, Metrics, OpenTablets, Reach, TabletTrials};
+use parfocal_dashboard::http::{App, Equipment, Metrics, OpenTablets, ServerAddress, TabletTrials};
 use parfocal_imaging::{Calibration, Developer, Size};
 use parfocal_pipeline::live;
 use parfocal_records::store::Backups;
@@ -19,7 +19,7 @@ use super::fixture::Trial;
 
 /// The pages of `trial`, whose data are in `folder`, until `shutdown` turns true. Threads that wait for pictures end
 /// when the trial's `control.frames` is closed.
-pub fn app(trial: &Trial, folder: &Path, reach: Reach, shutdown: watch::Receiver<bool>) -> Arc<App> {
+pub fn app(trial: &Trial, folder: &Path, address: ServerAddress, shutdown: watch::Receiver<bool>) -> Arc<App> {
     let clock: Arc<dyn Clock> = trial.clock.clone();
     let control = trial.control.clone();
     let calibration = Arc::new(Calibration::default());
@@ -59,7 +59,7 @@ pub fn app(trial: &Trial, folder: &Path, reach: Reach, shutdown: watch::Receiver
         library: trial.library.clone(),
         registry: parfocal_autofocus::Registry::standard(),
         keys: Keys::load_or_create(folder).unwrap(),
-        reach,
+        address,
         equipment: Equipment::new(None, calibration, None),
         tablets: OpenTablets::default(),
         tablet_trials: TabletTrials::default(),

@@ -27,8 +27,8 @@ async fn a_database(folder: &Path) -> (SessionId, Head) {
         let event = DeviceEvent { wall: trial.clock.wall(), at, device: "camera".to_owned(), working: false, message };
         trial.store.device_event(&event).await.unwrap();
     }
-    trial.recorder().record(&Access::Entered).await.unwrap();
-    trial.recorder().record(&Access::PathViewed(session)).await.unwrap();
+    trial.access_log().record(&Access::Entered).await.unwrap();
+    trial.access_log().record(&Access::PathViewed(session)).await.unwrap();
     trial.unblind(session).await;
     let head = trial.store.reader().head().await.unwrap();
     trial.store.close().await;
@@ -244,7 +244,7 @@ async fn whatever_is_changed_in_an_export_is_found_and_named() {
     let mut trial = Trial::start(folder.path()).await;
     let other = trial.whole_session("practice").await;
     let out = folder.path().join("export");
-    let summary = export(&trial.recorder(), session, &out, true).await.unwrap();
+    let summary = export(&trial.access_log(), session, &out, true).await.unwrap();
 
     let head: Head = summary.head.parse().unwrap();
     assert_eq!(failed(&verify(&out, Some(&head))), [""; 0]);
@@ -333,7 +333,7 @@ async fn another_program_computes_the_same_chain_from_the_document_alone() {
 
     for (session, unblinded, withheld) in [(session, false, 8), (session, true, 1), (formulas, false, 1)] {
         let out = folder.path().join(format!("{session}-{unblinded}"));
-        let summary = export(&trial.recorder(), session, &out, unblinded).await.unwrap();
+        let summary = export(&trial.access_log(), session, &out, unblinded).await.unwrap();
         assert_eq!(failed(&verify(&out, None)), [""; 0]);
         let found = recomputed(&out).unwrap();
         assert!(found["head"].as_str().unwrap().starts_with(&summary.head), "{found} {}", summary.head);
@@ -484,9 +484,9 @@ async fn a_database_is_looked_at_whatever_its_version() {
 async fn who_looks_is_recorded_and_stands_in_the_export() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(folder.path()).await;
-    trial.recorder().record(&Access::PathViewed(session)).await.unwrap();
+    trial.access_log().record(&Access::PathViewed(session)).await.unwrap();
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let rows = crate::exports::rows(&out, "accesses");
     let told: Vec<_> =
         rows.iter().map(|row| (row["role"].as_str(), row["kind"].as_str(), row["detail"].as_str())).collect();

@@ -50,7 +50,7 @@ async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
     assert_eq!(trial.view().phase, Phase::Notice);
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     let told = rows(&out, "consents");
     let [row] = told.as_slice() else { panic!("{told:?}") };
@@ -71,13 +71,13 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_listed_and_the_cha
     let (mut trial, session) = with_session(folder.path()).await;
     trial.unblind(session).await;
     let before = folder.path().join("before");
-    export(&trial.recorder(), session, &before, true).await.unwrap();
+    export(&trial.access_log(), session, &before, true).await.unwrap();
 
     trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
     trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
     for unblinded in [false, true] {
         let out = folder.path().join("after");
-        let refused = export(&trial.recorder(), session, &out, unblinded).await.unwrap_err();
+        let refused = export(&trial.access_log(), session, &out, unblinded).await.unwrap_err();
         assert!(matches!(&refused, ExportError::Withdrawn { by: "researcher", .. }), "{refused}");
         assert!(!out.exists());
     }
@@ -91,7 +91,7 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_listed_and_the_cha
     // The export of a later session with the same protocol mentions the withdrawal. With another protocol it does not.
     let later = trial.whole_session("paper").await;
     let out = folder.path().join("later");
-    export(&trial.recorder(), later, &out, false).await.unwrap();
+    export(&trial.access_log(), later, &out, false).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     let told = rows(&out, "withdrawals");
     let [row] = told.as_slice() else { panic!("{told:?}") };
@@ -104,7 +104,7 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_listed_and_the_cha
     }
     let practice = trial.whole_session("practice").await;
     let out = folder.path().join("practice");
-    export(&trial.recorder(), practice, &out, false).await.unwrap();
+    export(&trial.access_log(), practice, &out, false).await.unwrap();
     assert_eq!(rows(&out, "withdrawals").len(), 0);
 
     let checks = verify_database(folder.path(), None).await.unwrap();

@@ -46,7 +46,7 @@ async fn originals(trial: &Trial, session: SessionId) -> String {
 }
 
 async fn export_of(trial: &Trial, session: SessionId, out: &Path) {
-    export(&trial.recorder(), session, out, false).await.unwrap();
+    export(&trial.access_log(), session, out, false).await.unwrap();
     let checks = verify(out, None);
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
 }

@@ -106,7 +106,7 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     assert!(detail.log.iter().any(|line| line.text == "Words of a comment erased: names a patient"));
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     assert_eq!(holding(&out, "Mustermann"), NOWHERE);
     let row = rows(&out, "comments").into_iter().find(|row| row["key"] == comment.key.to_string()).unwrap();
@@ -201,7 +201,7 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     assert!(log.iter().any(|line| line.text == "Reason of an event erased: names a patient"), "{log:?}");
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     let erased: Vec<String> =
         rows(&out, "erasures").into_iter().map(|mut row| row.remove("subject").unwrap()).collect();

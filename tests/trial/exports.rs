@@ -11,7 +11,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_base::step::{Hold, StepRecord};
 use parfocal_records::store::export::verify::{Check, Verdict, verify};
 use parfocal_records::store::export::{Export, ExportError, ZipStream, export};
-use parfocal_records::store::{DeviceEvent, Reader, Recorder, telemetry};
+use parfocal_records::store::{AccessLog, DeviceEvent, Reader, telemetry};
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
 use serde_json::Value;
@@ -67,7 +67,7 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    let summary = export(&trial.recorder(), session, &out, false).await.unwrap();
+    let summary = export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
 
     // The blur rate of the optics that the policies were given.
@@ -123,7 +123,7 @@ async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
     drop(sender);
     writer.await.unwrap();
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let held: Vec<_> = rows(&out, "telemetry").iter().map(|row| row["held"] == "true").collect();
     assert_eq!(held, [false, false, false, false, false, true, true, true]);
 }
@@ -134,7 +134,7 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
 
     let sums = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
     let listed: BTreeMap<&str, &str> =
@@ -165,15 +165,15 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
 async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
-    let refused = export(&trial.recorder(), session, &data.path().join("early"), true).await.unwrap_err();
+    let refused = export(&trial.access_log(), session, &data.path().join("early"), true).await.unwrap_err();
     assert!(matches!(refused, ExportError::StillBlinded(_)), "{refused}");
     assert!(!data.path().join("early").exists());
 
     trial.unblind(session).await;
     let blinded = data.path().join("blinded");
     let unblinded = data.path().join("unblinded");
-    export(&trial.recorder(), session, &blinded, false).await.unwrap();
-    export(&trial.recorder(), session, &unblinded, true).await.unwrap();
+    export(&trial.access_log(), session, &blinded, false).await.unwrap();
+    export(&trial.access_log(), session, &unblinded, true).await.unwrap();
     let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
     assert_eq!(more, ["allocation.csv", "allocation.json", "chain_salts.csv", "policy_steps.csv", "weights.csv"]);
     for file in files(&blinded).iter().filter(|file| !tells_of_the_export(file)) {
@@ -199,14 +199,14 @@ async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     // As the command exports while the server runs.
-    let recorder = Recorder::open(data.path(), trial.clock.clone()).await.unwrap();
+    let access_log = AccessLog::open(data.path(), trial.clock.clone()).await.unwrap();
     let out = data.path().join("a/new/export");
-    export(&recorder, session, &out, false).await.unwrap();
-    let again = export(&recorder, session, &out, false).await.unwrap_err();
+    export(&access_log, session, &out, false).await.unwrap();
+    let again = export(&access_log, session, &out, false).await.unwrap_err();
     assert!(matches!(again, ExportError::Exists(_)), "{again}");
     assert_eq!(files(&data.path().join("a/new")).len(), 1, "nothing half-written is left beside it");
     let nobody = "00000000-0000-4000-8000-000000000000".parse().unwrap();
-    let unknown = export(&recorder, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
+    let unknown = export(&access_log, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
     assert!(unknown.contains(&session.to_string()), "{unknown}");
     drop(trial);
 }
@@ -226,9 +226,9 @@ async fn an_export_of_a_session_under_way_is_of_one_moment() {
     assert_eq!(snapshot.events(session).await.unwrap().len(), 5, "created, started, three of the first setting");
     let one = data.path().join("one");
     let other = data.path().join("other");
-    export(&trial.recorder(), session, &one, false).await.unwrap();
+    export(&trial.access_log(), session, &one, false).await.unwrap();
     assert_eq!(rows(&one, "comments").len(), 3, "each export takes a moment of its own");
-    export(&trial.recorder(), session, &other, false).await.unwrap();
+    export(&trial.access_log(), session, &other, false).await.unwrap();
     assert_eq!(failed(&verify(&other, None)), [""; 0]);
 }
 
@@ -237,9 +237,9 @@ async fn the_pages_zip_is_the_commands_folder() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let (zip, bytes) = ZipStream::new(format!("parfocal-{session}"));
-    let prepared = Export::prepare(&trial.recorder(), session, false).await.unwrap();
+    let prepared = Export::prepare(&trial.access_log(), session, false).await.unwrap();
     let (written, bytes) = tokio::join!(prepared.into_zip(zip), bytes.try_collect::<Vec<_>>());
     written.unwrap();
     let archive = bytes.unwrap().concat();
@@ -262,7 +262,7 @@ async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
         trial.say(text).await;
     }
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
 
     let cells: Vec<_> = rows(&out, "comments").into_iter().map(|row| row["text"].clone()).collect();
     let expected = ["'=1+1", "'-3 dioptres too far", "'@once", "'\t=tab", "''=quoted", "sharp = good", "'quoted'"];
@@ -290,7 +290,7 @@ async fn an_emergency_unblinding_is_flagged_in_the_export() {
     trial.unblind(session).await;
     trial.conductor.act(Role::Operator, session, Action::Abort { reason: "adverse event".to_owned() }).await.unwrap();
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let row = &rows(&out, "sessions")[0];
     assert_eq!((row["unblinded"].as_str(), row["status"].as_str()), ("while-under-way", "aborted"));
     assert_eq!(json(&out, "datapackage.json")["parfocal"]["unblinded"], "while-under-way");
@@ -331,7 +331,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     assert_eq!(log, expected);
 
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let devices = rows(&out, "devices");
     let devices: Vec<_> = devices.iter().map(|row| (row["working"].as_str(), row["message"].as_str())).collect();
     let expected = [

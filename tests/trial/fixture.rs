@@ -14,7 +14,7 @@ use parfocal_devices::lens::LensHealth;
 use parfocal_imaging::ContentArea;
 use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, PictureGeometry, Tap};
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
-use parfocal_records::store::{Recorder, Run, Store};
+use parfocal_records::store::{AccessLog, ServerRun, Store};
 use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
 use parfocal_session::reports::Reports;
 use parfocal_trial::account::{Account, AccountName, AccountRole};
@@ -50,8 +50,8 @@ pub struct Trial {
     keys: ChaCha12Rng,
 }
 
-pub fn a_run(clock: &ManualClock) -> Run {
-    Run {
+pub fn a_run(clock: &ManualClock) -> ServerRun {
+    ServerRun {
         wall: clock.wall(),
         at: clock.now(),
         camera: "phantom".into(),
@@ -124,9 +124,9 @@ impl Trial {
         self.accounts().add(AccountName::new(name).unwrap(), display, role, passphrase, None).await.unwrap()
     }
 
-    /// The recorder with which the researcher's page exports.
-    pub fn recorder(&self) -> Recorder {
-        Recorder::of_server(&self.store, Role::Researcher.into(), self.clock.clone())
+    /// The access log with which the researcher's page exports.
+    pub fn access_log(&self) -> AccessLog {
+        AccessLog::of_server(&self.store, Role::Researcher.into(), self.clock.clone())
     }
 
     pub fn view(&self) -> SurgeonView {
@@ -277,7 +277,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         telemetry_dropped: 0,
         latency_p50_micros: 0,
         latency_p99_micros: 0,
-        priority: parfocal_base::priority::Standing::Ordinary,
+        priority: parfocal_base::priority::Scheduling::Ordinary,
         lock: parfocal_pipeline::control::FocusLock::default(),
         following: parfocal_pipeline::control::Following::default(),
         // A circle of radius 100 in a picture of 512 x 272 cells.

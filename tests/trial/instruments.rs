@@ -95,7 +95,7 @@ async fn every_instrument_is_answered_and_scored() {
     trial.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
     assert_eq!(trial.view().answers["workload"], points(&[0, 21, 21, 21, 21, 21]));
     let half = folder.path().join("half");
-    export(&trial.recorder(), session, &half, false).await.unwrap();
+    export(&trial.access_log(), session, &half, false).await.unwrap();
     let told = scores(&half);
     let of =
         |setting: &str, measure: &str| told[&("workload".to_owned(), setting.to_owned(), measure.to_owned())].clone();
@@ -117,7 +117,7 @@ async fn every_instrument_is_answered_and_scored() {
     trial.surgeon(Action::FinishQuestions { segment: None }).await;
 
     let out = folder.path().join("out");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     let told = scores(&out);
     let of = |question: &str, setting: &str, measure: &str| {

@@ -94,7 +94,7 @@ async fn the_latest_answer_counts_and_devices_that_disagree_are_reported() {
     assert!((aside.seconds - 20.0).abs() < 1e-9, "it stands where it was given: {aside:?}");
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let answers = rows(&out, "answers");
     let told: Vec<_> = answers
         .iter()
@@ -175,7 +175,7 @@ async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arr
     assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);
 
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let column = |table: &str, name: &str| rows(&out, table).iter().map(|row| row[name].clone()).collect::<Vec<_>>();
     assert_eq!(column("answers", "value"), ["3", "5", "1"]);
     assert_eq!(column("answers", "counts"), ["false", "true", "false"]);

@@ -1,6 +1,6 @@
 //! The figures that are computed from the telemetry of each setting, compared with values computed by hand.
 
-use parfocal_records::store::Motion;
+use parfocal_records::store::LensMotion;
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
 use sqlx::SqlitePool;
@@ -46,7 +46,7 @@ async fn insert(pool: &SqlitePool, segment: i64, frames: &[Frame]) {
     }
 }
 
-fn assert_is(found: &Motion, expected: Motion) {
+fn assert_is(found: &LensMotion, expected: LensMotion) {
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
     assert!(
         near(found.seconds, expected.seconds)
@@ -54,7 +54,7 @@ fn assert_is(found: &Motion, expected: Motion) {
             && near(found.error, expected.error),
         "{found:?} instead of {expected:?}"
     );
-    let counts = |motion: &Motion| (motion.setting, motion.frames, motion.turns, motion.known, motion.in_focus);
+    let counts = |motion: &LensMotion| (motion.setting, motion.frames, motion.turns, motion.known, motion.in_focus);
     assert_eq!(counts(found), counts(&expected));
 }
 
@@ -102,11 +102,11 @@ async fn figures_of_a_setting_are_those_by_hand_and_leave_out_pauses_and_restart
         assert_eq!(trial.store.reader().motions_of_ended(session).await.unwrap(), found);
     }
     let expected =
-        Motion { setting: 1, frames: 7, seconds: 0.24, travel: 0.7, turns: 2, known: 3, error: 0.3, in_focus: 2 };
+        LensMotion { setting: 1, frames: 7, seconds: 0.24, travel: 0.7, turns: 2, known: 3, error: 0.3, in_focus: 2 };
     assert_is(&found[0], expected);
     // Movements of the policy: 0.2 to 0.3, 0.4 to 0.5, 0.8 to 0.7 to 0.6. That is one turn. Each takes 40 ms, except
     // the last, which is a gap.
     let expected =
-        Motion { setting: 2, frames: 7, seconds: 0.12, travel: 0.4, turns: 1, known: 0, error: 0.0, in_focus: 0 };
+        LensMotion { setting: 2, frames: 7, seconds: 0.12, travel: 0.4, turns: 1, known: 0, error: 0.0, in_focus: 0 };
     assert_is(&found[1], expected);
 }

@@ -97,7 +97,7 @@ async fn a_touch_moves_the_patch_at_once_and_is_recorded_with_place_and_frame() 
     assert_eq!(aims(&mut trial), [aim(PatchPlace::nearest(1.0, 0.0), 4)]);
 
     let out = folder.path().join("out");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let checks = verify(&out, None);
     assert!(checks.iter().all(|check| !matches!(check.verdict, Verdict::Failed(_))), "{checks:#?}");
     let row = &rows(&out, "events")[3];

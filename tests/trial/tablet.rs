@@ -184,7 +184,7 @@ async fn an_export_tells_what_size_of_picture_the_surgeon_saw_and_how_many() {
     trial.conductor.act(Role::Operator, session, why).await.unwrap();
 
     let out = folder.path().join("out");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let checks = verify(&out, None);
     assert!(checks.iter().all(|check| !matches!(check.verdict, Verdict::Failed(_))), "{checks:#?}");
 

@@ -15,7 +15,7 @@ async fn an_export_is_verified_and_changes_in_it_are_found() {
     trial.unblind(session).await;
 
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
 
     let checks = verify(&out, None);
     assert!(checks.iter().all(|check| matches!(check.verdict, Verdict::Passed(_))), "{checks:#?}");
@@ -76,7 +76,7 @@ async fn forgeries_are_found_even_with_new_checksums() {
     trial.unblind(session).await;
 
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
 
     let kept: Vec<_> = std::fs::read_dir(&out)
         .unwrap()
@@ -162,7 +162,7 @@ async fn a_blinded_export_is_verified_as_far_as_it_can_be() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     let checks = verify(&out, None);
     assert_eq!(failed(&checks), [""; 0]);
     let open: Vec<_> = checks.iter().filter(|check| matches!(check.verdict, Verdict::NotChecked(_))).collect();

@@ -248,7 +248,7 @@ async fn an_export_has_each_recording_as_a_file_and_a_changed_one_is_found() {
     trial.conductor.correct(Role::Researcher, session, typed).await.unwrap();
 
     let out = folder.path().join("export");
-    let summary = export(&trial.recorder(), session, &out, false).await.unwrap();
+    let summary = export(&trial.access_log(), session, &out, false).await.unwrap();
     let file = format!("voice/{comment}.webm");
     assert!(summary.files.contains(&file), "{:?}", summary.files);
     let whole = [sound(1), sound(2), sound(3)].concat();
@@ -333,7 +333,7 @@ async fn an_erased_recording_is_nowhere_in_the_files_and_its_hashes_stay() {
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
     assert_eq!(said(&checks, "voice").unwrap(), "0 pieces of recordings are as they were sent; 5 were erased");
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, false).await.unwrap();
+    export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     let row = &rows(&out, "voice")[0];
     assert_eq!((row["file"].as_str(), row["sha256"].as_str(), row["pieces"].as_str()), ("", "", "5"));

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor, nn};
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
 use super::sharpness_memory::SharpnessMemory;
-use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
+use super::spectrum::{FEATURES, PatchTransform, SHARPNESS, features, spectrum};
 use super::weights::{self, WeightsError};
 use super::{Decision, FieldOfView, Observation, Policy};
 use parfocal_base::BlurRate;
@@ -93,7 +93,7 @@ struct Frame {
 #[derive(Debug, Clone)]
 struct Look {
     patch: Patch,
-    spectrum: Spectrum,
+    spectrum: PatchTransform,
     features: [f32; FEATURES],
 }
 

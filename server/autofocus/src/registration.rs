@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 
 use multiversion::multiversion;
 
-use super::spectrum::Spectrum;
+use super::spectrum::PatchTransform;
 use parfocal_imaging::{PATCH_SIDE, Patch};
 
 /// Length of the result of [`changes`]: log ratios of energy at [`LAGS`], the correlation, and the overlap.
@@ -33,7 +33,7 @@ type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];
 /// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive if sharper now; then the
 /// correlation of the patches in their overlap, and the overlap's share of a patch. Each is of the order of 1.
 #[must_use]
-pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; CHANGES] {
+pub fn changes(before: (&Patch, &PatchTransform), now: (&Patch, &PatchTransform)) -> [f32; CHANGES] {
     let (dx, dy) = displacement(before.1, now.1);
     let moved = shifted(before.0, dx, dy);
     let still: Square = std::array::from_fn(|y| std::array::from_fn(|x| now.0.0[y * PATCH_SIDE + x]));
@@ -62,7 +62,7 @@ pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; C
 /// The displacement `(x, y)` in whole pixels: `now` at a place shows what `before` shows at that place plus the
 /// displacement. It is the peak of their phase correlation (Kuglin and Hines 1975). Blur hardly moves the peak, since
 /// it reduces the amplitude of each frequency and leaves its phase.
-pub(super) fn displacement(before: &Spectrum, now: &Spectrum) -> (isize, isize) {
+pub(super) fn displacement(before: &PatchTransform, now: &PatchTransform) -> (isize, isize) {
     let map = correlate(before, now, &WAVES);
     let mut best = f32::NEG_INFINITY;
     let mut place = (0, 0);
@@ -94,7 +94,7 @@ static WAVES: LazyLock<Waves> = LazyLock::new(|| {
 });
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn correlate(before: &Spectrum, now: &Spectrum, waves: &Waves) -> Square {
+fn correlate(before: &PatchTransform, now: &PatchTransform, waves: &Waves) -> Square {
     let mut map = [[0.0f32; PATCH_SIDE]; PATCH_SIDE];
     for ky in (0..=FINEST).chain(PATCH_SIDE - FINEST..PATCH_SIDE) {
         let mut real = [0.0f32; PATCH_SIDE];

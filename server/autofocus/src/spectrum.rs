@@ -34,7 +34,7 @@ type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
 /// The Fourier transform of a patch, less its mean, under a Hann window. Rows are frequencies 0..=31 down the patch;
 /// the first 17 columns are frequencies 0..=16 along it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spectrum {
+pub struct PatchTransform {
     /// Real parts.
     pub real: Matrix,
     /// Imaginary parts.
@@ -101,7 +101,7 @@ fn band(ky: usize, kx: usize) -> usize {
 
 /// A patch's features, each of the order of 1.
 #[must_use]
-pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
+pub fn features(patch: &Patch, spectrum: &PatchTransform) -> [f32; FEATURES] {
     let energy = &spectrum.energy;
     let mut out = [0.0; FEATURES];
 
@@ -116,7 +116,7 @@ pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
     out
 }
 
-impl Spectrum {
+impl PatchTransform {
     /// Standard deviation of the patch, in gray levels.
     #[must_use]
     pub fn contrast(&self) -> f32 {
@@ -136,7 +136,7 @@ impl Spectrum {
 
 /// Computes the transform of a patch.
 #[must_use]
-pub fn spectrum(patch: &Patch) -> Spectrum {
+pub fn spectrum(patch: &Patch) -> PatchTransform {
     let mean = column_sums(patch, |value| value).iter().sum::<f32>() / patch.0.len() as f32;
     let variance = column_sums(patch, |value| (value - mean).powi(2)).iter().sum::<f32>() / patch.0.len() as f32;
 
@@ -159,7 +159,7 @@ fn column_sums(patch: &Patch, term: impl Fn(f32) -> f32) -> [f32; PATCH_SIDE] {
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables) -> Spectrum {
+fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables) -> PatchTransform {
     let mut real = [[0.0f32; COLUMNS]; PATCH_SIDE];
     let mut imaginary = [[0.0f32; COLUMNS]; PATCH_SIDE];
     for (row, line) in patch.chunks_exact(PATCH_SIDE).enumerate() {
@@ -173,7 +173,7 @@ fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables)
     }
 
     let blank = [[0.0; COLUMNS]; PATCH_SIDE];
-    let mut out = Spectrum { real: blank, imaginary: blank, mean, variance: 0.0, energy: [0.0; BANDS] };
+    let mut out = PatchTransform { real: blank, imaginary: blank, mean, variance: 0.0, energy: [0.0; BANDS] };
 
     for ky in 0..PATCH_SIDE {
         let re = &mut out.real[ky];
@@ -191,7 +191,7 @@ fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables)
     out
 }
 
-fn band_energies(spectrum: &Spectrum) -> [f32; BANDS] {
+fn band_energies(spectrum: &PatchTransform) -> [f32; BANDS] {
     // The last entry collects the energy that belongs to no band.
     let mut energy = [0.0f32; BANDS + 1];
     for (ky, bands) in TABLES.band.iter().enumerate() {

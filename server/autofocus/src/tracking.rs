@@ -1,6 +1,6 @@
 //! Follows a place of the tissue from frame to frame, by registering its surroundings with those of an earlier frame.
 
-use crate::bisection::motion::Spectrum;
+use crate::bisection::motion::ViewTransform;
 use parfocal_imaging::Surroundings;
 
 /// A peak of the phase correlation that stands out less shows nothing. Unrelated pictures reach 5.
@@ -32,7 +32,7 @@ pub enum Tracked {
 
 /// An earlier frame.
 struct Reference {
-    spectrum: Spectrum,
+    spectrum: ViewTransform,
     /// The corner of its surroundings in the picture.
     window: Corner,
     /// The corner of the patch that is followed.
@@ -53,7 +53,7 @@ impl Tracker {
     pub fn see(&mut self, around: &Surroundings, corner: (usize, usize)) -> Tracked {
         let patch = signed(corner);
         let window = minus(patch, signed(around.patch));
-        let spectrum = Spectrum::of(&around.levels);
+        let spectrum = ViewTransform::of(&around.levels);
 
         let Some(reference) = &mut self.reference else {
             self.reference = Some(Reference { spectrum, window, patch, frames: 0 });

@@ -37,7 +37,7 @@ pub enum ThreadRole {
 /// A thread's priority compared with other programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Standing {
+pub enum Scheduling {
     /// Before everything that is not real-time.
     RealTime,
     /// Slightly preferred, as the system allows no more.
@@ -48,7 +48,7 @@ pub enum Standing {
     Withdrawn,
 }
 
-impl Standing {
+impl Scheduling {
     /// The consequence for the focus and, if it could be better, what to do.
     #[must_use]
     pub const fn words(self) -> &'static str {
@@ -92,16 +92,16 @@ static WITHDRAWN: AtomicBool = AtomicBool::new(false);
 /// `rtprio` limit), otherwise to a lower niceness (root, or a raised limit). Threads that it starts do not
 /// inherit the real-time priority.
 #[allow(clippy::must_use_candidate, reason = "only the loop reads the result")]
-pub fn raise(role: ThreadRole) -> Standing {
+pub fn raise(role: ThreadRole) -> Scheduling {
     if withdrawn() {
-        return Standing::Withdrawn;
+        return Scheduling::Withdrawn;
     }
 
     if set(None, libc::SCHED_FIFO | ALONE, role as i32) {
-        return Standing::RealTime;
+        return Scheduling::RealTime;
     }
 
-    if nice(PREFERRED) { Standing::Preferred } else { Standing::Ordinary }
+    if nice(PREFERRED) { Scheduling::Preferred } else { Scheduling::Ordinary }
 }
 
 /// Like [`raise`], but threads that the calling one starts inherit the priority. For a library's own threads, whose

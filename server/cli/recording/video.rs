@@ -55,15 +55,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
     let frames = chosen(arguments, &recording)?;
-    let mut studio = Studio { developer: Developer::new(&calibration), size: arguments.size };
+    let mut developer = SizedDeveloper { developer: Developer::new(&calibration), size: arguments.size };
 
     if let Some(format) = format {
         let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
-            save_video(&Video { file, format }, &recording, &frames, &mut studio)
+            save_video(&Video { file, format }, &recording, &frames, &mut developer)
         });
         made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
     } else {
-        save_pictures(arguments, &recording, &frames, &mut studio)?;
+        save_pictures(arguments, &recording, &frames, &mut developer)?;
     }
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
 }
@@ -117,12 +117,12 @@ fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Fa
 }
 
 /// Develops mosaics into pictures for people.
-struct Studio {
+struct SizedDeveloper {
     developer: Developer,
     size: Size,
 }
 
-impl Studio {
+impl SizedDeveloper {
     fn develop(&mut self, mosaic: &MosaicFrame, picture: &mut RgbImage) {
         self.developer.develop(mosaic, self.size, picture, &mut GrayImage::default());
     }
@@ -135,7 +135,12 @@ struct Video<'a> {
 }
 
 /// Pipes the frames into `ffmpeg`, each repeated for as long as it was the latest.
-fn save_video(video: &Video, recording: &Recording, frames: &[usize], studio: &mut Studio) -> Result<(), Failure> {
+fn save_video(
+    video: &Video,
+    recording: &Recording,
+    frames: &[usize],
+    developer: &mut SizedDeveloper,
+) -> Result<(), Failure> {
     let fps = recording.rate().map_or(25.0, |rate| rate.round().clamp(1.0, 1000.0));
     let rows = recording.rows();
     let start = rows[frames[0]].time;
@@ -151,7 +156,7 @@ fn save_video(video: &Video, recording: &Recording, frames: &[usize], studio: &m
             continue;
         }
 
-        studio.develop(&recording.frame(frame)?, &mut picture);
+        developer.develop(&recording.frame(frame)?, &mut picture);
         if encoder.is_none() {
             encoder = Some(Encoder(start_encoder(video, fps, &picture)?));
         }
@@ -211,7 +216,7 @@ fn save_pictures(
     arguments: &Arguments,
     recording: &Recording,
     frames: &[usize],
-    studio: &mut Studio,
+    developer: &mut SizedDeveloper,
 ) -> Result<(), Failure> {
     let out = &arguments.out;
     fs::create_dir(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
@@ -222,7 +227,7 @@ fn save_pictures(
         let mut bytes = Cursor::new(Vec::new());
         let (ending, written) = match arguments.pictures {
             Pictures::Png => {
-                studio.develop(&mosaic, &mut picture);
+                developer.develop(&mosaic, &mut picture);
                 let (width, height) = (picture.width as u32, picture.height as u32);
                 let image = ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, picture.data.as_slice());
                 ("png", image.map(|image| image.write_to(&mut bytes, ImageFormat::Png)))

@@ -13,7 +13,7 @@ use parfocal_learning::scans::benchmark::SEED;
 use parfocal_learning::scans::recording::{Cut, from_stack};
 use parfocal_learning::scans::stack::FocalStack;
 use parfocal_learning::scans::stack::check::check;
-use parfocal_learning::scans::stack::optics::Optics;
+use parfocal_learning::scans::stack::optics::StackOptics;
 
 /// Default number of poses: 20 s at 25 per second.
 const POSES: usize = 500;
@@ -89,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!(
         "{taken} pictures of {width}x{height} pixels\n\
          {}{} of {} planes in {out}; check them with `parfocal scan info {out}`\n",
-        info::optics(&Optics::of(&stack), "position"),
+        info::optics(&StackOptics::of(&stack), "position"),
         poses(cut.poses),
         cut.planes,
     ))

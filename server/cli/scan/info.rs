@@ -10,7 +10,7 @@ use crate::cli::output::{Failure, bar, print};
 use parfocal_base::files::replace;
 use parfocal_base::plot::{Axis, Plot};
 use parfocal_devices::camera::recorded::{Damage, Image, ScanFolder, poses};
-use parfocal_learning::scans::stack::optics::Optics;
+use parfocal_learning::scans::stack::optics::StackOptics;
 use parfocal_learning::scans::stack::{FocalStack, Plane};
 
 /// Most poses whose focus curves are used.
@@ -46,7 +46,7 @@ struct Info {
     bytes: u64,
     optimum: Optimum,
     /// Figures of the optic; `None` if the poses have too few focal powers or pictures are damaged.
-    optics: Option<Optics>,
+    optics: Option<StackOptics>,
     deviation: Option<Deviation>,
     missing: Vec<usize>,
     damaged: Vec<String>,
@@ -205,7 +205,7 @@ fn table(rows: &[(&str, String)]) -> String {
 }
 
 /// An optic's figures, one per line; `unit` names the unit of the pictures' positions.
-pub(super) fn optics(optics: &Optics, unit: &str) -> String {
+pub(super) fn optics(optics: &StackOptics, unit: &str) -> String {
     let mut rows = Vec::new();
     if let Some(blur) = optics.blur_per_unit {
         rows.push(("blur", format!("grows by {blur:.3} pixels per unit of {unit}")));
@@ -233,7 +233,7 @@ fn bars(curve: &[f64]) -> String {
 }
 
 /// The optic's figures, measured on some of the poses.
-fn optics_of(scan: &ScanFolder) -> Option<Optics> {
+fn optics_of(scan: &ScanFolder) -> Option<StackOptics> {
     let poses: Vec<_> = scan.poses().values().collect();
     let shown = poses.iter().step_by(poses.len().div_ceil(SHOWN).max(1));
     let stacks = shown.filter_map(|pose| {
@@ -245,8 +245,8 @@ fn optics_of(scan: &ScanFolder) -> Option<Optics> {
         FocalStack::new(pose.images.iter().map(plane).collect::<Option<_>>()?).ok()
     });
 
-    let found: Vec<Optics> = stacks.map(|stack| Optics::of(&stack)).collect();
-    (!found.is_empty()).then(|| Optics::together(found))
+    let found: Vec<StackOptics> = stacks.map(|stack| StackOptics::of(&stack)).collect();
+    (!found.is_empty()).then(|| StackOptics::together(found))
 }
 
 /// Plots the optimum over the poses in black, and the truth behind it if it is known.

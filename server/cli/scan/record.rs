@@ -13,7 +13,7 @@ use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, bar, poses, print};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
+use parfocal_devices::camera::recorded::{FORMAT, Header, MOST_POSES, PictureOrder, ScanRecording, VERSION};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
 use parfocal_devices::simulation::phantom::Trajectory;
@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(lens) => devices(arguments, lens, &interrupt, &progress),
     }?;
 
-    let mut recording = Recording::open(&arguments.out, &header)?;
+    let mut recording = ScanRecording::open(&arguments.out, &header)?;
     progress.set_position(recording.folder().poses().len() as u64);
     progress.reset_eta();
 
@@ -147,7 +147,7 @@ fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: 
         simulated,
         calibration: None,
         seed: arguments.seed,
-        order: Order::Random,
+        order: PictureOrder::Random,
         poses: arguments.poses,
         focal_powers: evenly_spread(arguments.focal_powers),
     }

@@ -21,7 +21,7 @@ pub use error::{Damage, RecordingError};
 pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
 pub use layout::{SHARD_FRAMES, by_wavelength};
 pub use reading::Recording;
-pub use recorder::{Intake, Progress, Recorder, Shot, compressed_size};
+pub use recorder::{CapturedFrame, Intake, Progress, Recorder, compressed_size};
 pub use session::{AnyRecording, FoundRecording, Kind, belonging, of_session};
 pub use view::{VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewWriter};
 pub use view_reading::{ViewRecording, ViewRow};

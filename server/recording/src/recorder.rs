@@ -28,7 +28,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 
 /// A frame to record, and what is known about it.
 #[derive(Debug, Clone)]
-pub struct Shot {
+pub struct CapturedFrame {
     /// The camera's number of the frame.
     pub number: u64,
     /// End of its exposure.
@@ -47,7 +47,7 @@ pub struct Shot {
     pub mosaic: Arc<MosaicFrame>,
 }
 
-impl Shot {
+impl CapturedFrame {
     fn row(&self, start: Moment) -> FrameRow {
         let value = |power: Option<FocalPower>| power.map_or(f64::NAN, FocalPower::get);
         FrameRow {
@@ -65,20 +65,20 @@ impl Shot {
 /// Where frames are offered.
 #[derive(Debug)]
 pub struct Intake {
-    frames: SyncSender<Shot>,
+    frames: SyncSender<CapturedFrame>,
     lost: Arc<AtomicU64>,
 }
 
 impl Intake {
     /// An intake that holds up to `capacity` frames, and the receiver that gets them.
     #[must_use]
-    pub fn new(capacity: usize) -> (Arc<Self>, Receiver<Shot>) {
+    pub fn new(capacity: usize) -> (Arc<Self>, Receiver<CapturedFrame>) {
         let (frames, taken) = sync_channel(capacity);
         (Arc::new(Self { frames, lost: Arc::default() }), taken)
     }
 
     /// Offers a frame; returns at once. A frame that does not fit is lost and counted.
-    pub fn offer(&self, shot: Shot) {
+    pub fn offer(&self, shot: CapturedFrame) {
         if let Err(TrySendError::Full(_)) = self.frames.try_send(shot) {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
@@ -187,7 +187,7 @@ struct Compressor {
     coder: Coder,
     size: (usize, usize),
     start: Moment,
-    frames: Receiver<Shot>,
+    frames: Receiver<CapturedFrame>,
     compressed: SyncSender<Compressed>,
     stop: Arc<AtomicBool>,
 }
@@ -210,7 +210,7 @@ impl Compressor {
         }
     }
 
-    fn compress(&self, shot: &Shot) -> Compressed {
+    fn compress(&self, shot: &CapturedFrame) -> Compressed {
         let found = (shot.mosaic.width(), shot.mosaic.height());
         if found != self.size {
             return Err(RecordingError::OtherSize { of: self.size, found });

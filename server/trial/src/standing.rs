@@ -25,7 +25,7 @@ pub struct GivenAnswer {
 
 /// The standing of one of the answers to a question: its place among them, and whether it counts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
+pub struct AnswerStanding {
     /// Place of the answer in the order in which the answers were given, from 1.
     pub revision: usize,
     /// The combined answer after this one was given. For a late answer, only its own value.
@@ -38,12 +38,12 @@ pub struct Standing {
 
 /// The standing of each of `answers`. All must be answers to the same question, in the order of their arrival.
 #[must_use]
-pub fn standings(answers: &[GivenAnswer]) -> Vec<Standing> {
+pub fn standings(answers: &[GivenAnswer]) -> Vec<AnswerStanding> {
     let order = in_order(answers);
 
-    let mut standings: Vec<Standing> = answers
+    let mut standings: Vec<AnswerStanding> = answers
         .iter()
-        .map(|given| Standing { revision: 0, value: given.value.clone(), counts: false, disagrees: false })
+        .map(|given| AnswerStanding { revision: 0, value: given.value.clone(), counts: false, disagrees: false })
         .collect();
 
     let mut latest: Option<usize> = None;
@@ -68,7 +68,7 @@ pub fn standings(answers: &[GivenAnswer]) -> Vec<Standing> {
 
 /// The standing of each of `answers`. Each comes with its question; they are in the order of their arrival.
 #[must_use]
-pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) -> Vec<Standing> {
+pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) -> Vec<AnswerStanding> {
     let mut questions: BTreeMap<Q, (Vec<usize>, Vec<GivenAnswer>)> = BTreeMap::new();
     for (place, (question, given)) in answers.into_iter().enumerate() {
         let (places, all) = questions.entry(question).or_default();
@@ -77,7 +77,7 @@ pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) 
     }
 
     let of_question = |(places, all): (Vec<usize>, Vec<GivenAnswer>)| places.into_iter().zip(standings(&all));
-    let mut found: Vec<(usize, Standing)> = questions.into_values().flat_map(of_question).collect();
+    let mut found: Vec<(usize, AnswerStanding)> = questions.into_values().flat_map(of_question).collect();
     found.sort_by_key(|(place, _)| *place);
     found.into_iter().map(|(_, standing)| standing).collect()
 }

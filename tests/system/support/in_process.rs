@@ -5,7 +5,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
 
 use parfocal_base::clock::{Clock, ManualClock, SystemClock};
-use parfocal_dashboard::http::{self, Reach};
+use parfocal_dashboard::http::{self, ServerAddress};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
@@ -34,7 +34,7 @@ impl InProcess {
             let trial = Trial::empty(folder, protocols, 7, clock).await;
             let listener = TcpListener::bind((address, 0)).await.unwrap();
             let address = listener.local_addr().unwrap();
-            let app = app(&trial, folder, Reach::new(address, None), shutdown);
+            let app = app(&trial, folder, ServerAddress::new(address, None), shutdown);
             tokio::spawn(trial.conductor.clone().run());
             tokio::spawn(http::run(listener, app, None));
             (trial, address)

@@ -74,7 +74,7 @@ async fn every_export_tells_an_emergency_and_none_tells_an_order_ahead_of_time()
 
     for unblinded in [false, true] {
         let out = folder.path().join(format!("export-{unblinded}"));
-        export(&trial.recorder(), session, &out, unblinded).await.unwrap();
+        export(&trial.access_log(), session, &out, unblinded).await.unwrap();
         let checks = verify(&out, None);
         assert_eq!(failed(&checks), [""; 0], "{checks:?}");
 

@@ -145,7 +145,7 @@ async fn sessions_take_the_places_of_their_site_in_turn_and_a_used_up_list_refus
     let study = detail(&trial).await;
     let first = study.study_sessions[0].session;
     change(&trial, Change::Withdraw { session: first }).await.unwrap();
-    let refused = export(&trial.recorder(), first, &folder.path().join("withdrawn"), false).await.unwrap_err();
+    let refused = export(&trial.access_log(), first, &folder.path().join("withdrawn"), false).await.unwrap_err();
     assert!(matches!(refused, ExportError::Withdrawn { .. }), "{refused}");
     assert!(refusal(change(&trial, Change::Withdraw { session: first }).await).contains("is recorded already"));
     assert!(refusal(prepare(&trial, PARTICIPANT, "london").await).contains("withdrew from the study"));

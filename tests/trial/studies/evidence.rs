@@ -28,7 +28,7 @@ async fn another_program_computes_the_same_orders_from_the_document_alone() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = unblinded(folder.path()).await;
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
     let checks = verify(&out, None);
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
     assert!(said(&checks, "study").unwrap().contains("all orders are those committed to"));
@@ -172,7 +172,7 @@ async fn whatever_is_changed_of_a_study_in_an_export_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = unblinded(folder.path()).await;
     let out = folder.path().join("export");
-    export(&trial.recorder(), session, &out, true).await.unwrap();
+    export(&trial.access_log(), session, &out, true).await.unwrap();
 
     for (file, from, to, expected) in TAMPERED_EXPORT {
         let path = out.join(file);

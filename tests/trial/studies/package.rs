@@ -363,10 +363,10 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     assert_eq!(exports.state(&reader, STUDY).await.unwrap(), StudyExportState::None);
 
     // The export makes no progress between the two calls, because the test has not awaited anything yet.
-    let first = exports.start(trial.recorder(), STUDY, false);
+    let first = exports.start(trial.access_log(), STUDY, false);
     let begun = StudyExportState::Running { unblinded: false, progress: Progress::default() };
     assert_eq!(first, begun);
-    assert_eq!(exports.start(trial.recorder(), STUDY, true), begun);
+    assert_eq!(exports.start(trial.access_log(), STUDY, true), begun);
 
     let mut told = Vec::new();
     let ready = loop {
@@ -385,7 +385,7 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     assert_eq!(accesses.len(), 1, "one export: {accesses:?}");
 
     // The next export replaces it. Its files stay as long as somebody downloads them.
-    let _ = exports.start(trial.recorder(), STUDY, false);
+    let _ = exports.start(trial.access_log(), STUDY, false);
     assert!(exports.made(&reader, STUDY).await.unwrap().is_none());
     assert!(made.folder.is_dir(), "it is being downloaded");
 }
@@ -399,7 +399,7 @@ async fn a_package_that_was_made_before_something_was_taken_back_is_handed_out_n
     let reader = trial.store.reader().clone();
     let exports = StudyExports::new(folder.path());
     let make = async || {
-        let _ = exports.start(trial.recorder(), STUDY, false);
+        let _ = exports.start(trial.access_log(), STUDY, false);
         loop {
             match exports.state(&reader, STUDY).await.unwrap() {
                 StudyExportState::Running { .. } => tokio::time::sleep(std::time::Duration::from_millis(1)).await,

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use self::filter::{Comparison, Filter};
-use self::motion::Spectrum;
+use self::motion::ViewTransform;
 use super::belief::{MAX_MOVE, best};
 use super::registration::displacement;
 use super::sharpness_memory::SharpnessMemory;
@@ -85,8 +85,8 @@ struct Window {
 
 /// What a window is registered by.
 enum Phases {
-    Surroundings(Spectrum),
-    Patch(Box<spectrum::Spectrum>),
+    Surroundings(ViewTransform),
+    Patch(Box<spectrum::PatchTransform>),
 }
 
 impl Window {
@@ -96,7 +96,7 @@ impl Window {
                 levels: Arc::clone(levels),
                 side: Surroundings::SIDE,
                 patch: *patch,
-                phases: Phases::Surroundings(Spectrum::of(levels)),
+                phases: Phases::Surroundings(ViewTransform::of(levels)),
             },
             None => Self::of_patch(&view.patch),
         }

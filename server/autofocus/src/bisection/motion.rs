@@ -41,9 +41,9 @@ impl<const WIDTH: usize> Rows<WIDTH> {
 /// The Fourier transform of a frame's surroundings, less their mean, under a Hann window: a row for each frequency
 /// across, in it those down from 0 to the highest.
 #[derive(Debug, Clone)]
-pub struct Spectrum(Rows<KEPT>);
+pub struct ViewTransform(Rows<KEPT>);
 
-impl Spectrum {
+impl ViewTransform {
     /// The transform of `levels` ([`Surroundings::levels`]).
     #[must_use]
     pub fn of(levels: &[f32]) -> Self {
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn the_transform_is_what_its_definition_says() {
         let picture = texture(2, SIDE);
-        let Spectrum(found) = Spectrum::of(&picture.data);
+        let ViewTransform(found) = ViewTransform::of(&picture.data);
         for (across, down) in [(0, 0), (3, 5), (4, 5), (125, 5), (64, 64), (70, 3), (127, 60), (1, 64)] {
             let (re, im) = by_definition(&picture.data, across, down);
             let found = (f64::from(found.re[across][down]), f64::from(found.im[across][down]));
@@ -294,18 +294,18 @@ mod tests {
         for seed in 0..5 {
             let sharp = texture(seed, 192);
             let blurred = gaussian_blur(&sharp, 2.0);
-            let before = Spectrum::of(&square(&sharp, 32, 32));
+            let before = ViewTransform::of(&square(&sharp, 32, 32));
             for (dx, dy) in [(0, 0), (3, -2), (-6, 5), (17, 9), (-24, 24)] {
                 // What was at (x, y) is at (x + dx, y + dy) in a square whose corner moved the other way.
                 let now = square(&blurred, (32 - dx) as usize, (32 - dy) as usize);
-                assert_eq!(before.motion_to(&Spectrum::of(&now)), (dx, dy), "seed {seed}");
+                assert_eq!(before.motion_to(&ViewTransform::of(&now)), (dx, dy), "seed {seed}");
             }
         }
     }
 
     #[test]
     fn a_flat_view_has_not_moved() {
-        let flat = Spectrum::of(&vec![90.0; SIDE * SIDE]);
+        let flat = ViewTransform::of(&vec![90.0; SIDE * SIDE]);
         assert_eq!(flat.motion_to(&flat), (0, 0));
     }
 }

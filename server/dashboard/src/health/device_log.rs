@@ -18,12 +18,12 @@ type Condition = (bool, bool);
 
 /// What was last recorded about a device.
 #[derive(Default)]
-struct Recorded {
+struct LastCondition {
     last: Option<Condition>,
     well_since: Option<Moment>,
 }
 
-impl Recorded {
+impl LastCondition {
     /// Whether `condition`, seen at `now`, has to be recorded.
     fn is_news(&mut self, condition: Condition, now: Moment) -> bool {
         if self.last == Some(condition) {
@@ -43,7 +43,7 @@ impl Recorded {
 
 /// Records the condition in which the devices were found, and then every change until the control loop ends.
 pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Receiver<Arc<ControlStatus>>) {
-    let mut recorded = [Recorded::default(), Recorded::default()];
+    let mut recorded = [LastCondition::default(), LastCondition::default()];
     loop {
         let now = Arc::clone(&status.borrow_and_update());
         let devices = [
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn a_failure_is_news_at_once_and_recovery_once_it_lasts() {
         let at = |millis: u64| Moment::from_nanos(millis * 1_000_000);
-        let mut recorded = Recorded::default();
+        let mut recorded = LastCondition::default();
         assert!(recorded.is_news((true, false), at(0)), "as it was found");
         assert!(!recorded.is_news((true, false), at(100)));
         assert!(recorded.is_news((false, false), at(200)));

@@ -44,7 +44,7 @@ async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analy
     // A refused request is not recorded.
     check(reader, study).await?;
     let access = Access::AnalysisViewed { study: study.to_owned() };
-    app.recorder(by.actor()).record(&access).await?;
+    app.access_log(by.actor()).record(&access).await?;
     Ok(analyse(reader, study).await?)
 }
 

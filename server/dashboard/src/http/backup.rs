@@ -45,7 +45,7 @@ async fn start_backup(
     JsonBody(wanted): JsonBody<MakeBackup>,
 ) -> Result<Json<BackupState>, Error> {
     let lead = confirmed_lead(&app, &by, Some(&wanted.passphrase), peer).await?;
-    Ok(Json(app.backups.start(app.recorder(by.actor()), lead.account.clone())))
+    Ok(Json(app.backups.start(app.access_log(by.actor()), lead.account.clone())))
 }
 
 /// The state of the latest backup that the lead who is signed in asked for. It is kept for 15 minutes, unless words are

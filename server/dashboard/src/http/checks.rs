@@ -47,8 +47,8 @@ async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>
     let mut findings = machine.await.map_err(|_| Error::Internal)?;
     findings.extend(database);
     let now = app.clock.wall();
-    let local = app.reach.authority().is_some();
-    findings.extend(app.reach.certificate_until().map(|until| doctor::certificate(until, local, now)));
+    let local = app.address.authority().is_some();
+    findings.extend(app.address.certificate_until().map(|until| doctor::certificate(until, local, now)));
     findings.extend(devices(&app));
     Ok(Json(Checks { at: now, findings }))
 }

@@ -19,9 +19,9 @@ use tokio::sync::watch;
 use tokio::time::timeout;
 use tower::ServiceExt;
 
-use super::door::Door;
 use super::permits::Permits;
 use super::shutdown::ended;
+use super::transport::Transport;
 
 /// Bytes that one connection may buffer in this process: about half a frame, so that a stream gets a new frame only
 /// when the last one has gone to the kernel.
@@ -47,7 +47,7 @@ const STILL_THERE: Duration = Duration::from_secs(20);
 
 /// Accepts connections on `listener` and opens them with `door` until `shutdown` turns true. Each connection then ends
 /// once its requests under way are answered, and holds a clone of `shutdown` until then.
-pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch::Receiver<bool>) {
+pub(super) async fn serve(listener: TcpListener, transport: Transport, mut shutdown: watch::Receiver<bool>) {
     let permits = Permits::default();
     loop {
         let accepted = tokio::select! {
@@ -57,7 +57,7 @@ pub(super) async fn serve(listener: TcpListener, door: Door, mut shutdown: watch
 
         match accepted {
             Ok((stream, peer)) => {
-                tokio::spawn(serve_one(stream, peer, permits.clone(), door.clone(), shutdown.clone()));
+                tokio::spawn(serve_one(stream, peer, permits.clone(), transport.clone(), shutdown.clone()));
             }
             Err(error) if is_the_peers_fault(&error) => {}
             Err(error) => {
@@ -72,7 +72,7 @@ async fn serve_one(
     stream: TcpStream,
     peer: SocketAddr,
     permits: Permits,
-    door: Door,
+    transport: Transport,
     mut shutdown: watch::Receiver<bool>,
 ) {
     // A socket that cannot be tuned still works.
@@ -83,7 +83,7 @@ async fn serve_one(
     let permit = Arc::new(permit);
 
     let opened = tokio::select! {
-        opened = timeout(HANDSHAKE_WITHIN, door.open(stream, Arc::clone(&permit), BUFFER)) => opened,
+        opened = timeout(HANDSHAKE_WITHIN, transport.open(stream, Arc::clone(&permit), BUFFER)) => opened,
         _ = &mut give_way => return,
         () = ended(&mut shutdown) => return,
     };

@@ -52,7 +52,7 @@ async fn zip(
 ) -> Result<impl IntoResponse, Error> {
     let name = folder_name(session, query.unblinded);
     let by = by.for_session(&app, session).await?;
-    let export = Export::prepare(&app.recorder(by), session, query.unblinded).await?;
+    let export = Export::prepare(&app.access_log(by), session, query.unblinded).await?;
     let (zip, bytes) = ZipStream::new(name.clone());
 
     // On a separate thread: compressing would delay the streams.

@@ -20,12 +20,12 @@ pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
         Some(session) if signed_in => app.keys.of_session(session),
         _ => app.keys.of(Role::Surgeon).to_owned(),
     };
-    app.reach.link_by(&host, &key)
+    app.address.link_by(&host, &key)
 }
 
 /// Address of the page that helps a tablet to trust the server; `None` if it need not.
 pub(super) fn trust_page(app: &App, headers: &HeaderMap) -> Option<String> {
-    app.reach.trust_page_by(&tablets_host(app, headers))
+    app.address.trust_page_by(&tablets_host(app, headers))
 }
 
 /// The host name that the request was sent to.
@@ -37,7 +37,7 @@ pub(super) fn asked_host(headers: &HeaderMap) -> Option<&str> {
 /// name.
 fn tablets_host(app: &App, headers: &HeaderMap) -> String {
     let asked = asked_host(headers).filter(|host| !is_loopback_name(host));
-    asked.map_or_else(|| app.reach.host(), str::to_owned)
+    asked.map_or_else(|| app.address.host(), str::to_owned)
 }
 
 /// `link` as a QR code, for embedding in a page: an `<svg>` element.

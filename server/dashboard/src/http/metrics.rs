@@ -18,7 +18,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::error::Error;
 use super::roles::Roles;
 use super::{App, AppState};
-use parfocal_base::priority::Standing;
+use parfocal_base::priority::Scheduling;
 use parfocal_imaging::Size;
 use parfocal_trial::role::Role;
 
@@ -103,7 +103,7 @@ fn collect(app: &App) -> Registry {
         (
             "real_time",
             "Whether the control loop runs at real-time priority",
-            f64::from(u8::from(status.priority == Standing::RealTime)),
+            f64::from(u8::from(status.priority == Scheduling::RealTime)),
         ),
     ];
 

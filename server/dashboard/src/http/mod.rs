@@ -2,6 +2,7 @@
 
 mod about;
 mod accounts;
+mod address;
 mod analysis;
 pub mod assets;
 mod backup;
@@ -10,7 +11,6 @@ mod camera;
 mod checks;
 mod connections;
 mod credentials;
-mod door;
 mod equipment;
 pub mod error;
 mod export;
@@ -30,7 +30,6 @@ mod permits;
 mod plain;
 mod playback;
 mod ranges;
-mod reach;
 mod recording;
 mod records;
 mod researcher;
@@ -47,12 +46,13 @@ mod tablet_trial;
 mod tablet_trials;
 mod tablets;
 mod tongue;
+mod transport;
 mod trust;
 mod voice;
 
+pub use address::ServerAddress;
 pub use equipment::Equipment;
 pub use live::OpenTablets;
-pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
 pub use tablet_trials::TabletTrials;
 
@@ -71,8 +71,8 @@ use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 
-use door::Door;
 use error::Error;
+use transport::Transport;
 
 /// Largest request body in bytes: the longest comment in JSON, with some margin.
 const BODY_LIMIT: usize = 256 * 1024;
@@ -142,10 +142,12 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
 pub async fn run(listener: TcpListener, app: AppState, tls: Option<Arc<ServerConfig>>) {
     let shutdown = app.shutdown.clone();
     let reporting = tokio::spawn(live::report_tablets(Arc::clone(&app)));
-    let door = match tls {
-        Some(tls) => Door::Encrypted { tls: tls.into(), pages: router(Arc::clone(&app)), plain: plain::router(app) },
-        None => Door::Plain { pages: router(app) },
+    let transport = match tls {
+        Some(tls) => {
+            Transport::Encrypted { tls: tls.into(), pages: router(Arc::clone(&app)), plain: plain::router(app) }
+        }
+        None => Transport::Plain { pages: router(app) },
     };
-    connections::serve(listener, door, shutdown).await;
+    connections::serve(listener, transport, shutdown).await;
     reporting.abort();
 }

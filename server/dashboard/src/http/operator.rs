@@ -64,7 +64,7 @@ struct Trust {
 
 impl Trust {
     fn of(app: &App, headers: &HeaderMap) -> Result<Option<Self>, Error> {
-        let (Some(link), Some(authority)) = (super::links::trust_page(app, headers), app.reach.authority()) else {
+        let (Some(link), Some(authority)) = (super::links::trust_page(app, headers), app.address.authority()) else {
             return Ok(None);
         };
         let qr = super::links::qr_svg(&link)?;
@@ -94,7 +94,7 @@ async fn page(
         chain: super::researcher::chain_words(&app).await,
         researcher,
         surgeon_link,
-        loopback_only: app.reach.loopback_only(),
+        loopback_only: app.address.loopback_only(),
         trust,
         qr,
         code_pattern: CODE_PATTERN,

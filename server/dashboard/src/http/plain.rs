@@ -32,7 +32,7 @@ pub(super) fn router(app: AppState) -> Router {
 async fn on_to_the_encrypted_page(State(app): State<AppState>, request: Request) -> Result<Response, Error> {
     let asked = request.headers().get(HOST).and_then(|host| host.to_str().ok());
     let asked = asked.and_then(|host| host.parse::<Authority>().ok());
-    let host = asked.map_or_else(|| app.reach.host(), |asked| asked.as_str().to_owned());
+    let host = asked.map_or_else(|| app.address.host(), |asked| asked.as_str().to_owned());
 
     if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return Err(Error::Unencrypted(host));

@@ -44,8 +44,8 @@ async fn recordings(
     let by = by.for_session(&app, session).await?;
     let found = app.player.recordings(Role::Researcher, session).await?;
     if !found.recordings.is_empty() {
-        let recorder = app.recorder(by);
-        recorder.record(&Access::RecordingViewed(session)).await?;
+        let access_log = app.access_log(by);
+        access_log.record(&Access::RecordingViewed(session)).await?;
     }
     Ok(Json(found))
 }

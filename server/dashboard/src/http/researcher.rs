@@ -277,7 +277,7 @@ async fn timeline(
 ) -> Result<Json<Timeline>, Error> {
     let by = by.for_session(&app, id).await?;
     let timeline = app.reports.timeline(Role::Researcher, id, POINTS).await?;
-    app.recorder(by).record(&Access::PathViewed(id)).await?;
+    app.access_log(by).record(&Access::PathViewed(id)).await?;
     Ok(Json(timeline))
 }
 

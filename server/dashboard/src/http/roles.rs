@@ -215,10 +215,10 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
         (None, Some(_)) => return Err(Error::SessionOver),
         (None, None) => return Err(Error::WrongKey),
     };
-    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted());
+    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.address.encrypted());
 
     // A browser is let in even if the disk is full. Then only the log records it.
-    match app.recorder(role).record(&Access::Entered).await {
+    match app.access_log(role).record(&Access::Entered).await {
         Ok(_) => tracing::info!(role = role_name(role), "a browser was let in"),
         Err(error) => {
             tracing::error!(role = role_name(role), "a browser was let in and could not be recorded: {error}");

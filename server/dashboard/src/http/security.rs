@@ -95,7 +95,7 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
     let person = people::find(&app, request.headers()).await;
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
-    if app.reach.loopback_only() && !is_loopback_name(host) {
+    if app.address.loopback_only() && !is_loopback_name(host) {
         return Error::WrongHost.into_response();
     }
 
@@ -105,7 +105,7 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
     }
 
     let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
-    if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host, app.reach.encrypted()) {
+    if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host, app.address.encrypted()) {
         return Error::CrossSite.into_response();
     }
     if let Some(person) = person {

@@ -108,7 +108,7 @@ async fn sign_in(
         let token = Some(token.as_str().to_owned());
         return Ok(Json(SignedInAs { account, home, token }).into_response());
     }
-    let cookie = set_cookie(ACCOUNT_COOKIE, token.as_str(), SIGN_IN_LIMIT.as_secs(), app.reach.encrypted());
+    let cookie = set_cookie(ACCOUNT_COOKIE, token.as_str(), SIGN_IN_LIMIT.as_secs(), app.address.encrypted());
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Json(SignedInAs { account, home, token: None })).into_response())
 }
 
@@ -120,7 +120,7 @@ async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Re
     if let Some(person) = person {
         app.accounts.sign_out(&person.token).await?;
     }
-    let cookie = set_cookie(ACCOUNT_COOKIE, "", 0, app.reach.encrypted());
+    let cookie = set_cookie(ACCOUNT_COOKIE, "", 0, app.address.encrypted());
     Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie)])))
 }
 

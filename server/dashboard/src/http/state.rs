@@ -6,10 +6,10 @@ use std::sync::atomic::AtomicU64;
 use prometheus_client::metrics::counter::Counter;
 use tokio::sync::watch;
 
+use super::address::ServerAddress;
 use super::equipment::Equipment;
 use super::keys::Keys;
 use super::live::OpenTablets;
-use super::reach::Reach;
 use super::tablet_trials::TabletTrials;
 use crate::health::HealthWatch;
 use parfocal_autofocus::Registry;
@@ -18,7 +18,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::ControlObserver;
 use parfocal_pipeline::live::LiveHandle;
 use parfocal_records::accounts::Accounts;
-use parfocal_records::store::{Backups, Recorder, Store};
+use parfocal_records::store::{AccessLog, Backups, Store};
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::conductor::{Conductor, Library};
 use parfocal_session::playback::Player;
@@ -66,7 +66,7 @@ pub struct App {
     /// Keys of the three roles.
     pub keys: Keys,
     /// How other devices reach the server.
-    pub reach: Reach,
+    pub address: ServerAddress,
     /// What the server learned about its devices when it started.
     pub equipment: Equipment,
     /// The surgeon's pages that are open.
@@ -94,8 +94,8 @@ pub type AppState = Arc<App>;
 impl App {
     /// Records what `by` looks at.
     #[must_use]
-    pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
-        Recorder::of_server(&self.store, by.into(), Arc::clone(&self.clock))
+    pub fn access_log(&self, by: impl Into<Actor>) -> AccessLog {
+        AccessLog::of_server(&self.store, by.into(), Arc::clone(&self.clock))
     }
 
     /// The session on the screens, if it belongs to a study.

@@ -57,7 +57,7 @@ async fn start_study_export(
 ) -> Result<Json<StudyExportState>, Error> {
     by.personally()?;
     check(app.store.reader(), &study, wanted.unblinded).await?;
-    Ok(Json(app.study_exports.start(app.recorder(by.actor()), &study, wanted.unblinded)))
+    Ok(Json(app.study_exports.start(app.access_log(by.actor()), &study, wanted.unblinded)))
 }
 
 /// The state of the latest export of a study. A finished export is kept for an hour, unless a surgeon withdraws or

@@ -40,8 +40,8 @@ struct Profile<'a> {
 }
 
 fn authority(app: &App) -> Result<&PublicAuthority, Error> {
-    app.reach.authority().ok_or_else(|| {
-        let why = if app.reach.encrypted() {
+    app.address.authority().ok_or_else(|| {
+        let why = if app.address.encrypted() {
             "the site's own authority signed this server's certificate"
         } else {
             "this server does not encrypt; start it with --tls"
@@ -56,7 +56,7 @@ fn authority(app: &App) -> Result<&PublicAuthority, Error> {
     (status = 404, description = "The server has no local authority", body = ErrorBody)))]
 async fn page(State(app): State<AppState>, Nonce(nonce): Nonce, headers: HeaderMap) -> Result<Html<String>, Error> {
     let authority = authority(&app)?;
-    let host = asked_host(&headers).map_or_else(|| app.reach.host(), str::to_owned);
+    let host = asked_host(&headers).map_or_else(|| app.address.host(), str::to_owned);
     let page = Page {
         nonce,
         encrypted: format!("https://{host}"),

@@ -13,8 +13,8 @@ use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{Notify, watch};
 use tokio::time::timeout;
 
+use super::frame_messages::{self, FrameMessages};
 use super::message::{HEADER_BYTES, Header, Version};
-use super::shot::{self, Shot};
 use super::{Source, condition};
 
 /// A client that takes nothing for so long is disconnected.
@@ -46,7 +46,12 @@ enum End {
 }
 
 /// Serves `stream` until the client leaves.
-pub async fn serve(stream: TcpStream, peer: SocketAddr, shots: watch::Receiver<Option<Arc<Shot>>>, source: &Source) {
+pub async fn serve(
+    stream: TcpStream,
+    peer: SocketAddr,
+    messages: watch::Receiver<Option<Arc<FrameMessages>>>,
+    source: &Source,
+) {
     // A picture must not wait for the acknowledgement of the one before.
     let _ = stream.set_nodelay(true);
     let (from, to) = stream.into_split();
@@ -54,7 +59,7 @@ pub async fn serve(stream: TcpStream, peer: SocketAddr, shots: watch::Receiver<O
 
     let end = tokio::select! {
         end = listen(from, &shared) => end,
-        end = tell(to, shots, source, &shared) => end,
+        end = tell(to, messages, source, &shared) => end,
     };
     match end {
         End::Closed => tracing::debug!(%peer, "an OpenIGTLink client left"),
@@ -98,7 +103,7 @@ async fn listen(mut from: OwnedReadHalf, shared: &Shared) -> End {
 
 async fn tell(
     mut to: OwnedWriteHalf,
-    mut shots: watch::Receiver<Option<Arc<Shot>>>,
+    mut messages: watch::Receiver<Option<Arc<FrameMessages>>>,
     source: &Source,
     shared: &Shared,
 ) -> End {
@@ -108,19 +113,19 @@ async fn tell(
         let condition = condition(&states.borrow_and_update());
         if last_sent != Some(condition) {
             last_sent = Some(condition);
-            let message = shot::status(shared.version(), source.clock.wall(), condition);
+            let message = frame_messages::status(shared.version(), source.clock.wall(), condition);
             if let Err(end) = send(&mut to, message).await {
                 return end;
             }
         }
 
         tokio::select! {
-            changed = shots.changed() => {
+            changed = messages.changed() => {
                 if changed.is_err() {
                     return End::Closed;
                 }
-                let latest = shots.borrow_and_update().clone();
-                if let Some(shot) = latest && let Err(end) = show(&mut to, &shot, source, shared).await {
+                let latest = messages.borrow_and_update().clone();
+                if let Some(of_frame) = latest && let Err(end) = show(&mut to, &of_frame, source, shared).await {
                     return end;
                 }
             }
@@ -135,15 +140,15 @@ async fn tell(
 }
 
 /// Sends a frame.
-async fn show(to: &mut OwnedWriteHalf, shot: &Shot, source: &Source, shared: &Shared) -> Result<(), End> {
+async fn show(to: &mut OwnedWriteHalf, messages: &FrameMessages, source: &Source, shared: &Shared) -> Result<(), End> {
     // A session may have begun since it was made.
-    if shot.tells_focal_power() && (source.blinded)() {
+    if messages.tells_focal_power() && (source.blinded)() {
         return Ok(());
     }
 
     let version = shared.version();
-    send(to, shot.picture(version)).await?;
-    match shot.focal_power(version) {
+    send(to, messages.picture(version)).await?;
+    match messages.focal_power(version) {
         Some(message) => send(to, message).await,
         None => Ok(()),
     }

@@ -5,8 +5,8 @@
 //! one when it can take it, so a slow one delays nobody.
 
 mod client;
+mod frame_messages;
 mod message;
-mod shot;
 
 use std::io;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use tokio::runtime::Handle;
 use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
-use self::shot::Shot;
+use self::frame_messages::FrameMessages;
 use parfocal_base::clock::Clock;
 use parfocal_base::priority;
 use parfocal_base::step::Hold;
@@ -64,25 +64,25 @@ pub struct Settings {
 /// If the system has no thread left.
 pub async fn run(listener: TcpListener, source: Source, settings: Settings) -> io::Result<()> {
     let source = Arc::new(source);
-    let (shots, _) = watch::channel(None);
+    let (messages, _) = watch::channel(None);
     let arrived = Arc::new(Notify::new());
 
-    let studio = Studio {
+    let publisher = FramePublisher {
         source: Arc::clone(&source),
         settings,
         developer: source.developer.clone(),
-        shots: shots.clone(),
+        messages: messages.clone(),
         arrived: Arc::clone(&arrived),
     };
     let runtime = Handle::current();
     std::thread::Builder::new().name("openigtlink".into()).spawn(move || {
         priority::lower_further();
-        runtime.block_on(studio.run());
+        runtime.block_on(publisher.run());
     })?;
 
     let mut shutdown = source.shutdown.clone();
     tokio::select! {
-        () = accept(&listener, &source, &shots, &arrived) => {}
+        () = accept(&listener, &source, &messages, &arrived) => {}
         _ = shutdown.wait_for(|ended| *ended) => {}
     }
     Ok(())
@@ -91,7 +91,7 @@ pub async fn run(listener: TcpListener, source: Source, settings: Settings) -> i
 async fn accept(
     listener: &TcpListener,
     source: &Arc<Source>,
-    shots: &watch::Sender<Option<Arc<Shot>>>,
+    messages: &watch::Sender<Option<Arc<FrameMessages>>>,
     arrived: &Notify,
 ) {
     let clients = Arc::new(AtomicUsize::new(0));
@@ -106,7 +106,7 @@ async fn accept(
         }
 
         clients.fetch_add(1, Ordering::Relaxed);
-        let mut latest = shots.subscribe();
+        let mut latest = messages.subscribe();
         // A picture made earlier is stale.
         latest.mark_unchanged();
         arrived.notify_one();
@@ -139,15 +139,15 @@ fn condition(status: &ControlStatus) -> (u16, &'static str, &'static str) {
 }
 
 /// Makes the pictures while there are clients.
-struct Studio {
+struct FramePublisher {
     source: Arc<Source>,
     settings: Settings,
     developer: Developer,
-    shots: watch::Sender<Option<Arc<Shot>>>,
+    messages: watch::Sender<Option<Arc<FrameMessages>>>,
     arrived: Arc<Notify>,
 }
 
-impl Studio {
+impl FramePublisher {
     async fn run(mut self) {
         let mut shutdown = self.source.shutdown.clone();
         let source = Arc::clone(&self.source);
@@ -169,7 +169,7 @@ impl Studio {
         loop {
             self.arrived.notified().await;
             let mut frames = source.live.frames();
-            while self.shots.receiver_count() > 0 {
+            while self.messages.receiver_count() > 0 {
                 due.tick().await;
                 tokio::select! {
                     changed = frames.changed() => if changed.is_err() { return },
@@ -178,15 +178,21 @@ impl Studio {
 
                 let frame = frames.borrow_and_update().clone();
                 if let Some(frame) = frame {
-                    let shot = self.shoot(&frame, source, &mut rgb, &mut gray);
-                    self.shots.send_replace(Some(Arc::new(shot)));
+                    let messages = self.messages_of(&frame, source, &mut rgb, &mut gray);
+                    self.messages.send_replace(Some(Arc::new(messages)));
                 }
             }
-            self.shots.send_replace(None);
+            self.messages.send_replace(None);
         }
     }
 
-    fn shoot(&mut self, frame: &ControlledFrame, source: &Source, rgb: &mut RgbImage, gray: &mut GrayImage) -> Shot {
+    fn messages_of(
+        &mut self,
+        frame: &ControlledFrame,
+        source: &Source,
+        rgb: &mut RgbImage,
+        gray: &mut GrayImage,
+    ) -> FrameMessages {
         let now = source.clock.now();
         let age = SignedDuration::try_from(now.since(frame.frame.exposed_at)).unwrap_or_default();
         let at = source.clock.wall().checked_sub(age).unwrap_or_default();
@@ -194,11 +200,11 @@ impl Studio {
         let focal_power = frame.record.measured.filter(|_| !(source.blinded)()).map(f64::from);
 
         match &frame.frame.image {
-            FrameImage::Rgb(picture) => Shot::new(picture, 1.0, at, number, focal_power),
+            FrameImage::Rgb(picture) => FrameMessages::new(picture, 1.0, at, number, focal_power),
             FrameImage::Mosaic(mosaic) => {
                 self.developer.develop(mosaic, self.settings.size, rgb, gray);
                 // Both sizes cover the same area.
-                Shot::new(rgb, 1.0 / self.settings.size.per_cell() as f32, at, number, focal_power)
+                FrameMessages::new(rgb, 1.0 / self.settings.size.per_cell() as f32, at, number, focal_power)
             }
         }
     }

@@ -1,9 +1,9 @@
 //! Colorimetry: the CIE 1931 standard observer and illuminant D65, and the XYZ of a reflectance under it.
 
-/// Shortest wavelength of a [`Spectrum`] in nm.
+/// Shortest wavelength of a [`Reflectance`] in nm.
 const FIRST_NM: u32 = 380;
 
-/// Number of values in a [`Spectrum`].
+/// Number of values in a [`Reflectance`].
 const SAMPLES: usize = 401;
 
 /// Step of the tables below in nm.
@@ -36,9 +36,9 @@ const D65: [f64; 41] = [
 
 /// A reflectance from 380 to 780 nm in steps of 1 nm.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Spectrum(Vec<f64>);
+pub(super) struct Reflectance(Vec<f64>);
 
-impl Spectrum {
+impl Reflectance {
     /// The reflectance that `at` gives for each wavelength in nm.
     pub(super) fn from_fn(at: impl FnMut(f64) -> f64) -> Self {
         Self((FIRST_NM..).take(SAMPLES).map(f64::from).map(at).collect())
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_perfect_reflector_has_the_white_point_of_d65() {
         // CIE 015 with the 2-degree observer, summed in steps of 5 nm.
-        for (found, expected) in Spectrum::from_fn(|_| 1.0).xyz().iter().zip([0.950_47, 1.0, 1.088_83]) {
+        for (found, expected) in Reflectance::from_fn(|_| 1.0).xyz().iter().zip([0.950_47, 1.0, 1.088_83]) {
             assert!((found - expected).abs() < 1e-3, "{found} {expected}");
         }
     }
@@ -85,14 +85,14 @@ mod tests {
     #[test]
     fn a_narrow_line_has_the_chromaticity_of_the_spectral_locus() {
         // CIE 1931: 520 nm lies at x = 0.0743, y = 0.8338.
-        let [x, y, z] = Spectrum::from_fn(|nm| f64::from(u8::from((nm - 520.0).abs() < 2.0))).xyz();
+        let [x, y, z] = Reflectance::from_fn(|nm| f64::from(u8::from((nm - 520.0).abs() < 2.0))).xyz();
         assert!((x / (x + y + z) - 0.0743).abs() < 1e-3);
         assert!((y / (x + y + z) - 0.8338).abs() < 1e-3);
     }
 
     #[test]
     fn weighted_mean_of_a_ramp_is_the_middle_of_the_weight() {
-        let ramp = Spectrum::from_fn(|nm| nm);
+        let ramp = Reflectance::from_fn(|nm| nm);
         assert!((ramp.weighted_mean(|nm| (-0.5 * ((nm - 520.5) / 8.0).powi(2)).exp()) - 520.5).abs() < 1e-6);
     }
 }

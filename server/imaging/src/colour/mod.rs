@@ -11,7 +11,7 @@ mod srgb;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::calibration::{BANDS, Band, Calibration};
-use cie::Spectrum;
+use cie::Reflectance;
 pub(super) use srgb::Encoder;
 
 /// Standard deviation of a band's noise that the fit assumes, as a share of white. It keeps the matrix from telling
@@ -63,7 +63,7 @@ fn xyz_from_bands(bands: &[Band; BANDS]) -> SMatrix<f64, 3, BANDS> {
     let inverse = squares.cholesky().map_or_else(BandMatrix::identity, |decomposed| decomposed.inverse());
     let mut fitted = products * inverse;
 
-    let white = Spectrum::from_fn(|_| 1.0).xyz();
+    let white = Reflectance::from_fn(|_| 1.0).xyz();
     for (mut row, white) in fitted.row_iter_mut().zip(white) {
         row *= white / row.sum();
     }
@@ -72,7 +72,7 @@ fn xyz_from_bands(bands: &[Band; BANDS]) -> SMatrix<f64, 3, BANDS> {
 }
 
 /// The white-balanced bands' responses to a reflectance.
-fn responses(bands: &[Band; BANDS], spectrum: &Spectrum) -> SVector<f64, BANDS> {
+fn responses(bands: &[Band; BANDS], spectrum: &Reflectance) -> SVector<f64, BANDS> {
     SVector::from_fn(|index, _| {
         let Band { centre_nm, fwhm_nm } = bands[index];
         // Half the maximum at half the width: exp(-4 ln 2 (d / FWHM)^2).
@@ -87,7 +87,7 @@ mod tests {
 
     /// Linear sRGB of a reflectance: through the default sensor's bands, and through the eye's colour-matching
     /// functions.
-    fn both_ways(spectrum: &Spectrum) -> ([f64; 3], [f64; 3]) {
+    fn both_ways(spectrum: &Reflectance) -> ([f64; 3], [f64; 3]) {
         let bands = Calibration::default().bands;
         let seen = responses(&bands, spectrum);
         let sensed = linear_srgb_from_bands(&bands)
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn white_and_grays_come_out_neutral() {
         for level in [0.1, 0.5, 1.0] {
-            for component in both_ways(&Spectrum::from_fn(|_| level)).0 {
+            for component in both_ways(&Reflectance::from_fn(|_| level)).0 {
                 assert!((component - level).abs() < 1e-5, "{component} {level}");
             }
         }
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn hues_are_where_they_belong() {
         let of = |low: f64, high: f64| {
-            both_ways(&Spectrum::from_fn(|nm| if (low..high).contains(&nm) { 0.8 } else { 0.05 })).0
+            both_ways(&Reflectance::from_fn(|nm| if (low..high).contains(&nm) { 0.8 } else { 0.05 })).0
         };
         let [red, green, blue] = of(380.0, 490.0);
         assert!(blue > 2.0 * green && blue > 2.0 * red, "short waves are blue: {red} {green} {blue}");

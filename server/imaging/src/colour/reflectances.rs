@@ -1,6 +1,6 @@
 //! The reflectances over which bands are fitted to colours: smooth edges and hills, and perfused tissue.
 
-use super::cie::Spectrum;
+use super::cie::Reflectance;
 
 /// Molar extinction of oxygenated and of deoxygenated haemoglobin in 1/(cm M), from 400 to 700 nm in
 /// steps of 10 nm: S. Prahl, "Tabulated molar extinction coefficient for hemoglobin in water", Oregon
@@ -20,8 +20,8 @@ const HAEMOGLOBIN: [[f64; 2]; 31] = [
 const BLOOD_MOLAR: f64 = 150.0 / 64_500.0;
 
 /// All reflectances that the fit uses.
-pub(super) fn reflectances() -> Vec<Spectrum> {
-    let mut set = vec![Spectrum::from_fn(|_| 1.0)];
+pub(super) fn reflectances() -> Vec<Reflectance> {
+    let mut set = vec![Reflectance::from_fn(|_| 1.0)];
 
     for centre in (420..=680).step_by(20).map(f64::from) {
         for width in [8.0, 20.0] {
@@ -29,8 +29,8 @@ pub(super) fn reflectances() -> Vec<Spectrum> {
             set.push(edge(centre, -width));
         }
         for width in [12.0, 25.0, 50.0, 100.0] {
-            set.push(Spectrum::from_fn(|nm| 0.1 + 0.8 * hill(nm, centre, width)));
-            set.push(Spectrum::from_fn(|nm| 0.9 - 0.8 * hill(nm, centre, width)));
+            set.push(Reflectance::from_fn(|nm| 0.1 + 0.8 * hill(nm, centre, width)));
+            set.push(Reflectance::from_fn(|nm| 0.9 - 0.8 * hill(nm, centre, width)));
         }
     }
 
@@ -46,8 +46,8 @@ pub(super) fn reflectances() -> Vec<Spectrum> {
 }
 
 /// A logistic edge at `centre`, rising towards longer wavelengths for a positive `width` (both in nm).
-fn edge(centre: f64, width: f64) -> Spectrum {
-    Spectrum::from_fn(|nm| 0.05 + 0.85 / (1.0 + ((centre - nm) / width).exp()))
+fn edge(centre: f64, width: f64) -> Reflectance {
+    Reflectance::from_fn(|nm| 0.05 + 0.85 / (1.0 + ((centre - nm) / width).exp()))
 }
 
 fn hill(nm: f64, centre: f64, width: f64) -> f64 {
@@ -58,8 +58,8 @@ fn hill(nm: f64, centre: f64, width: f64) -> f64 {
 /// reduced scattering `scattering` (1/cm) at 500 nm that falls with wavelength to the power 1.6, as
 /// in brain (S. Jacques, "Optical properties of biological tissues: a review", Phys. Med. Biol. 58,
 /// R37, 2013). Kubelka-Munk with K = 2 absorption and S = 3/4 reduced scattering.
-pub(super) fn tissue(blood_fraction: f64, saturation: f64, scattering: f64) -> Spectrum {
-    Spectrum::from_fn(|nm| {
+pub(super) fn tissue(blood_fraction: f64, saturation: f64, scattering: f64) -> Reflectance {
+    Reflectance::from_fn(|nm| {
         let [oxygenated, deoxygenated] = extinction(nm);
         let extinction = saturation * oxygenated + (1.0 - saturation) * deoxygenated;
         let absorption = std::f64::consts::LN_10 * extinction * BLOOD_MOLAR * blood_fraction;

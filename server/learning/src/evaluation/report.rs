@@ -19,7 +19,7 @@ use parfocal_base::{IN_FOCUS, PolicyName};
 
 /// What was evaluated.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Subject {
+pub struct EvaluatedScans {
     /// Kind of scans: `simulated`, `relief`, `phantom`, or the folder of a recorded scan.
     pub scans: String,
     /// Seed of the scans' courses.
@@ -38,7 +38,7 @@ pub struct Subject {
     pub weights: BTreeMap<PolicyName, String>,
 }
 
-impl Subject {
+impl EvaluatedScans {
     /// Names the first difference from `other`; `None` if there is none.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
@@ -60,7 +60,7 @@ impl Subject {
 pub struct Report {
     /// What was evaluated.
     #[serde(flatten)]
-    pub subject: Subject,
+    pub subject: EvaluatedScans,
     /// Number of scans in which even the sharpest patch shows nothing to focus on.
     pub without_detail: usize,
     /// One row for each policy.
@@ -345,7 +345,7 @@ mod tests {
             ("file:far,b.pt", path([0.11, 0.12, 0.13, 0.14])),
         ];
         let rows: Vec<Row> = outcomes.map(outcome).iter().map(Outcome::row).collect();
-        let subject = Subject {
+        let subject = EvaluatedScans {
             scans: "simulated".to_owned(),
             seed: 7,
             count: 4,

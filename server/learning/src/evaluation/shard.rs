@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::report::{Report, Subject};
+use super::report::{EvaluatedScans, Report};
 use super::rollout::Path;
 use super::{Outcome, ScanSet, compare};
 use crate::scans::FocalTimeScan;
@@ -104,7 +104,7 @@ pub struct Shard {
     /// The part of the scans.
     pub part: Part,
     /// What was evaluated. It is the same for all parts.
-    pub subject: Subject,
+    pub subject: EvaluatedScans,
     /// Number of this part's scans without detail.
     pub without_detail: usize,
     /// Each policy's paths over this part's scans, in their order.
@@ -148,7 +148,7 @@ pub enum MergeError {
 impl Shard {
     /// The results on `part` of the scans of `subject`.
     #[must_use]
-    pub fn new(part: Part, subject: Subject, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
+    pub fn new(part: Part, subject: EvaluatedScans, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
     }
 
@@ -273,7 +273,7 @@ mod tests {
     fn shards_that_do_not_fit_together_are_rejected() {
         let shard = |text: &str, seed: u64| {
             let part = part(text);
-            let subject = Subject { scans: "simulated".to_owned(), seed, count: 3, ..Subject::default() };
+            let subject = EvaluatedScans { scans: "simulated".to_owned(), seed, count: 3, ..EvaluatedScans::default() };
             let path = Path { focal_power: vec![0.5], optimum: vec![0.6], ..Path::default() };
             let paths = vec![path; part.scans(3).len()];
             let outcome = Outcome { policy: "fixed".to_owned(), paths, parts: 1 };

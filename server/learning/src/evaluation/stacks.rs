@@ -90,7 +90,7 @@ pub struct StackResult {
 
 /// A policy compared with the MGM hill-climber, over all stacks and scales.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Standing {
+pub struct OverallRow {
     /// The policy.
     pub policy: String,
     /// Geometric mean of its mean absolute error divided by the hill-climber's.
@@ -123,7 +123,7 @@ pub struct StackReport {
     /// One result for each stack and scale.
     pub stacks: Vec<StackResult>,
     /// One standing for each policy.
-    pub standings: Vec<Standing>,
+    pub standings: Vec<OverallRow>,
 }
 
 /// Evaluates `policies`, the oracle and the baseline on the stacks of `sources`. `seed` is the first of the courses'
@@ -177,7 +177,7 @@ pub enum StackReportError {
 }
 
 /// The standing of `policy` over `stacks`, with each stack's `outcomes`; `None` if a row is missing.
-fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> Option<Standing> {
+fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> Option<OverallRow> {
     let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
     let rows = |name| stacks.iter().map(|result| row(result, name)).collect::<Option<Vec<Row>>>();
     let own = rows(policy)?;
@@ -200,7 +200,7 @@ fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> 
     let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
     let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
 
-    Some(Standing {
+    Some(OverallRow {
         policy: policy.to_owned(),
         ratio,
         ratio_interval: ratio_interval(stacks, &logs),

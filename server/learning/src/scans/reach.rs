@@ -12,7 +12,7 @@ use parfocal_devices::simulation::walk::Walk;
 
 /// How a lens's focal power becomes a position in a focal stack.
 #[derive(Debug, Clone, Copy)]
-pub struct Optics {
+pub struct LensOverStack {
     /// Positions per unit of focal power; below 0 if positions fall when focal power rises.
     pub slope: f64,
     /// Curvature of the response: 0 if it is straight, else the relative change of slope over half a unit.
@@ -40,7 +40,7 @@ pub enum Reach {
     },
 }
 
-impl Optics {
+impl LensOverStack {
     /// Draws the optics for one scan of `scene`.
     pub fn draw(scene: &StackScene, course: &mut ChaCha8Rng) -> Self {
         let (least, most) = scene.slopes;
@@ -80,7 +80,7 @@ impl Optics {
         }
     }
 
-    /// The focal power at which `position` is in focus: the inverse of [`Optics::position`].
+    /// The focal power at which `position` is in focus: the inverse of [`LensOverStack::position`].
     pub fn focal_power(&self, reach: Reach, position: f64) -> f64 {
         match reach {
             Reach::View { origin } => (position - origin) / self.slope,
@@ -185,7 +185,7 @@ mod tests {
 
         for scene in [stack, followed] {
             for _ in 0..20 {
-                let optics = Optics::draw(&scene, &mut rng);
+                let optics = LensOverStack::draw(&scene, &mut rng);
                 for (focus, focal_power) in [(0.2, 0.7), (0.5, 0.5), (0.9, 0.1)] {
                     let reach = optics.reach(&scene, focus, 0.3);
                     let position = optics.position(reach, focal_power);

@@ -377,14 +377,14 @@ impl FocalTimeScan for Playing {
 
 /// Recorded scans to evaluate on.
 #[derive(Debug, Clone)]
-pub struct Recorded {
+pub struct RecordedScans {
     /// The scans, each of at least one pose.
     pub scans: Vec<Arc<RecordedScan>>,
     /// What is shown between two focal powers.
     pub between: Interpolation,
 }
 
-impl ScanSet for Recorded {
+impl ScanSet for RecordedScans {
     fn count(&self) -> usize {
         self.scans.len()
     }

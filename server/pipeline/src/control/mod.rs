@@ -35,7 +35,7 @@ use parfocal_base::FocalPower;
 use parfocal_base::PatchPlace;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
-use parfocal_base::priority::Standing;
+use parfocal_base::priority::Scheduling;
 use parfocal_base::step::{Hold, StepRecord};
 use parfocal_devices::camera::{CameraHealth, CameraOffer, Controls, Frame};
 use parfocal_devices::lens::LensHealth;
@@ -142,7 +142,7 @@ pub struct ControlStatus {
     /// 99th percentile of the same latency, in microseconds.
     pub latency_p99_micros: u32,
     /// Scheduling priority of the loop's thread.
-    pub priority: Standing,
+    pub priority: Scheduling,
     /// What people can point at.
     pub geometry: PictureGeometry,
     /// What the policy's belief says of the focus.

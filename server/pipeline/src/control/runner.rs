@@ -28,14 +28,14 @@ struct Question {
 }
 
 /// The outcome of a question.
-type Answer = Result<Advice, Failure>;
+type StepResult = Result<Advice, Failure>;
 
 /// One instance of a policy on its own thread. At most one question is open at a time. Dropping the runner ends the
 /// thread as soon as the policy's step returns. The drop does not wait.
 #[derive(Debug)]
 pub struct Runner {
     questions: SyncSender<Question>,
-    answers: Receiver<Answer>,
+    answers: Receiver<StepResult>,
     thread: JoinHandle<()>,
     /// The thread's number, once the thread runs.
     id: Arc<OnceLock<Pid>>,
@@ -164,7 +164,7 @@ fn serve(
     build: impl FnOnce() -> Result<Box<dyn Policy>, PolicyError>,
     clock: &dyn Clock,
     questions: &Receiver<Question>,
-    answers: &SyncSender<Answer>,
+    answers: &SyncSender<StepResult>,
 ) {
     let mut policy = match guarded(build) {
         Ok(Ok(policy)) => policy,
@@ -181,7 +181,7 @@ fn serve(
     }
 }
 
-fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answer {
+fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> StepResult {
     let began = clock.now();
     let seen = Observation { view: &question.view, focal_power: question.focal_power };
     let decide = || {

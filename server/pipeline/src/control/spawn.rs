@@ -19,7 +19,7 @@ use super::window::LatencyWindow;
 use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Following, LatestSlot, PictureGeometry};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
-use parfocal_base::priority::{self, Standing, ThreadRole};
+use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::{Camera, CameraOffer, Controls, Frame};
@@ -145,7 +145,7 @@ struct Worker {
     steps: u64,
     telemetry_dropped: u64,
     /// Scheduling priority of the loop's thread.
-    priority: Standing,
+    priority: Scheduling,
 }
 
 impl Worker {
@@ -172,7 +172,7 @@ impl Worker {
             telemetry_dropped: 0,
             latency_p50_micros: 0,
             latency_p99_micros: 0,
-            priority: Standing::Ordinary,
+            priority: Scheduling::Ordinary,
             geometry: PictureGeometry::default(),
             lock: FocusLock::default(),
             following: Following::default(),
@@ -193,7 +193,7 @@ impl Worker {
             lock: LockWatch::default(),
             steps: 0,
             telemetry_dropped: 0,
-            priority: Standing::Ordinary,
+            priority: Scheduling::Ordinary,
         }
     }
 
@@ -301,7 +301,7 @@ impl Worker {
             telemetry_dropped: self.telemetry_dropped,
             latency_p50_micros: figures.p50,
             latency_p99_micros: figures.p99,
-            priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
+            priority: if priority::withdrawn() { Scheduling::Withdrawn } else { self.priority },
             geometry: self.stepper.geometry(),
             lock: self.lock.told(),
             following: self.stepper.following(),

@@ -6,7 +6,7 @@ use arc_swap::ArcSwapOption;
 
 use super::ControlledFrame;
 use parfocal_devices::camera::FrameImage;
-use parfocal_recording::{Intake, PatchRow, Shot};
+use parfocal_recording::{CapturedFrame, Intake, PatchRow};
 
 /// Passes every frame of the loop to a recorder, if one is connected. The loop never waits: frames that the recorder
 /// cannot take are lost and counted there. Clones share the connection.
@@ -30,7 +30,7 @@ impl Tap {
         let Some(intake) = guard.as_ref() else { return };
         let FrameImage::Mosaic(mosaic) = &controlled.frame.image else { return };
 
-        intake.offer(Shot {
+        intake.offer(CapturedFrame {
             number: controlled.frame.number,
             exposed_at: controlled.frame.exposed_at,
             exposure: controlled.frame.exposure,

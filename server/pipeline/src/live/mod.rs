@@ -4,11 +4,11 @@
 mod area;
 mod counts;
 mod follow;
-mod larger;
+mod frame_encoder;
+mod larger_size;
 mod lead;
-mod outlet;
 mod picture;
-mod studio;
+mod publisher;
 mod thread;
 mod viewer;
 
@@ -28,13 +28,13 @@ use lead::{Lead, Leaders};
 use parfocal_imaging::Size;
 
 /// The latest frame of one size.
-type Latest = watch::Receiver<Option<Arc<EncodedFrame>>>;
+type LatestFrame = watch::Receiver<Option<Arc<EncodedFrame>>>;
 
 /// The viewers' source of frames. Clone freely.
 #[derive(Debug, Clone)]
 pub struct LiveHandle {
     /// Indexed by [`Size`], up to the largest size of the camera's pictures.
-    frames: Arc<[Latest]>,
+    frames: Arc<[LatestFrame]>,
     counts: Arc<Counts>,
     leaders: watch::Sender<Leaders>,
     /// The loop's frames, for those who make pictures of their own.
@@ -83,7 +83,7 @@ impl LiveHandle {
 #[derive(Debug)]
 pub struct Watcher {
     size: Size,
-    frames: Latest,
+    frames: LatestFrame,
     counts: Arc<Counts>,
     /// Set for a leading viewer.
     _lead: Option<Lead>,

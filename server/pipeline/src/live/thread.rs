@@ -9,9 +9,9 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::area::AreaWatch;
-use super::larger::Larger;
-use super::outlet::Outlet;
-use super::studio::Studio;
+use super::frame_encoder::FrameEncoder;
+use super::larger_size::LargerSize;
+use super::publisher::Publisher;
 use super::{Counts, LiveHandle};
 use crate::control::{Command, ControlHandle, ControlledFrame};
 use parfocal_base::clock::Clock;
@@ -34,21 +34,21 @@ pub fn start(
     clock: &Arc<dyn Clock>,
 ) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
     let counts = Arc::new(Counts::default());
-    let outlet = |size| {
+    let publisher = |size| {
         let (sender, frames) = watch::channel(None);
-        (Outlet::new(size, sender, Arc::clone(&counts)), frames)
+        (Publisher::new(size, sender, Arc::clone(&counts)), frames)
     };
 
-    let (cells, latest) = outlet(Size::Cell);
+    let (cells, latest) = publisher(Size::Cell);
     let mut frames = vec![latest];
     let mut larger = Vec::new();
     for size in Size::ALL.into_iter().filter(|size| (Size::Half..=largest).contains(size)) {
-        let (outlet, latest) = outlet(size);
+        let (publisher, latest) = publisher(size);
         frames.push(latest);
-        larger.push(Larger::start(developer.clone(), size, outlet, Arc::clone(clock))?);
+        larger.push(LargerSize::start(developer.clone(), size, publisher, Arc::clone(clock))?);
     }
 
-    let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
+    let frame_encoder = FrameEncoder::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
     let taken = watch::Sender::default();
     let handle = LiveHandle {
         frames: frames.into(),
@@ -58,10 +58,10 @@ pub fn start(
     };
     let worker = Worker {
         control,
-        outlet: cells,
+        publisher: cells,
         counts,
         clock: Arc::clone(clock),
-        studio,
+        frame_encoder,
         larger,
         taken,
         areas: AreaWatch::default(),
@@ -74,11 +74,11 @@ pub fn start(
 
 struct Worker {
     control: ControlHandle,
-    outlet: Outlet,
+    publisher: Publisher,
     counts: Arc<Counts>,
     clock: Arc<dyn Clock>,
-    studio: Studio,
-    larger: Vec<Larger>,
+    frame_encoder: FrameEncoder,
+    larger: Vec<LargerSize>,
     /// Frames for those who make pictures of their own.
     taken: watch::Sender<Option<Arc<ControlledFrame>>>,
     areas: AreaWatch,
@@ -101,7 +101,7 @@ impl Worker {
 
     fn turn(&mut self, frame: &ControlledFrame) {
         self.counts.note_step(&frame.record);
-        let watched = self.outlet.is_watched();
+        let watched = self.publisher.is_watched();
 
         // We count from the last search: if frames come faster than this thread takes them, every multiple of ten could
         // be among those that it misses.
@@ -111,13 +111,13 @@ impl Worker {
         let began = self.clock.now();
         let image = frame.frame.image.clone();
         if watched || detect {
-            self.studio.develop(&image);
+            self.frame_encoder.develop(&image);
         }
 
         // The picture leaves first: its viewers wait neither for a larger size nor for the detection.
         if watched {
-            match self.studio.encode(frame.clone()) {
-                Ok(frame) => self.outlet.publish(frame),
+            match self.frame_encoder.encode(frame.clone()) {
+                Ok(frame) => self.publisher.publish(frame),
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
             self.counts.note_picture(Size::Cell, &frame.record, self.clock.now().since(began));
@@ -134,7 +134,7 @@ impl Worker {
 
         if detect {
             self.looked = Some(number);
-            if let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
+            if let Some(news) = self.areas.see(content_area::detect(self.frame_encoder.gray(&image))) {
                 self.control.send(Command::ContentArea(news));
             }
         }

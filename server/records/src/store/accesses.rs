@@ -81,7 +81,7 @@ impl Access {
 
 /// Records accesses to a database, in that database.
 #[derive(Clone)]
-pub struct Recorder {
+pub struct AccessLog {
     writer: Writer,
     /// The data folder.
     folder: PathBuf,
@@ -93,7 +93,7 @@ pub struct Recorder {
     clock: Arc<dyn Clock>,
 }
 
-impl Recorder {
+impl AccessLog {
     /// Records what `by` does through the server.
     #[must_use]
     pub fn of_server(store: &Store, by: Actor, clock: Arc<dyn Clock>) -> Self {

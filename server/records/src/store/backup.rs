@@ -15,7 +15,7 @@ use super::export::verify::{Check, Verdict};
 use super::lock::FolderLock;
 use super::schema::DATABASE;
 use super::verify::checks;
-use super::{Access, Head, Reader, Recorder, StoreError};
+use super::{Access, AccessLog, Head, Reader, StoreError};
 use parfocal_base::clock::Clock;
 use parfocal_base::files::{make_private, sync_folder_of};
 
@@ -130,9 +130,9 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
     }
 
     let temporary = temporary_beside(out)?;
-    let recorder = Recorder::open(folder, clock).await?;
-    let copied = copy_into(&recorder, temporary, &out.display().to_string()).await;
-    recorder.close().await;
+    let access_log = AccessLog::open(folder, clock).await?;
+    let copied = copy_into(&access_log, temporary, &out.display().to_string()).await;
+    access_log.close().await;
 
     let VerifiedCopy { file, bytes, head } = copied?;
     put_in_place(file, out, |file, out| file.persist_noclobber(out))?;
@@ -147,9 +147,9 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
 /// If the data folder has no room for the copy, the database cannot be read, the copy does not verify, or `receiver`
 /// does not take all of it.
 pub async fn backup_to(folder: &Path, receiver: &mut impl Write, clock: Arc<dyn Clock>) -> Result<Backup, BackupError> {
-    let recorder = Recorder::open(folder, clock).await?;
-    let copied = verified_copy(&recorder, folder).await;
-    recorder.close().await;
+    let access_log = AccessLog::open(folder, clock).await?;
+    let copied = verified_copy(&access_log, folder).await;
+    access_log.close().await;
 
     let VerifiedCopy { file, bytes, head } = copied?;
     let mut content = file.reopen().map_err(BackupError::file(file.path()))?;
@@ -178,15 +178,15 @@ impl VerifiedCopy {
 ///
 /// # Errors
 /// If the file cannot be written, the database cannot be read, or the copy does not verify.
-pub async fn verified_copy(recorder: &Recorder, folder: &Path) -> Result<VerifiedCopy, BackupError> {
-    copy_into(recorder, temporary_in(folder)?, "the backup").await
+pub async fn verified_copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
+    copy_into(access_log, temporary_in(folder)?, "the backup").await
 }
 
 /// Records a backup, and copies the database of `recorder` into `file`. Errors call the copy `what`.
-async fn copy_into(recorder: &Recorder, file: NamedTempFile, what: &str) -> Result<VerifiedCopy, BackupError> {
-    recorder.record(&Access::BackedUp).await?;
+async fn copy_into(access_log: &AccessLog, file: NamedTempFile, what: &str) -> Result<VerifiedCopy, BackupError> {
+    access_log.record(&Access::BackedUp).await?;
     // A connection of its own: its thread has the priority of this one, and the server's readers stay free.
-    let reader = Reader::open(recorder.folder()).await?;
+    let reader = Reader::open(access_log.folder()).await?;
     let copied = reader.copy_to(file.path()).await;
     reader.close().await;
     copied?;
@@ -248,9 +248,9 @@ pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Resul
         reader.close().await;
     }
 
-    let recorder = Recorder::open_file(copy.path(), Arc::clone(&clock)).await?;
-    recorder.record(&Access::Restored { replaced: replaced.clone() }).await?;
-    recorder.close().await;
+    let access_log = AccessLog::open_file(copy.path(), Arc::clone(&clock)).await?;
+    access_log.record(&Access::Restored { replaced: replaced.clone() }).await?;
+    access_log.close().await;
     synced(copy.path())?;
 
     let kept = if there { Some(set_aside(&database, clock.wall()).await?) } else { None };

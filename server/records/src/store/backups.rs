@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 use utoipa::ToSchema;
 
 use super::backup::{BackupError, VerifiedCopy, verified_copy};
-use super::{Reader, Recorder, StoreError};
+use super::{AccessLog, Reader, StoreError};
 use parfocal_base::priority;
 use parfocal_recording::room;
 use parfocal_trial::account::AccountName;
@@ -30,10 +30,10 @@ const OUTDATED: &str = "words were erased after this backup was begun; make anot
 #[derive(Clone)]
 pub struct Backups {
     folder: PathBuf,
-    latest: Arc<Mutex<Option<Latest>>>,
+    latest: Arc<Mutex<Option<LatestBackup>>>,
 }
 
-struct Latest {
+struct LatestBackup {
     /// Account that requested the backup. No other account gets it.
     by: AccountName,
     stage: Stage,
@@ -99,19 +99,19 @@ impl Backups {
 
     /// Begins a backup for `by`, unless one is being made. `recorder` records it.
     #[must_use]
-    pub fn start(&self, recorder: Recorder, by: AccountName) -> BackupState {
+    pub fn start(&self, access_log: AccessLog, by: AccountName) -> BackupState {
         let mut latest = self.lock();
         if latest.as_ref().is_some_and(|latest| matches!(latest.stage, Stage::Running)) {
             return BackupState::Running;
         }
 
         let number = latest.as_ref().map_or(0, |latest| latest.number) + 1;
-        let before = latest.replace(Latest { by, stage: Stage::Running, number });
+        let before = latest.replace(LatestBackup { by, stage: Stage::Running, number });
         drop(latest);
         forget(before);
 
         let backups = self.clone();
-        tokio::spawn(async move { backups.run(recorder, number).await });
+        tokio::spawn(async move { backups.run(access_log, number).await });
         BackupState::Running
     }
 
@@ -123,7 +123,7 @@ impl Backups {
         self.give_up_outdated(reader).await?;
         let latest = self.lock();
         Ok(match latest.as_ref() {
-            Some(Latest { stage: Stage::Running, .. }) => BackupState::Running,
+            Some(LatestBackup { stage: Stage::Running, .. }) => BackupState::Running,
             Some(latest) if latest.by == *by => match &latest.stage {
                 Stage::Running => BackupState::Running,
                 Stage::Failed(reason) => BackupState::Failed { reason: reason.clone() },
@@ -140,7 +140,7 @@ impl Backups {
     pub async fn made(&self, reader: &Reader, by: &AccountName) -> Result<Option<FinishedBackup>, StoreError> {
         self.give_up_outdated(reader).await?;
         Ok(match self.lock().as_ref() {
-            Some(Latest { stage: Stage::Ready(made), by: owner, .. }) if owner == by => Some(made.clone()),
+            Some(LatestBackup { stage: Stage::Ready(made), by: owner, .. }) if owner == by => Some(made.clone()),
             _ => None,
         })
     }
@@ -156,8 +156,8 @@ impl Backups {
         Ok(())
     }
 
-    async fn run(self, recorder: Recorder, number: u64) {
-        let stage = match self.make(recorder).await {
+    async fn run(self, access_log: AccessLog, number: u64) {
+        let stage = match self.make(access_log).await {
             Ok(made) => Stage::Ready(made),
             Err(reason) => {
                 tracing::warn!("a backup to download could not be made: {reason}");
@@ -178,8 +178,8 @@ impl Backups {
 
     /// Makes the backup on a thread that all others come before, since a large database takes a while to copy and to
     /// verify.
-    async fn make(&self, recorder: Recorder) -> Result<FinishedBackup, String> {
-        let erasures = recorder.reader().count_erasures().await.map_err(|error| error.to_string())?;
+    async fn make(&self, access_log: AccessLog) -> Result<FinishedBackup, String> {
+        let erasures = access_log.reader().count_erasures().await.map_err(|error| error.to_string())?;
         let folder = self.folder.clone();
         let runtime = Handle::current();
         let (done, made) = oneshot::channel();
@@ -187,7 +187,7 @@ impl Backups {
         let work = move || {
             // Threads that this one starts, such as those of database connections, inherit the lower priority.
             priority::lower_further();
-            let _ = done.send(runtime.block_on(copy(&recorder, &folder)));
+            let _ = done.send(runtime.block_on(copy(&access_log, &folder)));
         };
         let thread = std::thread::Builder::new().name("backup".to_owned());
         thread.spawn(work).map_err(|error| format!("no thread could be started: {error}"))?;
@@ -198,24 +198,24 @@ impl Backups {
         Ok(FinishedBackup { file: Arc::new(copy.into_path()), bytes, head, erasures })
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<Latest>> {
+    fn lock(&self) -> MutexGuard<'_, Option<LatestBackup>> {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-async fn copy(recorder: &Recorder, folder: &Path) -> Result<VerifiedCopy, BackupError> {
+async fn copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
     let unwritable = |error| BackupError::File { path: folder.to_owned(), error };
     std::fs::create_dir_all(folder).map_err(unwritable)?;
-    let needed = recorder.reader().bytes().await?;
+    let needed = access_log.reader().bytes().await?;
     // Comments and answers of a session need the reserve. If the free space is unknown, writing reports a full disk.
     if room(folder).is_ok_and(|room| room.spare() < needed) {
         return Err(BackupError::NoRoom { path: folder.to_owned(), needed });
     }
-    verified_copy(recorder, folder).await
+    verified_copy(access_log, folder).await
 }
 
 /// Removes a backup's file on a thread that may block on the disk.
-fn forget(backup: Option<Latest>) {
+fn forget(backup: Option<LatestBackup>) {
     if backup.is_some() {
         tokio::task::spawn_blocking(move || drop(backup));
     }

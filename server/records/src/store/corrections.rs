@@ -51,9 +51,9 @@ pub struct StoredCorrection {
 
 /// The latest correction of each field of each record of a session.
 #[derive(Debug, Clone, Default)]
-pub struct Latest(BTreeMap<(Subject, String, Field), String>);
+pub struct LatestCorrections(BTreeMap<(Subject, String, Field), String>);
 
-impl Latest {
+impl LatestCorrections {
     /// Takes the `corrections` of a session, in the order in which they were recorded.
     #[must_use]
     pub fn of(corrections: &[StoredCorrection]) -> Self {

@@ -30,7 +30,7 @@ use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct ServerRun {
     /// When the server started, by the wall clock.
     pub wall: Timestamp,
     /// When the server started, by the monotonic clock.
@@ -105,7 +105,7 @@ impl Store {
     ///
     /// # Errors
     /// If another server uses the folder, the database is from a newer version, or the disk cannot be written.
-    pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
+    pub async fn open(folder: &Path, run: &ServerRun) -> Result<Self, StoreError> {
         Self::open_locked(LockedFolder::of(folder)?, run).await
     }
 
@@ -113,7 +113,7 @@ impl Store {
     ///
     /// # Errors
     /// If the database is from a newer version, or the disk cannot be written.
-    pub async fn open_locked(locked: LockedFolder, run: &Run) -> Result<Self, StoreError> {
+    pub async fn open_locked(locked: LockedFolder, run: &ServerRun) -> Result<Self, StoreError> {
         let LockedFolder { folder, lock } = locked;
         let file = folder.join(DATABASE);
         let options = SqliteConnectOptions::new()
@@ -277,7 +277,7 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
 }
 
 /// Records the start of a run. Before that, chains the telemetry that the run before left unchained.
-async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
+async fn begin_run(trial: &SqlitePool, run: &ServerRun) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
 

@@ -44,19 +44,19 @@ mod withdrawals;
 mod writer;
 mod writes;
 
-pub use accesses::{Access, Recorder};
+pub use accesses::{Access, AccessLog};
 pub use accounts::{
     AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, StoredAccount, StoredSignIn,
 };
 pub use backups::{BackupState, Backups, FinishedBackup};
 pub use chain::Head;
 pub use consents::StoredConsent;
-pub use corrections::{Correction, Latest, StoredCorrection};
+pub use corrections::{Correction, LatestCorrections, StoredCorrection};
 pub use counts::Counts;
-pub use database::{LockedFolder, Run, Store};
+pub use database::{LockedFolder, ServerRun, Store};
 pub use erasures::{Erased, Erasure, StoredErasure};
 pub use error::StoreError;
-pub use motion::Motion;
+pub use motion::LensMotion;
 pub use reader::Reader;
 pub use remarks::{KeepOutcome, withdrawn};
 pub use rows::*;
@@ -64,7 +64,7 @@ pub use schema::MIGRATOR;
 pub use sessions::{NewSession, StoredSession};
 pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
-pub use voice::{KeptVoice, PieceKept, Recorded, StoredPiece, VoicePiece};
+pub use voice::{KeptVoice, PieceKept, StoredPiece, VoicePiece, VoiceRecording};
 pub use whole::{DatabaseState, database_state};
 pub use withdrawals::Withdrawal;
 pub use writes::{WriteTimes, Writes};

@@ -16,7 +16,7 @@ const GAP_NS: i64 = 1_000_000_000;
 /// How the lens was driven in a setting. Frames at which the loop held the lens on request, for a pause or for a failed
 /// device are left out. Frames that were held because of the policy are counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Motion {
+pub struct LensMotion {
     /// Setting, from 1.
     pub setting: usize,
     /// Number of frames.
@@ -40,12 +40,12 @@ pub struct Motion {
 pub type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
 
 /// Figures of ended sessions, by session. Their telemetry no longer changes.
-pub type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<Motion>>>>;
+pub type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<LensMotion>>>>;
 
 /// A setting's figures so far.
 #[derive(Default)]
 pub struct RunningFigures {
-    pub motion: Motion,
+    pub motion: LensMotion,
     /// Run, end of the exposure and focal power of the frame before; `None` if the loop was held then.
     before: Option<(i64, i64, f64)>,
     /// The latest change of focal power.

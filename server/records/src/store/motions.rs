@@ -4,7 +4,7 @@ use std::sync::PoisonError;
 
 use futures_util::TryStreamExt;
 
-use super::motion::{Motion, Row, RunningFigures};
+use super::motion::{LensMotion, Row, RunningFigures};
 use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
 
@@ -14,7 +14,7 @@ impl Reader {
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn motions_of_ended(&self, session: SessionId) -> Result<Vec<Motion>, StoreError> {
+    pub async fn motions_of_ended(&self, session: SessionId) -> Result<Vec<LensMotion>, StoreError> {
         let remembered = self.ended.lock().unwrap_or_else(PoisonError::into_inner).get(&session).cloned();
         if let Some(motions) = remembered {
             return Ok(motions);
@@ -29,7 +29,7 @@ impl Reader {
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn motions(&self, session: SessionId) -> Result<Vec<Motion>, StoreError> {
+    pub async fn motions(&self, session: SessionId) -> Result<Vec<LensMotion>, StoreError> {
         let segments: Vec<(i64, i64)> =
             sqlx::query_as("SELECT number, setting FROM segments WHERE session = ? ORDER BY setting")
                 .bind(session.to_string())
@@ -52,7 +52,7 @@ impl Reader {
             }
             if watched.motion.frames > 0 {
                 let setting = usize::try_from(setting).unwrap_or(0);
-                motions.push(Motion { setting, ..watched.motion });
+                motions.push(LensMotion { setting, ..watched.motion });
             }
         }
         Ok(motions)

@@ -12,7 +12,7 @@ use parfocal_base::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::{CommentContent, Origin, Sight};
-use parfocal_trial::standing::{GivenAnswer, Standing, by_question};
+use parfocal_trial::standing::{AnswerStanding, GivenAnswer, by_question};
 
 /// When something was recorded, by both clocks of the server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +87,7 @@ impl Answer {
 /// The standing of each of `answers`, such as whether it counts. `answers` are those of a session in the order they
 /// were kept, each with the run that kept it.
 #[must_use]
-pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<Standing> {
+pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<AnswerStanding> {
     let asked = |(run, answer): &(i64, Answer)| ((answer.segment, answer.question.clone()), answer.given(*run, clocks));
     by_question(answers.iter().map(asked))
 }

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
-use super::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
+use super::chain::check::{BlockToCheck, ChainCheck, FoundEntry, FoundRow};
 use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
 use super::schema::DATABASE;
@@ -83,7 +83,7 @@ async fn chain(snapshot: &Reader, expected: Option<Head>) -> Result<String, Wron
     const PAGE: i64 = 4096;
 
     let mut connection = snapshot.pool().acquire().await?;
-    let mut walk = Walk::new(all(&mut connection).await?, expected);
+    let mut walk = ChainCheck::new(all(&mut connection).await?, expected);
     let mut after = i64::MIN;
     loop {
         let page = sqlx::query(
@@ -139,7 +139,7 @@ async fn check_block(connection: &mut SqliteConnection, block: &BlockToCheck) ->
 
 /// How many steps of telemetry have no block yet. Only the latest run may have such steps, because the next start of
 /// the server chains what a killed one left unchained.
-async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64, Wrong> {
+async fn unchained(connection: &mut SqliteConnection, walk: &ChainCheck) -> Result<i64, Wrong> {
     let sessions = sqlx::query_as(
         "SELECT session, session IN (SELECT session FROM events WHERE run = (SELECT max(run) FROM events))
          FROM sessions ORDER BY rowid",

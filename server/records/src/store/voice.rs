@@ -75,12 +75,12 @@ pub struct StoredPiece {
 
 /// A recording without its sound: its pieces, in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Recorded {
+pub struct VoiceRecording {
     /// The pieces that arrived.
     pub pieces: Vec<StoredPiece>,
 }
 
-impl Recorded {
+impl VoiceRecording {
     /// Length of all pieces in bytes.
     #[must_use]
     pub fn bytes(&self) -> i64 {
@@ -207,7 +207,7 @@ impl Reader {
     ///
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
-    pub async fn voice(&self, session: SessionId) -> Result<BTreeMap<IdempotencyKey, Recorded>, StoreError> {
+    pub async fn voice(&self, session: SessionId) -> Result<BTreeMap<IdempotencyKey, VoiceRecording>, StoreError> {
         let rows = sqlx::query(
             "SELECT number, comment, piece, media_type, through_ms, ended, bytes, sha256, run, wall, monotonic_ns
              FROM voice_pieces WHERE session = ? ORDER BY comment, piece",
@@ -216,7 +216,7 @@ impl Reader {
         .fetch_all(self.pool())
         .await?;
 
-        let mut recordings: BTreeMap<IdempotencyKey, Recorded> = BTreeMap::new();
+        let mut recordings: BTreeMap<IdempotencyKey, VoiceRecording> = BTreeMap::new();
         for row in &rows {
             recordings.entry(parsed(row, "comment")?).or_default().pieces.push(stored(row)?);
         }

@@ -8,7 +8,7 @@ use super::records::{
 };
 use super::report::AnalysedSession;
 use parfocal_records::store::{
-    Erased, Latest, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings,
+    Erased, LatestCorrections, Reader, RunClocks, StoreError, StoredSession, StoredStudy, standings,
     withdrawn as withdrawn_comments,
 };
 use parfocal_trial::correction::Subject;
@@ -99,7 +99,7 @@ async fn read_session(
         return Ok((line, None));
     }
 
-    let corrections = Latest::of(&reader.corrections(session.session).await?);
+    let corrections = LatestCorrections::of(&reader.corrections(session.session).await?);
     let erased = Erased::by(&reader.erasures(session.session).await?);
     let settings = stored.made.segments.iter().map(|(segment, policy)| (*segment, policy.as_str().to_owned()));
 
@@ -124,7 +124,7 @@ fn unblinded_before(stored: &StoredSession) -> bool {
 async fn comments(
     reader: &Reader,
     session: &Enrolled,
-    corrections: &Latest,
+    corrections: &LatestCorrections,
     erased: &Erased,
 ) -> Result<Vec<CommentRecord>, StoreError> {
     let kept = reader.comments(session.session).await?;
@@ -145,7 +145,7 @@ async fn answers(
     reader: &Reader,
     clocks: &RunClocks,
     session: &Enrolled,
-    corrections: &Latest,
+    corrections: &LatestCorrections,
     erased: &Erased,
 ) -> Result<Vec<AnswerRecord>, StoreError> {
     let answers = reader.answers(session.session).await?;

@@ -15,7 +15,7 @@ use super::records::{
 use super::report::AnalysedSession;
 use crate::package::{LeftOut, PackageError, exports_of, left_out};
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_records::store::Motion;
+use parfocal_records::store::LensMotion;
 use parfocal_records::store::export::ExportFiles;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
@@ -135,7 +135,7 @@ struct ExportedSession {
     tables: Tables,
     /// The policies of its settings, in order.
     schedule: Vec<String>,
-    motions: Vec<Motion>,
+    motions: Vec<LensMotion>,
     /// Identity of its database: the hash of the first row of its chain, which is random.
     database: String,
     /// The row of the chain with the session, which tells the order in which sessions were made.

@@ -6,7 +6,7 @@ use super::outcomes::{is_ranking, of_answer, of_motion, of_ranks, rank_name};
 use super::records::{AnswerRecord, SessionRecords};
 use super::report::{SettingWords, Words};
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_records::store::Motion;
+use parfocal_records::store::LensMotion;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::question::{AnswerValue, Question, QuestionKind};
 
@@ -99,7 +99,7 @@ impl<'a> Gathering<'a> {
         self.segments.iter().position(|known| Some(*known) == segment)
     }
 
-    fn take_motion(&mut self, motion: &Motion) {
+    fn take_motion(&mut self, motion: &LensMotion) {
         let setting = motion.setting.checked_sub(1).and_then(|place| self.gathered.settings.get_mut(place));
         let Some(setting) = setting else { return };
         let values = of_motion(motion).into_iter().map(|(outcome, value)| (outcome.to_owned(), value));

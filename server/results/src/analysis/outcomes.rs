@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::Motion;
+use parfocal_records::store::LensMotion;
 use parfocal_trial::instruments::{Measure, measures};
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::question::{AnswerValue, Question, QuestionKind};
@@ -92,7 +92,7 @@ pub fn driven() -> Vec<Outcome> {
 /// The values of the outcomes of [`driven`] in `motion`. Those that need the optimum are left out unless it is known
 /// for at least half of the frames.
 #[must_use]
-pub fn of_motion(motion: &Motion) -> Vec<(&'static str, f64)> {
+pub fn of_motion(motion: &LensMotion) -> Vec<(&'static str, f64)> {
     let mut values = Vec::new();
     if motion.seconds > 0.0 {
         values.push((TURNS, motion.turns as f64 / motion.seconds));

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::report::{AnalysedSession, Words};
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_records::store::Motion;
+use parfocal_records::store::LensMotion;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::question::AnswerValue;
@@ -55,7 +55,7 @@ pub struct SessionRecords {
     /// The session's settings in order: the segment, and the policy that ran in it.
     pub settings: Vec<(SegmentId, String)>,
     /// How the lens was driven in each setting that has telemetry.
-    pub motions: Vec<Motion>,
+    pub motions: Vec<LensMotion>,
     /// The comments, in order.
     pub comments: Vec<CommentRecord>,
     /// The answers that count, in order.

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::error::StudyExportError;
 use super::making::{Progress, export_study};
-use parfocal_records::store::{Reader, Recorder, StoreError};
+use parfocal_records::store::{AccessLog, Reader, StoreError};
 
 /// The folder within the data folder in which exports are made.
 const FOLDER: &str = "study-exports";
@@ -27,11 +27,11 @@ const OUTDATED: &str = "a surgeon has withdrawn or words were erased after this 
 #[derive(Clone)]
 pub struct StudyExports {
     folder: PathBuf,
-    latest: Arc<Mutex<BTreeMap<String, Latest>>>,
+    latest: Arc<Mutex<BTreeMap<String, LatestExport>>>,
 }
 
 /// The latest export of a study.
-struct Latest {
+struct LatestExport {
     unblinded: bool,
     stage: Stage,
     /// Number of the export, which distinguishes it from the one before.
@@ -108,7 +108,7 @@ impl StudyExports {
     /// If the database failed.
     pub async fn state(&self, reader: &Reader, study: &str) -> Result<StudyExportState, StoreError> {
         self.give_up_outdated(reader, study).await?;
-        Ok(self.lock().get(study).map_or(StudyExportState::None, Latest::state))
+        Ok(self.lock().get(study).map_or(StudyExportState::None, LatestExport::state))
     }
 
     /// The latest export of `study`, if it is finished.
@@ -117,7 +117,7 @@ impl StudyExports {
     /// If the database failed.
     pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<FinishedExport>, StoreError> {
         self.give_up_outdated(reader, study).await?;
-        Ok(self.lock().get(study).and_then(Latest::made))
+        Ok(self.lock().get(study).and_then(LatestExport::made))
     }
 
     /// Discards the finished export of `study` if a surgeon has withdrawn or words were erased since it was begun,
@@ -130,7 +130,7 @@ impl StudyExports {
             return Ok(());
         }
 
-        let given_up = Latest { stage: Stage::Failed(OUTDATED.to_owned()), ..*latest };
+        let given_up = LatestExport { stage: Stage::Failed(OUTDATED.to_owned()), ..*latest };
         let before = std::mem::replace(latest, given_up);
         drop(exports);
         forget(Some(before));
@@ -140,7 +140,7 @@ impl StudyExports {
     /// Starts an export of `study`, unless one is already running, and returns the state. `recorder` records the
     /// export.
     #[must_use]
-    pub fn start(&self, recorder: Recorder, study: &str, unblinded: bool) -> StudyExportState {
+    pub fn start(&self, access_log: AccessLog, study: &str, unblinded: bool) -> StudyExportState {
         let mut latest = self.lock();
         let number = match latest.get(study) {
             Some(running) if matches!(running.stage, Stage::Running(_)) => return running.state(),
@@ -149,30 +149,30 @@ impl StudyExports {
         };
 
         // Removes the previous export now, because the disk may not have room for two packages of a study.
-        let started = Latest { unblinded, stage: Stage::Running(Progress::default()), number };
+        let started = LatestExport { unblinded, stage: Stage::Running(Progress::default()), number };
         let state = started.state();
         let before = latest.insert(study.to_owned(), started);
         drop(latest);
         forget(before);
 
         let job = Job { exports: self.clone(), study: study.to_owned(), unblinded, number };
-        tokio::spawn(job.run(recorder));
+        tokio::spawn(job.run(access_log));
         state
     }
 
     /// Removes export `number` of `study` from the list, unless a later one has replaced it.
-    fn take(&self, study: &str, number: u64) -> Option<Latest> {
+    fn take(&self, study: &str, number: u64) -> Option<LatestExport> {
         let mut latest = self.lock();
         let same = latest.get(study).is_some_and(|latest| latest.number == number);
         if same { latest.remove(study) } else { None }
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Latest>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, LatestExport>> {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Latest {
+impl LatestExport {
     /// The export, if it is finished.
     fn made(&self) -> Option<FinishedExport> {
         match &self.stage {
@@ -200,8 +200,8 @@ struct Job {
 }
 
 impl Job {
-    async fn run(self, recorder: Recorder) {
-        let stage = match self.make(&recorder).await {
+    async fn run(self, access_log: AccessLog) {
+        let stage = match self.make(&access_log).await {
             Ok(made) => Stage::Ready(made),
             Err(error) => {
                 tracing::warn!(study = %self.study, "a study could not be exported: {error}");
@@ -210,19 +210,19 @@ impl Job {
         };
         self.stands_at(stage);
         // Dropped before the wait, so that a server that stops meanwhile can close its database.
-        drop(recorder);
+        drop(access_log);
 
         tokio::time::sleep(KEPT).await;
         forget(self.exports.take(&self.study, self.number));
     }
 
-    async fn make(&self, recorder: &Recorder) -> Result<FinishedExport, StudyExportError> {
+    async fn make(&self, access_log: &AccessLog) -> Result<FinishedExport, StudyExportError> {
         let folder = &self.exports.folder;
         let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
         std::fs::create_dir_all(folder).map_err(unwritable)?;
         let room = tempfile::Builder::new().prefix("export-").tempdir_in(folder).map_err(unwritable)?;
         let package = room.path().join(&self.study);
-        let taken_back = recorder.reader().taken_back(&self.study).await?;
+        let taken_back = access_log.reader().taken_back(&self.study).await?;
 
         let exports = self.exports.clone();
         let study = self.study.clone();
@@ -231,7 +231,7 @@ impl Job {
                 latest.stage = Stage::Running(progress);
             }
         };
-        let summary = export_study(recorder, &self.study, self.unblinded, &package, Arc::new(report)).await?;
+        let summary = export_study(access_log, &self.study, self.unblinded, &package, Arc::new(report)).await?;
 
         let room = Arc::new(room);
         let sessions = summary.sessions;
@@ -246,7 +246,7 @@ impl Job {
 }
 
 /// Removes an export's files on a thread that may block on the disk.
-fn forget(export: Option<Latest>) {
+fn forget(export: Option<LatestExport>) {
     if export.is_some() {
         tokio::task::spawn_blocking(move || drop(export));
     }

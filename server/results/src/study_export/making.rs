@@ -19,7 +19,7 @@ use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
 use parfocal_recording::room;
 use parfocal_records::store::export::Export;
-use parfocal_records::store::{Reader, Recorder};
+use parfocal_records::store::{AccessLog, Reader};
 use parfocal_trial::study::places::Enrolled;
 use parfocal_trial::study::stage::Stage;
 
@@ -51,14 +51,15 @@ pub type ProgressCallback = Arc<dyn Fn(Progress) + Send + Sync>;
 /// If there is no such study, it has no session to export, the policies are requested before it is unblinded, an export
 /// cannot be verified, or `out` cannot be written.
 pub async fn export_study(
-    recorder: &Recorder,
+    access_log: &AccessLog,
     study: &str,
     unblinded: bool,
     out: &Path,
     progress: ProgressCallback,
 ) -> Result<Summary, StudyExportError> {
-    let (sessions, left_out) = sessions_of(recorder.reader(), study, unblinded).await?;
-    let making = Making { recorder: recorder.clone(), sessions, left_out, unblinded, out: out.to_owned(), progress };
+    let (sessions, left_out) = sessions_of(access_log.reader(), study, unblinded).await?;
+    let making =
+        Making { access_log: access_log.clone(), sessions, left_out, unblinded, out: out.to_owned(), progress };
 
     let runtime = Handle::current();
     let (done, made) = oneshot::channel();
@@ -115,7 +116,7 @@ async fn sessions_of(
 
 /// An export with its sessions and its target folder.
 struct Making {
-    recorder: Recorder,
+    access_log: AccessLog,
     sessions: Vec<SessionId>,
     left_out: Vec<LeftOut>,
     unblinded: bool,
@@ -207,7 +208,7 @@ impl Work<'_> {
         let folder = self.folder.join(session.to_string());
         self.runtime.block_on(async {
             let turn = self.turn.lock().await;
-            let export = Export::prepare(&self.making.recorder, session, self.making.unblinded).await?;
+            let export = Export::prepare(&self.making.access_log, session, self.making.unblinded).await?;
             drop(turn);
             export.into_folder(&folder).await
         })?;

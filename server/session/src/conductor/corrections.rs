@@ -3,7 +3,7 @@
 use super::course::Course;
 use super::{ConductError, Conductor, Shared};
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{Answer, Correction, Latest, standings};
+use parfocal_records::store::{Answer, Correction, LatestCorrections, standings};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::{self, Corrected, Field, FieldChange, NewCorrection, Subject};
 use parfocal_trial::permission;
@@ -46,7 +46,7 @@ impl Shared {
             permission::check_reading(course.state.withdrawn())?;
         }
 
-        let latest = Latest::of(&self.store.reader().corrections(session).await?);
+        let latest = LatestCorrections::of(&self.store.reader().corrections(session).await?);
         let DecidedCorrection { subject, record, field, old, new } = match new.change {
             FieldChange::Participant { old, new } => self.participant(&course, &latest, old, new).await?,
             FieldChange::Value { record, old, new } => self.value(&course, &latest, record, &old, &new).await?,
@@ -62,7 +62,7 @@ impl Shared {
     async fn participant(
         &self,
         course: &Course,
-        latest: &Latest,
+        latest: &LatestCorrections,
         old: String,
         new: String,
     ) -> Result<DecidedCorrection, ConductError> {
@@ -84,7 +84,7 @@ impl Shared {
     async fn value(
         &self,
         course: &Course,
-        latest: &Latest,
+        latest: &LatestCorrections,
         record: IdempotencyKey,
         old: &AnswerValue,
         new: &AnswerValue,
@@ -120,7 +120,7 @@ impl Shared {
     async fn note(
         &self,
         course: &Course,
-        latest: &Latest,
+        latest: &LatestCorrections,
         record: IdempotencyKey,
         old: &str,
         new: &str,

@@ -69,7 +69,7 @@ fn run(mut waiting: mpsc::Receiver<Job>) {
 pub(super) struct Open {
     recording: AnyRecording,
     /// None for a recording of the view.
-    studio: Option<Studio>,
+    mosaics: Option<MosaicDeveloper>,
 }
 
 fn look_into<T>(
@@ -99,35 +99,35 @@ fn look_into<T>(
 impl Open {
     fn new(folder: &Path) -> Result<Self, PlaybackError> {
         let recording = AnyRecording::open(folder).map_err(unreadable)?;
-        let studio = match &recording {
-            AnyRecording::Mosaic(recording) => Some(Studio::new(recording)?),
+        let mosaics = match &recording {
+            AnyRecording::Mosaic(recording) => Some(MosaicDeveloper::new(recording)?),
             AnyRecording::View(_) => None,
         };
-        Ok(Self { recording, studio })
+        Ok(Self { recording, mosaics })
     }
 
     /// Frame `number`, from 0, as a JPEG; a mosaic developed at `size`.
     pub fn picture(&mut self, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
-        match (&self.recording, &mut self.studio) {
+        match (&self.recording, &mut self.mosaics) {
             (AnyRecording::View(recording), _) => recording.picture(number).map(Bytes::from).map_err(unreadable),
-            (AnyRecording::Mosaic(recording), Some(studio)) => studio.picture(recording, number, size),
+            (AnyRecording::Mosaic(recording), Some(mosaics)) => mosaics.picture(recording, number, size),
             (AnyRecording::Mosaic(_), None) => Err(PlaybackError::Ending),
         }
     }
 
     /// The spectrum of frame `number`, from 0, within `circle`.
     pub fn spectrum(&mut self, number: usize, circle: Circle) -> Result<PlaceSpectrum, PlaybackError> {
-        let (AnyRecording::Mosaic(recording), Some(studio)) = (&self.recording, &mut self.studio) else {
+        let (AnyRecording::Mosaic(recording), Some(mosaics)) = (&self.recording, &mut self.mosaics) else {
             return Err(PlaybackError::NotFound("a recording of the view has no spectra, only colours".to_owned()));
         };
-        let mut sum = SpectrumSum::new(&studio.calibration, circle, recording.size())?;
-        sum.add(read(&mut studio.latest, recording, number)?);
-        Ok(PlaceSpectrum::new(&studio.calibration, &sum.spectrum()))
+        let mut sum = SpectrumSum::new(&mosaics.calibration, circle, recording.size())?;
+        sum.add(read(&mut mosaics.latest, recording, number)?);
+        Ok(PlaceSpectrum::new(&mosaics.calibration, &sum.spectrum()))
     }
 }
 
 /// Develops mosaics with the calibration that was stored in their recording.
-struct Studio {
+struct MosaicDeveloper {
     calibration: Calibration,
     developer: Developer,
     encoder: JpegEncoder,
@@ -138,7 +138,7 @@ struct Studio {
     latest: Option<(usize, MosaicFrame)>,
 }
 
-impl Studio {
+impl MosaicDeveloper {
     fn new(recording: &Recording) -> Result<Self, PlaybackError> {
         let calibration = calibration::read(&recording.calibration())
             .map_err(|error| PlaybackError::Unreadable(format!("the recording's calibration: {error}")))?;

@@ -9,7 +9,7 @@ use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 use crate::conductor::{ConductError, Course};
 use parfocal_base::PolicyName;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
-use parfocal_records::store::{DeviceEvent, Erased, Latest, SessionLine, standings};
+use parfocal_records::store::{DeviceEvent, Erased, LatestCorrections, SessionLine, standings};
 use parfocal_trial::correction::{Field, Subject};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::EventKind;
@@ -193,7 +193,7 @@ impl Reports {
         let clocks = &self.run_clock.clocks;
         let answers = self.reader.answers(course.session()).await?;
         let standings = standings(&answers, clocks);
-        let corrections = Latest::of(&self.reader.corrections(course.session()).await?);
+        let corrections = LatestCorrections::of(&self.reader.corrections(course.session()).await?);
         let erased = Erased::by(&self.reader.erasures(course.session()).await?);
 
         let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();

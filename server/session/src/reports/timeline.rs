@@ -11,7 +11,9 @@ use super::Reports;
 use crate::conductor::{ConductError, Course};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
-use parfocal_records::store::{Answer, Erased, Latest, PathPoint, Recorded, RunClocks, standings, withdrawn};
+use parfocal_records::store::{
+    Answer, Erased, LatestCorrections, PathPoint, RunClocks, VoiceRecording, standings, withdrawn,
+};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::event::{Event, EventKind, per_second};
@@ -21,7 +23,7 @@ use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::{Inspection, inspections};
-use parfocal_trial::standing::Standing;
+use parfocal_trial::standing::AnswerStanding;
 use parfocal_trial::tablet::PictureSize;
 use parfocal_trial::voice::Ending;
 
@@ -227,7 +229,7 @@ impl Reports {
             patch_y: point.patch_y,
         };
 
-        let notes = Latest::of(&reader.corrections(session).await?);
+        let notes = LatestCorrections::of(&reader.corrections(session).await?);
         let erased = Erased::by(&reader.erasures(session).await?);
         let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
@@ -327,7 +329,7 @@ impl Reports {
     }
 }
 
-fn told_of(recorded: &Recorded) -> TimelineVoice {
+fn told_of(recorded: &VoiceRecording) -> TimelineVoice {
     TimelineVoice {
         media_type: recorded.media_type().map(|media_type| media_type.name().to_owned()),
         seconds: recorded.seconds(),
@@ -338,7 +340,7 @@ fn told_of(recorded: &Recorded) -> TimelineVoice {
 
 fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {
     let standings = standings(answers, runs);
-    let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
+    let is_aside = |answer: &Answer, standing: &AnswerStanding| !standing.counts && (answer.late || standing.disagrees);
     let aside = answers.iter().zip(&standings).filter(|((_, answer), standing)| is_aside(answer, standing));
     let points = aside.map(|((run, answer), _)| {
         let question = course.protocol.question(&answer.question, answer.segment.is_some());

@@ -92,17 +92,17 @@ async fn live(
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
     let browser = headers.get(USER_AGENT).and_then(|name| name.to_str().ok()).unwrap_or_default().to_owned();
     Ok(upgrade.on_upgrade(async move |socket| match role {
-        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, Desk::new(app, None, token)).await,
+        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, PageConnection::new(app, None, token)).await,
         Role::Surgeon | Role::System => {
             let tablet = app.tablets.enter(&browser, app.clock.now());
-            attend::<ForSurgeon>(socket, Desk::new(app, pass, None).of_tablet(tablet)).await;
+            attend::<ForSurgeon>(socket, PageConnection::new(app, pass, None).of_tablet(tablet)).await;
         }
     }))
 }
 
 /// Serves one page until it leaves or the server ends.
-async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
-    while let Ok(Some(message)) = desk.next_message(&mut socket).await {
+async fn attend<A: Audience>(mut socket: WebSocket, mut connection: PageConnection<A>) {
+    while let Ok(Some(message)) = connection.next_message(&mut socket).await {
         let last = matches!(message, Message::Close(_));
         if !matches!(timeout(SEND_LIMIT, socket.send(message)).await, Ok(Ok(()))) || last {
             break;
@@ -114,7 +114,7 @@ async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
 struct PageGone;
 
 /// The connection to one page: what the page was told, and what must still be sent to it.
-struct Desk<A: Audience> {
+struct PageConnection<A: Audience> {
     app: AppState,
     pictures: Pictures,
     heartbeat: Heartbeat,
@@ -130,7 +130,7 @@ struct Desk<A: Audience> {
     next: Option<Message>,
 }
 
-impl<A: Audience> Desk<A> {
+impl<A: Audience> PageConnection<A> {
     fn new(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Self {
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();

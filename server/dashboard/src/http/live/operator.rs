@@ -16,7 +16,7 @@ use super::tablets::TabletSign;
 use crate::http::App;
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
-use parfocal_base::priority::Standing;
+use parfocal_base::priority::Scheduling;
 use parfocal_base::step::Hold;
 use parfocal_devices::camera::{CameraHealth, CameraOffer};
 use parfocal_devices::lens::LensHealth;
@@ -98,10 +98,10 @@ pub(super) struct OperatorStatus {
     tablet: TabletSign,
 }
 
-/// A [`Standing`], with what it means and what to do, in words.
+/// A [`Scheduling`], with what it means and what to do, in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Priority {
-    standing: Standing,
+    standing: Scheduling,
     message: &'static str,
 }
 
@@ -173,7 +173,7 @@ impl Audience for ForOperator {
 
     fn status(status: &ControlStatus, app: &App) -> OperatorStatus {
         let tablet = app.tablets.sign(app.clock.now());
-        OperatorStatus::new(status, app.blinded(), app.reach.certificate_until(), tablet)
+        OperatorStatus::new(status, app.blinded(), app.address.certificate_until(), tablet)
     }
 }
 

@@ -148,7 +148,7 @@ impl Audience for ForSurgeon {
     }
 
     fn status(status: &ControlStatus, app: &App) -> SurgeonStatus {
-        SurgeonStatus::new(status, app.reach.certificate_until())
+        SurgeonStatus::new(status, app.address.certificate_until())
     }
 }
 

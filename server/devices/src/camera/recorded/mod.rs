@@ -7,7 +7,7 @@ mod writing;
 
 pub use folder::{Damage, ScanFolder};
 pub use player::open as play;
-pub use writing::{Recording, Shot};
+pub use writing::{ScanRecording, TakenPose};
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ pub struct Header {
     /// Seed of everything drawn at random: the order of focal powers, and all of a simulation.
     pub seed: u64,
     /// In which order each pose's focal powers were taken.
-    pub order: Order,
+    pub order: PictureOrder,
     /// Number of poses in the complete scan.
     pub poses: usize,
     /// The focal powers of each pose, in rising order.
@@ -61,7 +61,7 @@ pub struct Header {
 /// In which order each pose's focal powers were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Order {
+pub enum PictureOrder {
     /// The order of [`Pose::images`], drawn anew for each pose.
     Random,
     /// The order was not noted.

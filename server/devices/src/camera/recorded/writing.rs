@@ -18,7 +18,7 @@ use parfocal_imaging::{GrayImage, PatchArea};
 
 /// A scan that is being recorded, by one process at a time.
 #[derive(Debug)]
-pub struct Recording {
+pub struct ScanRecording {
     folder: ScanFolder,
     /// The file of lines, locked as long as this value lives.
     journal: File,
@@ -26,7 +26,7 @@ pub struct Recording {
 
 /// A pose as it was taken.
 #[derive(Debug, Clone)]
-pub struct Shot {
+pub struct TakenPose {
     /// Its number, from 1.
     pub pose: usize,
     /// Its pictures, in the order in which they were taken; all of one size.
@@ -39,7 +39,7 @@ pub struct Shot {
     pub truth: Option<FocalPower>,
 }
 
-impl Recording {
+impl ScanRecording {
     /// Begins a scan in `path`, a new or empty folder, or continues the scan there if it was begun with
     /// the same `header` (apart from the software's version).
     ///
@@ -86,7 +86,7 @@ impl Recording {
     ///
     /// # Errors
     /// If it cannot be written. Then no part of it is left.
-    pub fn store(&mut self, shot: &Shot) -> Result<(), ScanError> {
+    pub fn store(&mut self, shot: &TakenPose) -> Result<(), ScanError> {
         let name = format!("pose{:04}", shot.pose);
         let partial = self.folder.path().join(format!(".{name}.partial"));
         let stored = self.write(shot, &name, &partial);
@@ -100,7 +100,7 @@ impl Recording {
         Ok(())
     }
 
-    fn write(&self, shot: &Shot, name: &str, partial: &Path) -> io::Result<Pose> {
+    fn write(&self, shot: &TakenPose, name: &str, partial: &Path) -> io::Result<Pose> {
         fs::create_dir(partial)?;
         let rounded = |power: f64| format!("{power:.3}");
         let unlike: BTreeSet<String> = shot.images.iter().map(|(power, _)| rounded(power.get())).collect();
@@ -123,7 +123,7 @@ impl Recording {
         fs::rename(partial, &whole)?;
 
         let (width, height) = shot.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height));
-        let Shot { pose, patch, optimum, truth, .. } = *shot;
+        let TakenPose { pose, patch, optimum, truth, .. } = *shot;
         let pose = Pose { pose, width, height, patch: (patch.x, patch.y), optimum, truth, images };
 
         self.note(&pose).inspect_err(|_| {

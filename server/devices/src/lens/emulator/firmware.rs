@@ -27,7 +27,7 @@ const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
 
 /// A reply on its way.
 #[derive(Debug)]
-pub struct Answer {
+pub struct Reply {
     /// The bytes to send.
     pub bytes: Vec<u8>,
     /// Delay before they are sent.
@@ -36,7 +36,7 @@ pub struct Answer {
 
 /// An order that the driver received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+pub enum LensCommand {
     /// Control by current.
     CurrentMode,
     /// Go to a current, in counts.
@@ -60,7 +60,7 @@ pub struct Firmware {
     /// Focal power commands carried out, in the driver's units, each with the time it was read.
     pub commands: VecDeque<(Moment, i16)>,
     /// Every order that the driver received, carried out or not.
-    pub orders: VecDeque<Order>,
+    pub orders: VecDeque<LensCommand>,
     /// Number of whole requests that have arrived.
     pub requests: u64,
     /// Glitches of the next replies, in order; `None` for a good reply.
@@ -124,7 +124,7 @@ impl Firmware {
     }
 
     /// The driver's answers to `bytes`, one per request.
-    pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Answer> {
+    pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Reply> {
         if now.since(self.last_byte) > PATIENCE {
             self.buffer.clear();
         }
@@ -138,7 +138,7 @@ impl Firmware {
             Fault::Silent => self.buffer.clear(),
             Fault::Stranger => {
                 self.buffer.clear();
-                answers.push(Answer { bytes: b"ok T:21.4 B:60.0\r\n".to_vec(), takes: self.model.latency });
+                answers.push(Reply { bytes: b"ok T:21.4 B:60.0\r\n".to_vec(), takes: self.model.latency });
             }
             _ => {
                 while let Some(answer) = self.next(now) {
@@ -190,7 +190,7 @@ impl Firmware {
         Some(self.answer(name, payload.get(name.len()..).unwrap_or_default(), now))
     }
 
-    fn remember(&mut self, order: Order) {
+    fn remember(&mut self, order: LensCommand) {
         if self.orders.len() == REMEMBERED {
             self.orders.pop_front();
         }
@@ -204,10 +204,10 @@ impl Firmware {
         };
 
         let order = match name {
-            b"Aw" => Some(Order::Current(value(0))),
-            b"MwDA" => Some(Order::CurrentMode),
-            b"MwCA" => Some(Order::FocalPowerMode),
-            b"PwDA" => Some(Order::FocalPower(value(0))),
+            b"Aw" => Some(LensCommand::Current(value(0))),
+            b"MwDA" => Some(LensCommand::CurrentMode),
+            b"MwCA" => Some(LensCommand::FocalPowerMode),
+            b"PwDA" => Some(LensCommand::FocalPower(value(0))),
             _ => None,
         };
         if let Some(order) = order {
@@ -313,8 +313,8 @@ impl Firmware {
     }
 
     /// `answer` with the present fault and the next glitch applied.
-    fn sent(&mut self, answer: Vec<u8>) -> Answer {
-        let mut sent = Answer { bytes: self.damaged(answer), takes: self.model.latency };
+    fn sent(&mut self, answer: Vec<u8>) -> Reply {
+        let mut sent = Reply { bytes: self.damaged(answer), takes: self.model.latency };
         let glitch = self.glitches.pop_front().unwrap_or_else(|| self.noise_of_the_line());
 
         match glitch {

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-pub use firmware::Order;
+pub use firmware::LensCommand;
 pub use unit::{Fault, Glitch, LENS_DIOPTRES, Model};
 
 use super::Response;
@@ -123,7 +123,7 @@ impl Emulator {
 
     /// Orders that the unit received, carried out or not. Only the latest few thousand are kept.
     #[must_use]
-    pub fn orders(&self) -> Vec<Order> {
+    pub fn orders(&self) -> Vec<LensCommand> {
         self.firmware().orders.iter().copied().collect()
     }
 

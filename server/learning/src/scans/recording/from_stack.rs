@@ -11,7 +11,7 @@ use crate::scans::recorded::{as_patch, evenly_spread, levels_at};
 use crate::scans::stack::FocalStack;
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use parfocal_autofocus::mgm;
-use parfocal_devices::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, ScanError, VERSION};
+use parfocal_devices::camera::recorded::{FORMAT, Header, LEAST_SIDE, PictureOrder, ScanError, ScanRecording, VERSION};
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::Walk;
 use parfocal_imaging::{GrayImage, PATCH_SIDE, PatchArea};
@@ -135,13 +135,13 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
         simulated: false,
         calibration: None,
         seed: cut.seed,
-        order: Order::Unknown,
+        order: PictureOrder::Unknown,
         poses: cut.poses,
         focal_powers: powers.clone(),
     };
 
     let patch = middle(cut.size);
-    let mut recording = Recording::open(out, &header)?;
+    let mut recording = ScanRecording::open(out, &header)?;
 
     for (pose, window) in (1..).zip(windows) {
         if !recording.folder().poses().contains_key(&pose) {

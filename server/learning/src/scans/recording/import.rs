@@ -11,7 +11,7 @@ use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
 use parfocal_devices::camera::recorded::{
-    FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
+    FORMAT, Header, LEAST_SIDE, MOST_POSES, PictureOrder, ScanError, ScanFolder, ScanRecording, VERSION,
 };
 use parfocal_imaging::{
     GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
@@ -132,7 +132,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         simulated: false,
         calibration: None,
         seed: 0,
-        order: Order::Unknown,
+        order: PictureOrder::Unknown,
         poses: imported.len(),
         focal_powers: imported.powers(),
     };
@@ -144,7 +144,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
     reader.set_scale(imported.bits)?;
 
-    let mut recording = Recording::open(out, &header)?;
+    let mut recording = ScanRecording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
         let powers: Vec<FocalPower> = stack.iter().map(|(power, _)| *power).collect();
         let pictures = stack.iter().map(|(_, path)| reader.read(path)).collect::<Result<Vec<_>, _>>()?;

@@ -16,7 +16,7 @@ use super::recorded::{Stack as PatchStack, capture_order, levels_at};
 use parfocal_base::FocalPower;
 use parfocal_devices::camera::CameraError;
 use parfocal_devices::camera::recorded::LEAST_SIDE;
-use parfocal_devices::camera::recorded::{Recording, ScanError, Shot};
+use parfocal_devices::camera::recorded::{ScanError, ScanRecording, TakenPose};
 use parfocal_devices::lens::LensError;
 use parfocal_imaging::{GrayImage, PatchArea};
 
@@ -76,7 +76,7 @@ pub enum RecordError {
 /// # Errors
 /// [`RecordError::Stopped`] if `stop` returned true, another one if something failed.
 pub fn record(
-    recording: &mut Recording,
+    recording: &mut ScanRecording,
     source: &mut dyn PoseSource,
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(),
@@ -100,9 +100,9 @@ pub fn record(
 }
 
 /// A pose as it is stored. Its optimum is searched in the stack, as the evaluation does.
-fn shot(pose: usize, in_order: &[FocalPower], taken: PosePictures) -> Shot {
+fn shot(pose: usize, in_order: &[FocalPower], taken: PosePictures) -> TakenPose {
     let PosePictures { pictures, patch, truth } = taken;
     let patches = pictures.iter().map(|picture| Box::new(levels_at(picture, patch))).collect();
     let optimum = PatchStack::new(in_order, patches).optimum;
-    Shot { pose, images: in_order.iter().copied().zip(pictures).collect(), patch, optimum, truth }
+    TakenPose { pose, images: in_order.iter().copied().zip(pictures).collect(), patch, optimum, truth }
 }

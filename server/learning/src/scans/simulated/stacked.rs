@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::course::Course;
-use crate::scans::reach::{Following, Optics, Reach, whole};
+use crate::scans::reach::{Following, LensOverStack, Reach, whole};
 use crate::scans::relief::{Distance, StackScene};
 use parfocal_base::{BlurRate, FocalPower};
 use parfocal_imaging::{Patch, View};
@@ -12,14 +12,14 @@ use parfocal_imaging::{Patch, View};
 #[derive(Debug, Clone)]
 pub struct StackLook {
     stack: Arc<StackScene>,
-    optics: Optics,
+    optics: LensOverStack,
     following: Option<Following>,
 }
 
 impl StackLook {
     /// Draws the optics. A hand that follows knows its way ahead, so the crop of `course` advances.
     pub fn new(stack: Arc<StackScene>, course: &mut Course) -> Self {
-        let optics = Optics::draw(&stack, &mut course.random);
+        let optics = LensOverStack::draw(&stack, &mut course.random);
         let follows = stack.distance != Distance::Kept;
         let following = follows.then(|| Following::new(&stack, &mut course.crop, &mut course.random));
         Self { stack, optics, following }

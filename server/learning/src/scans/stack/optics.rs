@@ -40,7 +40,7 @@ pub struct FocusCurve {
 
 /// What is known about an optic. A figure is `None` if the pictures do not show it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Optics {
+pub struct StackOptics {
     /// Focus curves.
     pub places: Vec<FocusCurve>,
     /// Pixels of blur (standard deviation) a unit of position away from the sharpest picture.
@@ -51,14 +51,14 @@ pub struct Optics {
     pub magnification: Option<f64>,
 }
 
-impl Optics {
+impl StackOptics {
     /// Measures all figures that `stack` shows.
     #[must_use]
     pub fn of(stack: &FocalStack) -> Self {
         Self { magnification: magnification(stack), ..Self::of_focus(stack) }
     }
 
-    /// As [`Optics::of`], but without magnification, which takes longer than all the rest.
+    /// As [`StackOptics::of`], but without magnification, which takes longer than all the rest.
     #[must_use]
     pub fn of_focus(stack: &FocalStack) -> Self {
         let (width, height) = stack.size();
@@ -230,7 +230,7 @@ mod tests {
     fn blur_a_unit_is_what_the_pictures_were_blurred_with() {
         // 6 pixels a unit, sharpest at 0.5.
         let sharp = texture(8, SIDE);
-        let optics = Optics::of(&stack(|index| gaussian_blur(&sharp, 0.6 * (index as f64 - 5.0).abs())));
+        let optics = StackOptics::of(&stack(|index| gaussian_blur(&sharp, 0.6 * (index as f64 - 5.0).abs())));
         let blur = optics.blur_per_unit.unwrap();
         assert!((blur / 6.0 - 1.0).abs() < 0.1, "{blur}");
         assert!(optics.places.iter().all(|place| (place.best - 0.5).abs() < 1e-9));
@@ -243,7 +243,7 @@ mod tests {
         let sharp = GrayImage { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(squares).collect() };
         for soft in [1.0, 2.0, 3.0] {
             let blur = |index: usize| (1.6 * (index as f64 - 5.0)).hypot(soft);
-            let found = Optics::of(&stack(|index| gaussian_blur(&sharp, blur(index)))).softness.unwrap();
+            let found = StackOptics::of(&stack(|index| gaussian_blur(&sharp, blur(index)))).softness.unwrap();
             assert!((found / soft - 1.0).abs() < 0.15, "{found} instead of {soft}");
         }
     }
@@ -272,7 +272,7 @@ mod tests {
             GrayImage { width: SIDE, height: SIDE, data }
         };
 
-        let found = Optics::of(&stack(zoomed)).magnification.unwrap();
+        let found = StackOptics::of(&stack(zoomed)).magnification.unwrap();
         assert!((found / 0.0407 - 1.0).abs() < 0.2, "{found}");
     }
 }

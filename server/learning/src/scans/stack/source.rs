@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::check::check;
-use super::optics::Optics;
+use super::optics::StackOptics;
 use super::{FocalStack, Plane, StackError};
 use crate::scans::planes::{PlaneStack, PlanesError};
 use parfocal_base::BlurRate;
@@ -70,7 +70,7 @@ impl ScaledStack {
     /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
     #[must_use]
     pub fn blur_rate(&self) -> Option<BlurRate> {
-        let rate = Optics::of_focus(&self.stack).blur_per_unit?;
+        let rate = StackOptics::of_focus(&self.stack).blur_per_unit?;
         BlurRate::new(rate * (self.planes - 1) as f64)
     }
 }

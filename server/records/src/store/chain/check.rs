@@ -31,7 +31,7 @@ pub enum FoundEntry {
 }
 
 /// The state of a check.
-pub struct Walk {
+pub struct ChainCheck {
     /// Records whose row has not come yet, by kind and key.
     records: BTreeMap<(&'static str, String), Record>,
     expected: Option<Head>,
@@ -62,7 +62,7 @@ pub struct BlockToCheck {
     pub sealed_salt: Option<String>,
 }
 
-impl Walk {
+impl ChainCheck {
     /// Begins a check. `records` are all records except telemetry. `expected` is a head known from elsewhere.
     pub fn new(records: BTreeMap<(&'static str, String), Record>, expected: Option<Head>) -> Self {
         Self {

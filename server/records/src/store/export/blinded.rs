@@ -19,8 +19,8 @@ use crate::store::remarks::{said_columns, withdrawn};
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
-    Answer, Comment, DeviceEvent, Erased, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
-    StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
+    Answer, Comment, DeviceEvent, Erased, Head, LatestCorrections, Reader, RunClocks, SessionLine, StoreError,
+    StoredConsent, StoredCorrection, StoredErasure, VoiceRecording, Withdrawal, standings,
 };
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_base::{FocalPower, PatchPlace};
@@ -34,7 +34,7 @@ use parfocal_trial::question::QuestionKind;
 use parfocal_trial::remark::WaitClock;
 use parfocal_trial::session::{Inspection, inspections};
 use parfocal_trial::sight::{SegmentSight, sights_by_segment};
-use parfocal_trial::standing::Standing;
+use parfocal_trial::standing::AnswerStanding;
 
 /// The beginning of an export's description of itself.
 const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, \
@@ -56,7 +56,7 @@ pub struct Blinded {
     events: Vec<(i64, Event)>,
     pub(super) comments: Vec<(i64, Comment)>,
     /// The recordings of voice comments.
-    pub(super) voice: BTreeMap<IdempotencyKey, Recorded>,
+    pub(super) voice: BTreeMap<IdempotencyKey, VoiceRecording>,
     answers: Vec<(i64, Answer)>,
     pub(super) corrections: Vec<StoredCorrection>,
     consents: Vec<StoredConsent>,
@@ -307,7 +307,7 @@ impl Blinded {
 
     fn answer_rows(&self) -> Vec<AnswerRow> {
         let standings = standings(&self.answers, &self.clocks);
-        let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), usize)| {
+        let row = |(((run, answer), standing), number): ((&(i64, Answer), AnswerStanding), usize)| {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
             AnswerRow {
@@ -351,7 +351,7 @@ impl Blinded {
             segments: &self.segments,
             answers: &self.answers,
             standings: &standings(&self.answers, &self.clocks),
-            corrections: &Latest::of(&self.corrections),
+            corrections: &LatestCorrections::of(&self.corrections),
         };
         scored.rows()
     }

@@ -33,7 +33,7 @@ use self::description::RecordingRow;
 pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
 pub use self::verify::ExportFiles;
-use super::{Access, Head, Reader, Recorder, StoreError, StoredSession};
+use super::{Access, AccessLog, Head, Reader, StoreError, StoredSession};
 use parfocal_base::ids::SessionId;
 
 /// How often an export is recorded at most, if something else is recorded at the same moment each time.
@@ -73,18 +73,18 @@ impl Export {
     ///
     /// # Errors
     /// If there is no such session, its participant withdrew, or the policies are asked for before unblinding.
-    pub async fn prepare(recorder: &Recorder, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
+    pub async fn prepare(access_log: &AccessLog, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
-        may_export(recorder.reader(), session, unblinded).await?;
+        may_export(access_log.reader(), session, unblinded).await?;
         // Read only once, because a long recording takes a while to open.
-        let recordings = recordings::rows(recorder.folder(), session).await;
+        let recordings = recordings::rows(access_log.folder(), session).await;
 
         // The chain in an export ends with the record of that export, so that nobody can cut off rows unnoticed. If
         // something else was recorded in between, the export is recorded again.
         for _ in 0..ATTEMPTS {
-            let head = recorder.record(&Access::Exported { session, unblinded }).await?;
+            let head = access_log.record(&Access::Exported { session, unblinded }).await?;
             // The session may be under way. The snapshot makes sure that a new comment is in all files or in none.
-            let snapshot = recorder.reader().snapshot().await?;
+            let snapshot = access_log.reader().snapshot().await?;
             match Self::of(&snapshot, head, session, unblinded).await {
                 Ok(Some(export)) => return Ok(Self { recordings, ..export }),
                 Ok(None) => snapshot.close().await,
@@ -186,14 +186,14 @@ async fn may_export(
 /// If there is no such session, its participant withdrew, the policies are asked for before unblinding, or `out` cannot
 /// be written.
 pub async fn export(
-    recorder: &Recorder,
+    access_log: &AccessLog,
     session: SessionId,
     out: &Path,
     unblinded: bool,
 ) -> Result<Summary, ExportError> {
     // An export that cannot be written is not recorded.
     destination::check_new(out)?;
-    Export::prepare(recorder, session, unblinded).await?.into_folder(out).await
+    Export::prepare(access_log, session, unblinded).await?.into_folder(out).await
 }
 
 async fn known_sessions(reader: &Reader) -> Result<String, StoreError> {

@@ -2,11 +2,11 @@
 //! correction applied.
 
 use super::description::ScoreRow;
-use crate::store::{Answer, Latest};
+use crate::store::{Answer, LatestCorrections};
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_trial::instruments::{Measure, measures};
 use parfocal_trial::protocol::Protocol;
-use parfocal_trial::standing::Standing;
+use parfocal_trial::standing::AnswerStanding;
 
 /// What the scores of a session are computed from.
 pub struct Scored<'a> {
@@ -19,9 +19,9 @@ pub struct Scored<'a> {
     /// Its answers, each with the start of the server that kept it.
     pub answers: &'a [(i64, Answer)],
     /// The standing of each answer, in the same order: whether it counts, and its full value.
-    pub standings: &'a [Standing],
+    pub standings: &'a [AnswerStanding],
     /// The corrections of the session.
-    pub corrections: &'a Latest,
+    pub corrections: &'a LatestCorrections,
 }
 
 impl Scored<'_> {
@@ -34,7 +34,7 @@ impl Scored<'_> {
             .collect()
     }
 
-    fn of(&self, answer: &Answer, standing: &Standing) -> Vec<ScoreRow> {
+    fn of(&self, answer: &Answer, standing: &AnswerStanding) -> Vec<ScoreRow> {
         let Some(question) = self.protocol.question(&answer.question, answer.segment.is_some()) else {
             return Vec::new();
         };

@@ -7,7 +7,7 @@ use super::blinded::Blinded;
 use super::description::{VoicePieceRow, VoiceRow};
 use super::folder::Folder;
 use crate::store::values::nanoseconds;
-use crate::store::{Comment, Latest, Reader, Recorded, StoredPiece};
+use crate::store::{Comment, LatestCorrections, Reader, StoredPiece, VoiceRecording};
 use parfocal_base::ids::IdempotencyKey;
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
@@ -25,7 +25,7 @@ pub fn file_name(comment: impl std::fmt::Display, media_type: MediaType) -> Stri
 impl Blinded {
     /// Writes the recordings, one file each, and returns the rows of their table.
     pub(super) async fn write_voice(&self, reader: &Reader, folder: &mut Folder) -> Result<Vec<VoiceRow>, ExportError> {
-        let typed = Latest::of(&self.corrections);
+        let typed = LatestCorrections::of(&self.corrections);
         let comments = self.comments.iter().map(|(_, comment)| comment);
         let mut rows = Vec::new();
 
@@ -45,7 +45,7 @@ impl Blinded {
 
     /// The row of a recording, without file, hash and transcript.
     fn voice_row(&self, comment: &Comment) -> VoiceRow {
-        let nothing = Recorded::default();
+        let nothing = VoiceRecording::default();
         let recorded = self.voice.get(&comment.key).unwrap_or(&nothing);
         let ended = recorded.ended();
 
@@ -69,7 +69,7 @@ impl Blinded {
 
     /// The pieces of all recordings, in the order they were kept.
     pub(super) fn voice_piece_rows(&self) -> Vec<VoicePieceRow> {
-        let rows_of = |(comment, recorded): (&IdempotencyKey, &Recorded)| -> Vec<VoicePieceRow> {
+        let rows_of = |(comment, recorded): (&IdempotencyKey, &VoiceRecording)| -> Vec<VoicePieceRow> {
             recorded.pieces.iter().map(|piece| self.voice_piece_row(*comment, piece)).collect()
         };
         let mut rows: Vec<VoicePieceRow> = self.voice.iter().flat_map(rows_of).collect();

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
-use crate::store::chain::check::{BlockToCheck, FoundEntry, FoundRow, Walk};
+use crate::store::chain::check::{BlockToCheck, ChainCheck, FoundEntry, FoundRow};
 use crate::store::chain::{
     Block, Entry, Fields, Head, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
 };
@@ -22,7 +22,7 @@ type Cells = BTreeMap<String, String>;
 /// Checks the chain of an export; `expected` is a head known from elsewhere.
 pub(super) fn chain(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
     let salts = salts(export)?;
-    let mut walk = Walk::new(records(export)?, expected.cloned());
+    let mut walk = ChainCheck::new(records(export)?, expected.cloned());
     let steps = Steps::read(export)?;
     let mut last = None;
 
@@ -250,7 +250,7 @@ impl Steps {
     }
 
     /// Number of steps that no row of the chain covers.
-    fn beyond(&self, walk: &Walk) -> i64 {
+    fn beyond(&self, walk: &ChainCheck) -> i64 {
         let tables = std::iter::once(&self.open).chain(&self.sealed);
         let beyond = tables.flatten().map(|(segment, steps)| steps.ends.len() as i64 - walk.steps(segment));
         beyond.filter(|steps| *steps > 0).sum()

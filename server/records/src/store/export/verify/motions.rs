@@ -1,7 +1,7 @@
 //! How the lens was driven in each setting, computed from the telemetry of an export.
 
 use super::files::ExportFiles;
-use crate::store::Motion;
+use crate::store::LensMotion;
 use crate::store::motion::RunningFigures;
 
 /// The file with a row for each step of the control loop.
@@ -12,7 +12,7 @@ impl ExportFiles {
     ///
     /// # Errors
     /// If the telemetry cannot be read. The text names the file.
-    pub fn motions(&self) -> Result<Vec<Motion>, String> {
+    pub fn motions(&self) -> Result<Vec<LensMotion>, String> {
         let column = |name| self.place(FILE, name);
         let places = ["setting", "run", "exposed_ns", "asked", "measured", "optimal", "held"];
         let places = places.map(column).into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -40,6 +40,6 @@ impl ExportFiles {
         })?;
 
         let driven = settings.into_iter().filter(|(_, figures)| figures.motion.frames > 0);
-        Ok(driven.map(|(setting, figures)| Motion { setting, ..figures.motion }).collect())
+        Ok(driven.map(|(setting, figures)| LensMotion { setting, ..figures.motion }).collect())
     }
 }

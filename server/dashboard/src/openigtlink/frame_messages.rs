@@ -17,7 +17,7 @@ const FOCAL_POWER: &str = "FocalPower";
 const STATUS: &str = "ExoscopeStatus";
 
 /// A frame.
-pub struct Shot {
+pub struct FrameMessages {
     content: Vec<u8>,
     stamp: u64,
     id: u32,
@@ -27,7 +27,7 @@ pub struct Shot {
     in_three: OnceLock<Bytes>,
 }
 
-impl Shot {
+impl FrameMessages {
     /// The frame whose picture is `picture`, exposed at `at`.
     pub fn new(picture: &RgbImage, spacing: f32, at: Timestamp, id: u32, focal_power: Option<f64>) -> Self {
         Self {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::outlet::Outlet;
-use super::studio::Studio;
+use super::frame_encoder::FrameEncoder;
+use super::publisher::Publisher;
 use crate::control::{ControlledFrame, LatestSlot};
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::{Developer, Size};
@@ -21,13 +21,13 @@ const PATIENCE: Duration = Duration::from_millis(500);
 const FULL_INTERVAL: Duration = Duration::from_millis(38);
 
 /// The thread of one larger size; ends when dropped.
-pub(super) struct Larger {
+pub(super) struct LargerSize {
     slot: Arc<LatestSlot<ControlledFrame>>,
-    outlet: Outlet,
+    publisher: Publisher,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Larger {
+impl LargerSize {
     /// Starts the thread for `size`, which publishes its pictures through `outlet`.
     ///
     /// # Errors
@@ -35,27 +35,27 @@ impl Larger {
     pub(super) fn start(
         developer: Developer,
         size: Size,
-        outlet: Outlet,
+        publisher: Publisher,
         clock: Arc<dyn Clock>,
     ) -> std::io::Result<Self> {
         let slot = Arc::<LatestSlot<ControlledFrame>>::default();
-        let studio = Studio::new(developer, size).map_err(std::io::Error::other)?;
-        let worker = Worker { slot: Arc::clone(&slot), outlet: outlet.clone(), clock, studio, last: None };
+        let frame_encoder = FrameEncoder::new(developer, size).map_err(std::io::Error::other)?;
+        let worker = Worker { slot: Arc::clone(&slot), publisher: publisher.clone(), clock, frame_encoder, last: None };
 
         let name = format!("imaging-{}", size.name());
         let thread = std::thread::Builder::new().name(name).spawn(move || worker.run())?;
-        Ok(Self { slot, outlet, thread: Some(thread) })
+        Ok(Self { slot, publisher, thread: Some(thread) })
     }
 
     /// Hands `frame` over if this size has viewers; never waits.
     pub(super) fn offer(&self, frame: &ControlledFrame) {
-        if self.outlet.is_watched() {
+        if self.publisher.is_watched() {
             self.slot.put(frame.clone());
         }
     }
 }
 
-impl Drop for Larger {
+impl Drop for LargerSize {
     fn drop(&mut self) {
         self.slot.close();
         let _ = self.thread.take().map(JoinHandle::join);
@@ -64,9 +64,9 @@ impl Drop for Larger {
 
 struct Worker {
     slot: Arc<LatestSlot<ControlledFrame>>,
-    outlet: Outlet,
+    publisher: Publisher,
     clock: Arc<dyn Clock>,
-    studio: Studio,
+    frame_encoder: FrameEncoder,
     /// When the last frame that became a picture was exposed.
     last: Option<Moment>,
 }
@@ -77,7 +77,7 @@ impl Worker {
         while !self.slot.is_closed() {
             let Some(frame) = self.slot.take(PATIENCE) else { continue };
             // Its last viewer may have left meanwhile.
-            if !self.outlet.is_watched() || !self.is_due(&frame) {
+            if !self.publisher.is_watched() || !self.is_due(&frame) {
                 continue;
             }
 
@@ -90,7 +90,7 @@ impl Worker {
 
     fn is_due(&self, frame: &ControlledFrame) -> bool {
         let exposed = frame.frame.exposed_at;
-        let early = |last| self.studio.size() == Size::Full && exposed.since(last) < FULL_INTERVAL;
+        let early = |last| self.frame_encoder.size() == Size::Full && exposed.since(last) < FULL_INTERVAL;
         !self.last.is_some_and(early)
     }
 
@@ -99,11 +99,11 @@ impl Worker {
         let began = self.clock.now();
         let step = frame.record.clone();
 
-        self.studio.develop(&frame.frame.image);
-        match self.studio.encode(frame) {
-            Ok(frame) => self.outlet.publish(frame),
+        self.frame_encoder.develop(&frame.frame.image);
+        match self.frame_encoder.encode(frame) {
+            Ok(frame) => self.publisher.publish(frame),
             Err(error) => tracing::error!(%error, "a larger picture could not be encoded"),
         }
-        self.outlet.note_time(&step, self.clock.now().since(began));
+        self.publisher.note_time(&step, self.clock.now().since(began));
     }
 }

@@ -6,7 +6,7 @@ use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{Developed, Developer, GrayImage, JpegEncoder, JpegError, Size, rgb_to_gray};
 
 /// A developer and an encoder, and the pictures that pass between them.
-pub(super) struct Studio {
+pub(super) struct FrameEncoder {
     size: Size,
     developer: Developer,
     encoder: JpegEncoder,
@@ -14,7 +14,7 @@ pub(super) struct Studio {
     gray: GrayImage,
 }
 
-impl Studio {
+impl FrameEncoder {
     /// A studio for pictures of `size`.
     ///
     /// # Errors

@@ -23,7 +23,7 @@ const HTTP2: &[u8] = b"h2";
 
 /// The pages that connections get.
 #[derive(Clone)]
-pub(super) enum Door {
+pub(super) enum Transport {
     /// Every page, unencrypted.
     Plain { pages: Router },
     /// Encrypted, every page; unencrypted, only the pages that lead to the encrypted ones (`plain`).
@@ -39,7 +39,7 @@ pub(super) struct ReadyConnection {
     pub(super) pages: Router,
 }
 
-impl Door {
+impl Transport {
     /// Finds out which protocol `stream` speaks, and does the handshake. There is no time limit here. Encryption
     /// buffers at most `buffer` bytes.
     pub(super) async fn open(

@@ -10,14 +10,14 @@ use crate::tls::{Certificates, PublicAuthority};
 
 /// How other devices reach the server.
 #[derive(Debug, Clone)]
-pub struct Reach {
+pub struct ServerAddress {
     /// The address and port on which the server listens.
     listening: SocketAddr,
     /// The server's certificate; `None` if it does not encrypt.
     certificates: Option<Arc<Certificates>>,
 }
 
-impl Reach {
+impl ServerAddress {
     /// A server that listens on `listening`, and encrypts if it has `certificates`.
     #[must_use]
     pub const fn new(listening: SocketAddr, certificates: Option<Arc<Certificates>>) -> Self {
@@ -94,8 +94,8 @@ impl Reach {
 mod tests {
     use super::*;
 
-    fn reach(listening: &str) -> Reach {
-        Reach::new(listening.parse().unwrap(), None)
+    fn reach(listening: &str) -> ServerAddress {
+        ServerAddress::new(listening.parse().unwrap(), None)
     }
 
     fn ip(address: &str) -> IpAddr {
@@ -123,8 +123,8 @@ mod tests {
         let listening: SocketAddr = "0.0.0.0:8443".parse().unwrap();
         let now = "2026-06-01T00:00:00Z".parse().unwrap();
         let certificates = Certificates::local(data.path(), Ipv4Addr::LOCALHOST.into(), now).unwrap();
-        let reach = Reach::new(listening, Some(Arc::new(certificates)));
-        assert_eq!(reach.link_by(&reach.host_from(Some(ip("10.0.0.5"))), "k"), "https://10.0.0.5:8443/enter?key=k");
-        assert_eq!(reach.link_by(&reach.host_from(Some(ip("10.0.0.6"))), "k"), "https://10.0.0.6:8443/enter?key=k");
+        let address = ServerAddress::new(listening, Some(Arc::new(certificates)));
+        assert_eq!(address.link_by(&address.host_from(Some(ip("10.0.0.5"))), "k"), "https://10.0.0.5:8443/enter?key=k");
+        assert_eq!(address.link_by(&address.host_from(Some(ip("10.0.0.6"))), "k"), "https://10.0.0.6:8443/enter?key=k");
     }
 }

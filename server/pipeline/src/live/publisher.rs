@@ -12,13 +12,13 @@ use parfocal_imaging::Size;
 
 /// The sending end of a size's pictures.
 #[derive(Clone)]
-pub(super) struct Outlet {
+pub(super) struct Publisher {
     size: Size,
     sender: watch::Sender<Option<Arc<EncodedFrame>>>,
     counts: Arc<Counts>,
 }
 
-impl Outlet {
+impl Publisher {
     /// The outlet for `size`, which counts its pictures in `counts`.
     pub(super) const fn new(size: Size, sender: watch::Sender<Option<Arc<EncodedFrame>>>, counts: Arc<Counts>) -> Self {
         Self { size, sender, counts }
