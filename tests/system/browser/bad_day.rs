@@ -309,7 +309,7 @@ impl Day {
 
         // Nothing told the surgeon which policy ran.
         let seen = blinding::check(&self.theatre.proxy.recorded());
-        assert!(seen.texts > 20 && seen.pictures > 20, "{} texts, {} pictures", seen.texts, seen.pictures);
+        assert!(seen.texts > 20 && seen.pictures > 5, "{} texts, {} pictures", seen.texts, seen.pictures);
         for browser in [&self.theatre.surgeon, &self.theatre.operator] {
             assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
         }

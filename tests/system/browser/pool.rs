@@ -18,10 +18,12 @@ use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
 use tokio::task::JoinHandle;
 
-const NEEDED: &str =
-    "the browser tests need Chromium and its driver; on Debian: apt-get install chromium chromium-driver";
-const ARGUMENTS: [&str; 9] = [
-    "--headless=new",
+const NEEDED: &str = "the browser tests need Chromium, its headless shell and its driver; \
+                      on Debian: apt-get install chromium chromium-headless-shell chromium-driver";
+/// Chromium without the interface around its pages. It starts in a third of the time, and takes a third less of a
+/// processor. It has no permissions to ask for, no preferences and no lock on its profile.
+const SHELL: &str = "chromium-headless-shell";
+const ARGUMENTS: [&str; 8] = [
     "--no-sandbox",
     "--disable-gpu",
     "--disable-quic",
@@ -113,7 +115,7 @@ pub struct Chromium {
 pub async fn borrow() -> Chromium {
     loop {
         let idle = IDLE.lock().unwrap().pop();
-        let Some(idle) = idle else { return start(profile(), &[], json!({})).await };
+        let Some(idle) = idle else { return start_shell().await };
         if let Ok(Some(chromium)) = idle.await {
             return chromium;
         }
@@ -149,13 +151,37 @@ pub fn profile() -> Arc<TempDir> {
     Arc::new(tempfile::tempdir_in(SERVICE.profiles.path()).unwrap())
 }
 
-/// Starts a browser with additional options on `profile`, with these preferences if it is new.
+/// Starts a whole browser with additional options on `profile`, with these preferences if it is new.
 pub async fn start(profile: Arc<TempDir>, options: &[String], preferences: Value) -> Chromium {
-    let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
+    let mut arguments = arguments(&profile);
+    arguments.push("--headless=new".to_owned());
     arguments.extend_from_slice(options);
+    connect(profile, "chrome", json!({ "args": arguments, "prefs": preferences })).await
+}
+
+/// Starts a browser of those that tests share.
+async fn start_shell() -> Chromium {
+    // Chromedriver looks for whole browsers only.
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let shell = std::env::split_paths(&folders).map(|folder| folder.join(SHELL)).find(|file| file.exists());
+    let shell = shell.unwrap_or_else(|| panic!("there is no {SHELL}: {NEEDED}"));
+
+    let profile = profile();
+    let options = json!({ "binary": shell, "args": arguments(&profile) });
+    connect(profile, "chrome-headless-shell", options).await
+}
+
+fn arguments(profile: &TempDir) -> Vec<String> {
+    let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
     arguments.push(format!("--user-data-dir={}", profile.path().display()));
+    arguments
+}
+
+/// Starts the browser that chromedriver knows as `name`, on `profile`.
+async fn connect(profile: Arc<TempDir>, name: &str, options: Value) -> Chromium {
     let wanted = json!({
-        "goog:chromeOptions": { "args": arguments, "prefs": preferences },
+        "browserName": name,
+        "goog:chromeOptions": options,
         "goog:loggingPrefs": { "browser": "ALL" },
     });
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(30);
-const PAUSE: Duration = Duration::from_millis(40);
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// Waits until `condition` holds. Panics, naming `what`, after a long time.
 pub async fn until<F: Future<Output = bool>>(what: &str, condition: impl FnMut() -> F) {
