@@ -38,10 +38,11 @@ check: lint web unit
 
 # Tests and program are one build, so all is compiled once. `cargo test` alone makes a development build, which is
 # faster after a change. `CARGO_FLAGS` says how a check run builds (.ci/run).
+# Without the cameras' libraries only the crate that uses them differs.
 lint:
 	cargo fmt --check
 	cargo clippy $(CARGO_FLAGS) --release --all-targets --locked $(FEATURES) -- --deny warnings
-	[ -z "$(FEATURES)" ] || cargo clippy $(CARGO_FLAGS) --release --locked -- --deny warnings
+	[ -z "$(FEATURES)" ] || cargo clippy $(CARGO_FLAGS) --release --locked --package parfocal-devices -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -54,9 +55,12 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
+# Two for each processor: most tests wait now and then for a disk, a browser or a lens.
+TEST_THREADS := $(shell echo $$((2 * $$(nproc))))
+
 # One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
 unit:
-	PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
+	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
