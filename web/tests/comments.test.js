@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { Refused } from "../static/shared/api.js";
 import { Comments } from "../static/surgeon/comments.js";
 import { Drafts } from "../static/surgeon/drafts.js";
 import { Origins } from "../static/surgeon/origin.js";
@@ -26,12 +27,28 @@ function openPage() {
     wall: time.wall,
     later: time.later,
   });
-  const here = () => ({ session: "s", segment: "a", setting: 2, frame: 7, run: 1 });
+  const page = { place: { session: "s", segment: "a", setting: 2, frame: 7, run: 1 } };
+  const here = () => page.place;
   const voice = { heldUp: 0, durable: true, trouble: null };
   const comments = new Comments(outbox, new Drafts(store, origins, newId, "tab"), here, voice);
+  outbox.subscribe((change) => comments.hear(change));
   comments.follow(VIEW);
-  return { server, comments };
+  return Object.assign(page, { server, outbox, comments });
 }
+
+test("a refused text about another setting is not joined to the one in the box", async () => {
+  const page = openPage();
+  const { server, comments } = page;
+  server.answers = [new Refused(422, "too long", true)];
+  comments.write("about setting 2");
+  comments.submit();
+  page.place = { ...page.place, segment: "b", setting: 3 };
+  comments.write("about setting 3");
+  await settle();
+  assert.equal(comments.text, "about setting 3");
+  assert.equal(page.outbox.refused("s").length, 1);
+  assert.match(comments.trouble, /about setting 2.* was not saved: too long/);
+});
 
 test("what is taken back stays in the record, and a withdrawal follows it", async () => {
   const { server, comments } = openPage();

@@ -275,6 +275,24 @@ test("while the server is missed, entries wait at once, long before a request gi
   assert.equal(outbox.waiting.length, 1, "the second answer is on its way");
 });
 
+test("what a closed tab has left is sent by an open one", async () => {
+  const page = openPage();
+  const open = page.open();
+  const other = openPage(page.store, page.time, page.newId);
+  other.server.answers = Array.from({ length: 9 }, noNetwork);
+  other.open().add("/comments", { session: "s", text: "from the closed tab" });
+  await settle();
+
+  open.wake();
+  assert.equal(open.waiting.length, 1);
+  await settle();
+  assert.deepEqual(texts(page.server), ["from the closed tab"]);
+  assert.equal(keptEntries(page.store), 0);
+  open.wake();
+  await settle();
+  assert.equal(page.server.got.length, 1, "once");
+});
+
 test("a failing comment alone does not keep answers from being settled", async () => {
   const page = openPage();
   const outbox = page.open();

@@ -96,6 +96,22 @@ test("a recording belongs to the moment of the press, and ends with its reason",
   assert.deepEqual([page.talk.state, page.talk.trouble], ["idle", ""]);
 });
 
+test("a piece that the browser cannot give back ends the recording, and what was said before and after it counts", async () => {
+  const page = openPage();
+  await begin(page);
+  page.microphone.heard?.piece(SOUND);
+  page.microphone.heard?.piece(
+    /** @type {any} */ ({ arrayBuffer: () => Promise.reject(new Error("NotReadable")) }),
+  );
+  page.microphone.heard?.piece(SOUND);
+  await settle();
+  assert.equal(page.microphone.stops, 1);
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.deepEqual(page.kept, ["begin 7", "1 0", "3 0", "4 0 microphone-lost"]);
+  assert.match(page.talk.trouble, /What you said until then is kept/);
+});
+
 test("a pedal held for an hour ends after two minutes, with a warning, and records again only when pressed", async () => {
   const page = openPage();
   await begin(page);

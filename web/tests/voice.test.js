@@ -81,6 +81,25 @@ test("while the server is missed, recordings are held up at once", async () => {
   assert.deepEqual([outbox.heldUp, outbox.trouble], [0, null]);
 });
 
+test("what a closed tab has left is sent by an open one, once", async () => {
+  const page = openPage();
+  const open = page.open();
+  await open.ready;
+  const other = openPage(page.store, page.time);
+  other.answers.push(...Array.from({ length: 9 }, noNetwork));
+  other.open().begin(PLACE, other.origins.stamp());
+  await settle();
+
+  open.wake();
+  await open.ready;
+  await settle();
+  open.wake();
+  await open.ready;
+  await settle();
+  assert.deepEqual(page.got, ["begin voice 7"]);
+  assert.equal(page.store.kept.size, 0);
+});
+
 test("without a network everything stays on the device and lands in order, over a reload too", async () => {
   const page = openPage();
   const outbox = page.open();

@@ -21,6 +21,7 @@ mod killed;
 mod languages;
 mod large_text;
 mod lens_troubles;
+mod link_over;
 mod offline;
 mod outbox;
 mod people_page;

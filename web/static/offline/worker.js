@@ -64,12 +64,26 @@ async function openPage(request) {
     // A proxy answers with such a status while the server is down.
     if (kept && answer.status >= 500) return kept;
 
-    if (isPageOf(version, answer)) await cache.put(PAGE, answer.clone());
-    // The answer is another page: the tablet is no longer let in, or the session is over for it.
-    else if (!answer.headers.has(PAGE_VERSION)) await cache.delete(PAGE);
+    await keepPage(cache, answer);
     return answer;
   } catch {
     return kept ?? Response.error();
+  }
+}
+
+/**
+ * Keeps a copy of `answer` if it is this version's page, and forgets the page if the tablet is no longer let in or the
+ * session is over for it. A device without room keeps no copy; the answer is good all the same.
+ *
+ * @param {Cache} cache
+ * @param {Response} answer
+ */
+async function keepPage(cache, answer) {
+  try {
+    if (isPageOf(version, answer)) await cache.put(PAGE, answer.clone());
+    else if (!answer.headers.has(PAGE_VERSION)) await cache.delete(PAGE);
+  } catch {
+    await cache.delete(PAGE).catch(() => false);
   }
 }
 

@@ -244,14 +244,16 @@ export class Comments {
     const { body } = entry;
     if (body.session !== this.#session) return;
 
-    if (body.kind === "text") {
+    // A text about another setting than the one in the box stays among the refused: together they would be one comment.
+    const isOther = this.text !== "" && this.#begun !== null && this.#begun.segment !== body.segment;
+    if (body.kind === "text" && !isOther) {
       this.#outbox.forget(entry);
       const { segment, frame, run, picture_width, pictures_per_second } = body;
       const setting = this.#numbers.get(segment) ?? 0;
       this.#begun ??= begunAt({ segment, setting, frame, run, picture_width, pictures_per_second });
       this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
     }
-    this.trouble = refusedWords(body, reason);
+    this.trouble = refusedWords(isOther ? { ...body, kind: "quick" } : body, reason);
   }
 
   /**

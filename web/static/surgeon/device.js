@@ -43,8 +43,8 @@ export function openOutbox() {
   const outbox = new Outbox({ store, spare, origins, send: keep, newId: uuid, wall: clock.wall, later });
 
   addEventListener("storage", ({ key, newValue }) => key && newValue === null && outbox.doneElsewhere(key));
-  addEventListener("online", () => outbox.nudge());
-  document.addEventListener("visibilitychange", () => document.hidden || outbox.nudge());
+  addEventListener("online", () => outbox.wake());
+  document.addEventListener("visibilitychange", () => document.hidden || outbox.wake());
   addEventListener("beforeunload", (event) => {
     if (!outbox.durable && outbox.waiting.length > 0) event.preventDefault();
   });
@@ -63,8 +63,8 @@ export function openVoiceOutbox() {
     later,
   });
 
-  addEventListener("online", () => outbox.nudge());
-  document.addEventListener("visibilitychange", () => document.hidden || outbox.nudge());
+  addEventListener("online", () => outbox.wake());
+  document.addEventListener("visibilitychange", () => document.hidden || outbox.wake());
   addEventListener("beforeunload", (event) => {
     if (!outbox.durable) event.preventDefault();
   });

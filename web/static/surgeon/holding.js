@@ -62,6 +62,16 @@ export class Holding {
   }
 
   /**
+   * Tells the server about a session that this page does not show, even if the device holds nothing of it.
+   *
+   * @param {string | null} session
+   */
+  tellOf(session) {
+    if (session !== null) this.#sessions.add(session);
+    this.tell();
+  }
+
+  /**
    * The number of unsent entries and half-written texts. A ranking of settings that was not confirmed does not count.
    *
    * @param {string} session

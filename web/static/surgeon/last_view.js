@@ -74,6 +74,11 @@ export class LastView {
     return null;
   }
 
+  /** The session of the kept view, by whatever link it was opened; null if none is kept. */
+  get session() {
+    return this.#parse()?.view?.session ?? null;
+  }
+
   forget() {
     this.#store.remove(NAME);
   }

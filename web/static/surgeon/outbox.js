@@ -85,6 +85,17 @@ export class Outbox {
     this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
   }
 
+  /** Sends what this device keeps, also what a tab has left that was closed meanwhile. Each entry is saved only once. */
+  wake() {
+    for (const entry of this.#stored()) {
+      const isKnown = this.#entries.has(entry.id) || this.#refused.has(entry.id) || this.#done.has(entry.id);
+      if (isKnown) continue;
+      this.#take(entry);
+      this.#tell(entry, "saving");
+    }
+    this.nudge();
+  }
+
   /** Restores entries that the device lost with its power. If one was already sent, the server recognises its key. */
   async #restore() {
     for (const entry of await this.#around.spare.all()) {
@@ -137,12 +148,14 @@ export class Outbox {
   }
 
   /**
-   * The entries of a session that the server refused and this device still keeps.
+   * The entries that the server refused and this device still keeps.
    *
-   * @param {string} session
+   * @param {string} [session] only those of this session
    */
   refused(session) {
-    return [...this.#refused.values()].filter(({ body }) => body.session === session);
+    return [...this.#refused.values()].filter(
+      ({ body }) => session === undefined || body.session === session,
+    );
   }
 
   /**

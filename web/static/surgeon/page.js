@@ -166,7 +166,8 @@ async function learnLanguage(code) {
 function followServer(next) {
   lastView.keep(next);
   if (next && !state) keepStorage();
-  if (next?.voice && !mayRecord && !comments.unsent && reloadForMicrophone(next.session)) return;
+  const mayReload = !comments.unsent && outbox.durable && voice.durable;
+  if (next?.voice && !mayRecord && mayReload && reloadForMicrophone(next.session)) return;
   follow(next);
 }
 
@@ -494,8 +495,8 @@ viewer.live.listen({
       return;
     }
     contact.heard();
-    outbox.nudge();
-    voice.nudge();
+    outbox.wake();
+    voice.wake();
     holding.tell();
     serverAnswered();
   },

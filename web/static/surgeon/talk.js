@@ -151,9 +151,15 @@ export class Talk {
     held.pieces += 1;
     const piece = held.pieces;
     const through_ms = Math.round(this.#around.now() - held.began);
-    held.pieced = held.pieced.then(async () =>
-      this.#add(held, comment, piece, through_ms, await sound.arrayBuffer()),
-    );
+    held.pieced = held.pieced.then(async () => {
+      try {
+        this.#add(held, comment, piece, through_ms, await sound.arrayBuffer());
+      } catch {
+        // The browser cannot give this piece back, for want of room say. The pieces before and after it still count.
+        this.#lost(held);
+        this.#around.changed();
+      }
+    });
   }
 
   /**

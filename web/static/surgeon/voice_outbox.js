@@ -73,6 +73,8 @@ export class VoiceOutbox {
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
+  /** Ids of the steps that this page has sent. @type {Set<string>} */
+  #done = new Set();
   /** Whether the last step that was sent ended a recording. */
   #hasSaved = false;
 
@@ -84,11 +86,18 @@ export class VoiceOutbox {
 
   async #load() {
     for (const step of await this.#around.store.all()) {
+      // It may have been sent while the store was read.
+      if (this.#done.has(step.id)) continue;
       this.#steps.set(step.id, step);
       this.#latest = Math.max(this.#latest, Number.parseInt(step.id, 10) || 0);
     }
     this.#tell();
     this.nudge();
+  }
+
+  /** Sends what this device keeps, also what a tab has left that was closed meanwhile. Each step is saved only once. */
+  wake() {
+    this.ready = this.#load();
   }
 
   /**
@@ -145,13 +154,15 @@ export class VoiceOutbox {
   }
 
   /**
-   * How many recordings of a session the server refused.
+   * How many recordings the server refused.
    *
-   * @param {string} session
+   * @param {string} [session] only those of this session
    */
   refused(session) {
-    const ofSession = [...this.#steps.values()].filter((step) => step.session === session);
-    const refused = ofSession.filter(({ comment }) => this.#refused.has(comment));
+    const steps = [...this.#steps.values()].filter(
+      (step) => session === undefined || step.session === session,
+    );
+    const refused = steps.filter(({ comment }) => this.#refused.has(comment));
     return new Set(refused.map(({ comment }) => comment)).size;
   }
 
@@ -268,6 +279,7 @@ export class VoiceOutbox {
     this.#failure = null;
     this.#wait = FIRST_WAIT_MS;
     this.#hasSaved = step.kind === "piece" && step.ended !== null;
+    this.#done.add(step.id);
     this.#steps.delete(step.id);
     this.#unkept.delete(step.id);
     await this.#around.store.remove(step.id);
