@@ -238,6 +238,22 @@ async fn count(data: &Path, sql: &'static str) -> i64 {
 }
 
 #[tokio::test]
+async fn what_a_reader_kept_from_being_erased_is_erased_within_the_hour() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, comment) = session(&mut trial).await;
+    let reader = Reader::open(folder.path()).await.unwrap();
+    let snapshot = reader.snapshot().await.unwrap();
+    trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, comment.key)).await.unwrap_err();
+
+    drop(snapshot);
+    drop(reader);
+    assert_eq!(trial.conductor.erase_expired_voice().await.unwrap(), 0, "no voice was kept too long");
+    assert_eq!(holding(folder.path(), "the vessel of Frau"), NOWHERE);
+    trial.store.close().await;
+}
+
+#[tokio::test]
 async fn what_a_killed_server_did_not_come_to_erase_is_erased_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;

@@ -177,7 +177,7 @@ impl Accounts {
 
         match found {
             Some(StoredAccount { account, set_by_another, .. }) if fits && !account.disabled => {
-                self.throttle().succeeded(name, peer);
+                self.throttle().succeeded(name);
                 match chosen {
                     Some(chosen) => self.choose_passphrase(&account.account, passphrase, chosen).await?,
                     None if set_by_another => return Err(AccountError::ChooseAnother),
@@ -222,7 +222,7 @@ impl Accounts {
 
         let found = self.reader().account(&account.account).await?;
         if self.fits(passphrase, found.as_ref().map(|found| &found.hash)).await? {
-            self.throttle().succeeded(name, peer);
+            self.throttle().succeeded(name);
             return Ok(());
         }
         self.failed(name, Some(account), FailedAttempt::Confirmation, peer).await?;

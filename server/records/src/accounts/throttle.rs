@@ -80,7 +80,7 @@ impl Throttle {
     }
 
     /// Records that an attempt succeeded: forgets the account's failures, but keeps those of the peer.
-    pub(super) fn succeeded(&mut self, name: &str, _peer: Peer) {
+    pub(super) fn succeeded(&mut self, name: &str) {
         self.subjects.remove(&Subject::Account(shortened(name)));
     }
 
@@ -136,7 +136,7 @@ mod tests {
         assert_eq!(waits, [0; 7], "20 s pass between them");
         assert_eq!(wait(&mut throttle, "lead", OTHER, 220), Ok(8));
         assert_eq!(wait(&mut throttle, "other", OTHER, 220), Ok(0));
-        throttle.succeeded("lead", OTHER);
+        throttle.succeeded("lead");
         assert_eq!(wait(&mut throttle, "lead", OTHER, 220), Ok(0));
     }
 

@@ -72,10 +72,20 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
-    /// free pages of the file or in its log, until the same words are erased again or the server starts again.
+    /// free pages of the file or in its log, until [`Store::finish_erasures`] succeeds or the server starts again.
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
         let run = self.inner.run;
         self.write(async |connection| insert_erasures(connection, run, erasures, account).await).await?;
+        self.finish_erasures().await.map(drop)
+    }
+
+    /// Removes the copies that erasures could not remove when they were made. Returns whether there may have been any.
+    ///
+    /// # Errors
+    /// As [`Store::erase`].
+    pub async fn finish_erasures(&self) -> Result<bool, StoreError> {
+        // The whole database may be written anew: nobody else writes meanwhile, or waits for a connection in vain.
+        let _turn = self.turn().await;
         scrub(&self.inner.trial).await
     }
 }

@@ -70,7 +70,8 @@ pub enum StoreError {
     /// Words were erased from their records, but not yet from the files.
     #[error(
         "the words are erased from their record, but copies may stand in the database's log as long as another \
-         program reads the database, such as an export or a backup; end that program and erase again"
+         program reads the database, such as an export or a backup; end that program and erase again, or leave it to \
+         the server, which tries again every hour"
     )]
     ErasureUnfinished,
     /// Another program has locked the database.

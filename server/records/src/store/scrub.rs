@@ -7,15 +7,16 @@ use sqlx::{Row, SqlitePool};
 use super::StoreError;
 
 /// Removes copies of erased words that may remain in the database's files. Does nothing if no erasure is unfinished.
+/// Returns whether one was.
 ///
 /// # Errors
 /// If the disk or database fails, or another program reads the database.
-pub(super) async fn scrub(trial: &SqlitePool) -> Result<(), StoreError> {
+pub(super) async fn scrub(trial: &SqlitePool) -> Result<bool, StoreError> {
     let mut connection = trial.acquire().await?;
     let unfinished: i64 =
         sqlx::query_scalar("SELECT count(*) FROM unfinished_erasures").fetch_one(&mut *connection).await?;
     if unfinished == 0 {
-        return Ok(());
+        return Ok(false);
     }
 
     // Pages that were split earlier may hold copies in their free space, so every page is written anew.
@@ -24,7 +25,7 @@ pub(super) async fn scrub(trial: &SqlitePool) -> Result<(), StoreError> {
     // The log still holds pages as they were before.
     fold_log(&mut connection).await?;
     sqlx::query("DELETE FROM unfinished_erasures").execute(&mut *connection).await?;
-    Ok(())
+    Ok(true)
 }
 
 /// Writes the log into the file and empties it.

@@ -112,9 +112,7 @@ impl Writer {
 
     async fn flush(&mut self, store: &Store) {
         let counts = store.telemetry_counts();
-        let written = self.write(store).await;
-        store.writes().note(&written);
-        match written {
+        match self.write(store).await {
             Ok(()) => {
                 counts.written.fetch_add(self.waiting.len() as u64, Ordering::Relaxed);
                 self.unsealed.extend(self.waiting.iter().filter_map(|record| record.segment));

@@ -52,6 +52,10 @@ impl Shared {
 
         let records = words_left(self.store.reader(), session).await?;
         if records.is_empty() {
+            // But there may be copies that an earlier attempt could not remove.
+            if self.store.finish_erasures().await? {
+                return Ok(());
+            }
             return Err(Refusal::conflict("no words of this session are left to erase").into());
         }
         self.erase_records(by, session, records, &reason).await
@@ -102,7 +106,11 @@ impl Shared {
         let Actor { role: by, account } = by;
         let erasure = |(subject, record)| Erasure { session, subject, record, reason: reason.to_owned(), by, stamp };
         let erasures: Vec<Erasure> = records.into_iter().map(erasure).collect();
-        self.store.erase(&erasures, account.as_ref()).await?;
+        let erased = self.store.erase(&erasures, account.as_ref()).await;
+        // Then the words are erased from their records, and no page may go on showing them.
+        if !matches!(erased, Ok(()) | Err(StoreError::ErasureUnfinished)) {
+            return Ok(erased?);
+        }
 
         let reader = self.store.reader();
         let comments = reader.comments(session).await?;
@@ -113,7 +121,7 @@ impl Shared {
             course.read_again(events.into_iter().map(|(_, event)| event));
             self.publish(&live);
         }
-        Ok(())
+        Ok(erased?)
     }
 
     /// The record itself and the notes on it, because a note may repeat the words.

@@ -15,10 +15,7 @@ use parfocal_trial::role::Role;
 use parfocal_trial::voice::{self, NewPiece};
 
 /// Interval between two searches for recordings whose retention period is over.
-const DAILY: Duration = Duration::from_hours(24);
-
-/// Time until the next attempt if this one could not finish, for example because a session is under way.
-const SOON: Duration = Duration::from_hours(1);
+const HOURLY: Duration = Duration::from_hours(1);
 
 impl Conductor {
     /// Stores a piece of a recording. It is on disk when this returns. Pieces may come late, and in any order.
@@ -30,7 +27,8 @@ impl Conductor {
         self.to_the_end(|shared| async move { shared.voice_piece(piece).await }).await
     }
 
-    /// Erases recordings whose retention period by their protocol is over. Returns how many.
+    /// Erases recordings whose retention period by their protocol is over, and finishes earlier erasures. Returns how
+    /// many recordings.
     ///
     /// # Errors
     /// If a session is under way, or the disk failed.
@@ -38,24 +36,19 @@ impl Conductor {
         self.to_the_end(|shared| async move { shared.erase_expired_voice().await }).await
     }
 
-    /// Erases expired recordings now and then daily. Never returns; drop it to stop.
+    /// Erases expired recordings, and finishes erasures, now and then every hour. Never returns; drop it to stop.
     pub async fn keep_voice_no_longer(self) {
         loop {
-            let wait = match self.erase_expired_voice().await {
-                Ok(0) => DAILY,
-                Ok(erased) => {
-                    tracing::info!(
-                        "{erased} voice comments were erased, because the time that their protocols keep them is over"
-                    );
-                    DAILY
-                }
-                Err(ConductError::Conflict(_)) => SOON,
+            match self.erase_expired_voice().await {
+                Ok(0) | Err(ConductError::Conflict(_)) => {}
+                Ok(erased) => tracing::info!(
+                    "{erased} voice comments were erased, because the time that their protocols keep them is over"
+                ),
                 Err(error) => {
-                    tracing::warn!("voice comments whose time is over were not erased: {error}");
-                    SOON
+                    tracing::warn!("voice comments whose time is over, or copies of them, may remain: {error}");
                 }
-            };
-            sleep(wait).await;
+            }
+            sleep(HOURLY).await;
         }
     }
 }
@@ -96,12 +89,12 @@ impl Shared {
             })
         };
         let erasures: Vec<Erasure> = kept.into_iter().filter_map(erasure).collect();
-        if erasures.is_empty() {
-            return Ok(0);
-        }
 
         // Erasing rewrites the whole database, and a surgeon's comments would have to wait for it.
         let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
+        if under_way && erasures.is_empty() {
+            return Ok(0);
+        }
         if under_way {
             return Err(ConductError::Conflict("a session is under way; voice is erased once it has ended".to_owned()));
         }
@@ -113,7 +106,9 @@ impl Shared {
 /// The protocol's retention period for this recording in days, if it is over at `now`. If the protocol cannot be read,
 /// nothing is erased.
 fn days_over(kept: &KeptVoice, now: Timestamp) -> Option<u32> {
-    let protocol = Protocol::parse_kept(&kept.protocol_toml, "the protocol kept with the session").ok()?;
+    let protocol = Protocol::parse_kept(&kept.protocol_toml, "the protocol kept with the session")
+        .inspect_err(|error| tracing::warn!(session = %kept.session, %error, "its voice comments are kept"))
+        .ok()?;
     let days = protocol.voice_days?;
     let age = now.duration_since(kept.wall);
     (age >= SignedDuration::from_hours(24 * i64::from(days))).then_some(days)
