@@ -85,7 +85,7 @@ pub struct Arguments {
     shard: Option<Part>,
     /// Merge all shards of an evaluation; the result equals that of one run to the last digit.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = [
-        "scans", "between", "footage", "policies", "weights", "seed", "count", "shard",
+        "scans", "between", "footage", "policies", "weights", "blur", "seed", "count", "shard",
     ])]
     merge: Vec<PathBuf>,
     /// Print JSON.
@@ -229,6 +229,10 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
         count,
         footage: arguments.footage.iter().map(|path| path.display().to_string()).collect(),
         between,
+        blur: match arguments.blur {
+            Some(Blur::Rate(rate)) => Some(rate.get()),
+            Some(Blur::Measured) | None => None,
+        },
         weights_folder: arguments.weights.as_ref().map(|folder| folder.display().to_string()),
         weights,
     };

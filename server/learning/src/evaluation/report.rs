@@ -31,6 +31,9 @@ pub struct EvaluatedScans {
     /// What a recorded scan shows between two of its focal powers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub between: Option<Interpolation>,
+    /// The optic's blur rate that the policies were told, if any: pixels per unit of focal power.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur: Option<f64>,
     /// Folder of weights that replace those that ship, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights_folder: Option<String>,
@@ -48,6 +51,7 @@ impl EvaluatedScans {
             (self.count != other.count, "the number of scans"),
             (self.footage != other.footage, "the footage"),
             (self.between != other.between, "what is shown between two focal powers"),
+            (self.blur != other.blur, "the optic's blur rate"),
             (self.weights != other.weights, "the weights"),
             (self != other, "the folder of the weights"),
         ];
@@ -103,7 +107,12 @@ impl Report {
              |---|---|---|---|---|---|---|---|---|---|\n",
         );
 
-        let paper = if self.subject.between.is_some() { ROBOTIC } else { SIMULATED };
+        // The paper has no scans with relief.
+        let paper = match (self.subject.scans.as_str(), self.subject.between) {
+            ("simulated", _) => SIMULATED.as_slice(),
+            (_, Some(_)) => ROBOTIC.as_slice(),
+            (_, None) => &[],
+        };
         for row in &self.rows {
             let paper = paper.iter().find(|paper| paper.0 == row.policy);
             let paper = match paper {
@@ -187,6 +196,9 @@ impl Report {
             }
         });
 
+        if let Some(blur) = self.subject.blur {
+            let _ = write!(text, " The policies were told that the optic blurs by {blur} px per unit of focal power.");
+        }
         if !self.subject.weights.is_empty() {
             let weights: Vec<_> = self.subject.weights.iter().map(|(name, sum)| format!("{name} {sum:.12}")).collect();
             let _ = write!(text, " Weights, by how their SHA-256 begins: {}", weights.join(", "));
@@ -221,7 +233,7 @@ impl Report {
             record.push(weights.cloned().unwrap_or_default());
 
             let belief = row.belief.map(|belief| (Some(belief.sure), belief.right)).unwrap_or_default();
-            let numbers = [Some(row.sharpness_kept), row.delay, belief.0, belief.1];
+            let numbers = [Some(row.sharpness_kept), row.delay, belief.0, belief.1, self.subject.blur];
             record.extend(numbers.map(|number| number.map_or_else(String::new, |number| number.to_string())));
             table.write_record(record)?;
         }
@@ -245,7 +257,7 @@ impl Report {
 }
 
 /// Columns of the table as CSV. New ones are added at the end.
-const COLUMNS: [&str; 19] = [
+const COLUMNS: [&str; 20] = [
     "policy",
     "frames",
     "mae",
@@ -265,6 +277,7 @@ const COLUMNS: [&str; 19] = [
     "delay",
     "sure",
     "sure_and_right",
+    "blur",
 ];
 
 /// A delay for people: frames, or what it is more than.
@@ -276,9 +289,13 @@ pub(super) fn frames_late(delay: Option<f64>) -> String {
 fn reliances(rows: &[Row]) -> String {
     let sentence = |row: &Row| {
         let Reliance { sure, right } = row.belief?;
-        let right =
-            right.map_or_else(|| "never right".to_owned(), |right| format!("right in {:.1} % of them", 100.0 * right));
-        Some(format!("{} in {:.1} % of the frames, {right}", row.policy, 100.0 * sure))
+        Some(match right {
+            Some(right) => {
+                let (sure, right) = (100.0 * sure, 100.0 * right);
+                format!("{} in {sure:.1} % of the frames, right in {right:.1} % of them", row.policy)
+            }
+            None => format!("{} never", row.policy),
+        })
     };
     let all: Vec<String> = rows.iter().filter_map(sentence).collect();
     if all.is_empty() { all.concat() } else { format!("\nSure of being in focus (85 %): {}.\n", all.join("; ")) }
@@ -351,6 +368,7 @@ mod tests {
             count: 4,
             footage: vec!["endo.mp4".to_owned()],
             between: None,
+            blur: Some(6.5),
             weights_folder: Some("runs/x".to_owned()),
             weights: [(PolicyName::new("near"), "0123456789abcdef".repeat(4))].into(),
         };
@@ -369,7 +387,8 @@ mod tests {
             ),
             "{text}"
         );
-        assert!(text.contains("shows no detail. Weights, by "), "{text}");
+        let blur = "The policies were told that the optic blurs by 6.5 px per unit of focal power.";
+        assert!(text.contains(&format!("shows no detail. {blur} Weights, by ")), "{text}");
         assert!(text.contains("near 0123456789ab; those in runs/x replaced"), "{text}");
     }
 
@@ -399,7 +418,7 @@ mod tests {
         let records: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
         let cell = |row: usize, column: &str| &records[row][COLUMNS.iter().position(|name| *name == column).unwrap()];
         assert_eq!((cell(2, "policy"), cell(2, "footage"), cell(2, "weights")), ("file:far,b.pt", "endo.mp4", ""));
-        assert_eq!(cell(1, "weights"), "0123456789abcdef".repeat(4));
+        assert_eq!((cell(1, "weights"), cell(1, "blur")), ("0123456789abcdef".repeat(4).as_str(), "6.5"));
         let [low, mae, high] = ["mae_low", "mae", "mae_high"].map(|column| cell(1, column).parse::<f64>().unwrap());
         assert!(0.01 <= low && low < mae && mae < high && high <= 0.04, "{text}");
     }

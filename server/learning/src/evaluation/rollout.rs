@@ -35,9 +35,11 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// The claim of `belief`; `None` if it does not have [`BINS`] bins.
+    /// The claim of `belief`; `None` if that is not a probability for each of [`BINS`] bins.
     fn of(belief: &[f32]) -> Option<Self> {
-        if belief.len() != BINS {
+        let are_probabilities = belief.iter().all(|probability| (0.0..=1.01).contains(probability));
+        let sum: f32 = belief.iter().sum();
+        if belief.len() != BINS || !are_probabilities || (sum - 1.0).abs() > 0.01 {
             return None;
         }
 
@@ -140,10 +142,10 @@ impl Path {
     }
 }
 
-/// A policy's answer that is not a finite number.
+/// A policy's answer that is not a focal power.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoTarget {
-    /// A number that is not finite.
+    /// A number outside 0 to 1, or NaN.
     #[error("at frame {frame} it returned {target}, which is not a focal power")]
     Number {
         /// The frame, from 1.
@@ -182,8 +184,8 @@ fn kept(sharpness: f64, at_optimum: f64) -> f64 {
 /// that the policy returns. `sharpest` has the sharpness of each frame at its optimum, and so their number.
 ///
 /// # Errors
-/// If the policy returns something that is not a finite number. In the live loop the watchdog would then take over, and
-/// the rest of the path would not be the policy's.
+/// If the policy returns something that is not a focal power. The live loop would then hold the lens, and the rest of
+/// the path would not be the policy's.
 pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest: &[f64]) -> Result<Path, NoTarget> {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
@@ -196,12 +198,10 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest:
         let decision = policy.step(&Observation { view: &view, focal_power });
         course.claims.extend(decision.belief.as_deref().and_then(Claim::of));
         let target = decision.target;
-        if !target.is_finite() {
+        focal_power = FocalPower::new(target).map_err(|_| {
             let fault = policy.fault();
-            return Err(fault.map_or(NoTarget::Number { frame, target }, |fault| NoTarget::Fault { frame, fault }));
-        }
-
-        focal_power = FocalPower::nearest(target);
+            fault.map_or(NoTarget::Number { frame, target }, |fault| NoTarget::Fault { frame, fault })
+        })?;
         scan.advance();
     }
 
