@@ -157,7 +157,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let health = HealthWatch::new(Arc::clone(&clock), control.status.clone(), conductor.operator_view(), store.clone());
     let watching = tokio::spawn(health.clone().run());
 
-    let conducting = tokio::spawn(conductor.clone().run());
+    let mut conducting = tokio::spawn(conductor.clone().run());
     let recording = tokio::spawn(recordings.clone().run());
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
@@ -198,7 +198,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     // The server serves whether or not anyone reads the announcement.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
 
-    signals.any().await;
+    let outcome = end_of_serving(&mut signals, &mut conducting).await;
     tracing::info!("ending");
 
     // Hold the lens at once, because viewers may take their time to leave.
@@ -212,7 +212,19 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     end_recording_and_devices(&recordings, control_loop, imaging).await;
     let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
 
-    Ok(())
+    outcome
+}
+
+/// Waits until the server is to end.
+///
+/// # Errors
+/// If `conducting`, which keeps sessions' time limits, has failed. Nobody would notice; but a service manager starts the
+/// server again.
+async fn end_of_serving(signals: &mut Signals, conducting: &mut JoinHandle<()>) -> Result<(), Failure> {
+    tokio::select! {
+        () = signals.any() => Ok(()),
+        _ = conducting => Err("what keeps the time limits of sessions has failed; the log says why".into()),
+    }
 }
 
 /// Gives the picture to OpenIGTLink's clients, if that is on. Returns its address.

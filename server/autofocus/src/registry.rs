@@ -1,6 +1,7 @@
 //! The registry: all policies by name. Every part of the program uses the same names.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -86,6 +87,21 @@ impl Registry {
         build: impl Fn() -> Box<dyn Policy> + Send + Sync + 'static,
     ) -> Self {
         self.trying(name, summary, move || Ok(build()))
+    }
+
+    /// Adds policy `name`, which `build` makes of weights that were checked before. Should it fail nevertheless, for want
+    /// of memory say, the policy is unavailable for so long.
+    #[must_use]
+    pub fn made_of_weights<E: Display>(
+        self,
+        name: &str,
+        summary: &'static str,
+        build: impl Fn() -> Result<Box<dyn Policy>, E> + Send + Sync + 'static,
+    ) -> Self {
+        let of = PolicyName::new(name);
+        self.trying(name, summary, move || {
+            build().map_err(|error| PolicyError::Unavailable { name: of.clone(), reason: error.to_string() })
+        })
     }
 
     /// Adds policy `name`, made by `build`, which may fail now and succeed later.

@@ -14,7 +14,7 @@ use tch::{CModule, Kind, Tensor};
 
 use super::learned::{action_step, best_action};
 use super::networks::{ACTIONS, HISTORY};
-use super::{Decision, FieldOfView, Fixed, Observation, Policy, Registry};
+use super::{Decision, FieldOfView, Observation, Policy, Registry};
 use parfocal_base::PolicyName;
 use parfocal_imaging::PATCH_SIDE;
 
@@ -32,15 +32,8 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     match load(Path::new(path)) {
         Ok(bytes) => {
             let source = Arc::clone(&bytes);
-            // The module was loaded a moment ago. If libtorch fails now nevertheless, the lens stays where it is.
-            let make = move || {
-                parse(&source).map_or_else(
-                    |_| Box::<Fixed>::default() as Box<dyn Policy>,
-                    |module| Box::new(Scripted::new(module)),
-                )
-            };
-
-            registry.with(name.as_str(), SUMMARY, make).weighing(name.as_str(), &bytes)
+            let make = move || parse(&source).map(|module| Box::new(Scripted::new(module)) as Box<dyn Policy>);
+            registry.made_of_weights(name.as_str(), SUMMARY, make).weighing(name.as_str(), &bytes)
         }
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }

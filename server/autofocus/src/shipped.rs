@@ -131,12 +131,10 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
     })
 }
 
-/// Adds a policy whose weights were checked a moment ago. If libtorch fails now nevertheless, the lens stays where it
-/// is.
+/// Adds a policy whose weights were checked a moment ago.
 fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
     let weights = Arc::clone(&bytes);
-    let make = move || build(design, &bytes).unwrap_or_else(|_| Box::<Fixed>::default() as Box<dyn Policy>);
-    registry.with(name, summary, make).weighing(name, &weights)
+    registry.made_of_weights(name, summary, move || build(design, &bytes)).weighing(name, &weights)
 }
 
 /// A policy of `design` with the weights in `bytes` (safetensors).

@@ -101,7 +101,7 @@ impl<'a> PictureFile<'a> {
 
     /// Reads a picture, from 0: 8 or 16 bit, gray or RGB; transparency is left out. EXIF's orientation is applied.
     ///
-    /// A gray picture of more than 8 bit of the sensor's full size is a mosaic. With `mosaic`, one of any size is read
+    /// A gray picture of the sensor's full size is a mosaic. With `mosaic`, one of any size is read
     /// as one, and its sides must be multiples of 4.
     ///
     /// # Errors

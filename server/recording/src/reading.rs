@@ -98,7 +98,7 @@ impl Recording {
     #[must_use]
     pub fn missing(&self) -> u64 {
         let numbered = match (self.rows.first(), self.rows.last()) {
-            (Some(first), Some(last)) => last.number.saturating_sub(first.number) + 1,
+            (Some(first), Some(last)) => last.number.saturating_sub(first.number).saturating_add(1),
             _ => 0,
         };
         numbered.saturating_sub(self.rows.len() as u64)

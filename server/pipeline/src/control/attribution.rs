@@ -36,6 +36,14 @@ impl Attribution {
         }
     }
 
+    /// Records that the lens was lost, and goes to its destination again from `now`. Where it stood meanwhile is unknown;
+    /// so it counts as arrived only when it would have come from the farther end.
+    pub fn regained(&mut self, now: Moment) {
+        let farther = if self.destination < FocalPower::MIDDLE { FocalPower::MAX } else { FocalPower::MIN };
+        self.way = Response::new(self.way.dynamics(), 0.0, farther);
+        self.way.command(now, self.destination);
+    }
+
     /// The lens's focal power at `moment`.
     pub fn focal_power(&self, moment: Moment) -> FocalPower {
         let on_the_way = self.way.focal_power_at(moment);
@@ -76,6 +84,18 @@ mod tests {
         // After 18 ms, 20^(-18/15) = 0.027 of the step is left: 0.0055 of focal power.
         assert_eq!(lens.focal_power(millis(120)), power(0.7), "exactly, so that steps do not creep off their grid");
         assert!(lens.settled(millis(120)));
+    }
+
+    #[test]
+    fn a_lens_that_is_back_is_waited_for_although_its_destination_is_the_same() {
+        let dynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
+        let mut lens = Attribution::new(dynamics, power(0.5));
+        lens.commanded(millis(100), power(0.7));
+        lens.regained(millis(500));
+        lens.commanded(millis(500), power(0.7));
+        // After 18 ms, 20^(-18/15) = 0.027 of the whole way from the far end is left, more than an eighth of a step.
+        assert!(!lens.settled(millis(520)), "{:?}", lens.focal_power(millis(520)));
+        assert!(lens.settled(millis(532)));
     }
 
     #[test]

@@ -68,7 +68,8 @@ pub struct ControlLoop {
 }
 
 impl ControlLoop {
-    /// Starts the loop. The lens stays where it is until a command comes. Also returns the handle for the rest of the
+    /// Starts the loop. The lens stays where it is until a command comes; one that is connected only later goes to the
+    /// middle of its range. Also returns the handle for the rest of the
     /// server, and the telemetry; records that are not taken in time are dropped and counted.
     ///
     /// # Errors

@@ -276,11 +276,22 @@ impl Stepper {
 
         match (&failure, &self.lens_fault) {
             (Some(error), None) => tracing::warn!(%error, "the lens does not accept commands"),
-            (None, Some(_)) => tracing::info!("the lens accepts commands again"),
+            (None, Some(_)) => {
+                tracing::info!("the lens accepts commands again");
+                self.regain_lens();
+            }
             _ => (),
         }
 
         self.lens_fault = failure.map(|error| HoldReason::new(Hold::LensFailed, &format!("{error}; trying again")));
+    }
+
+    /// The lens may have moved meanwhile, and the tissue has. So the policy is asked only when the lens has arrived, and
+    /// compares nothing with what it saw before.
+    fn regain_lens(&mut self) {
+        self.attribution.regained(self.clock.now());
+        self.placed = false;
+        self.forget();
     }
 
     /// The lens's health.

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
+use image::DynamicImage;
 use sha2::{Digest, Sha256};
 
 use super::{FORMAT, HEADER, Header, Image, LEAST_SIDE, MOST_POSES, POSES, Pose, ScanError, VERSION};
 use parfocal_base::FocalPower;
-use parfocal_imaging::{DecodeError, GrayImage, PATCH_SIDE, Picture, decode};
+use parfocal_imaging::{DecodeError, GrayImage, PATCH_SIDE, PictureFile};
 
 /// A recorded scan, possibly with poses missing.
 #[derive(Debug, Clone)]
@@ -159,10 +160,16 @@ impl ScanFolder {
             return Err(ScanError::Checksum(path));
         }
 
-        match decode(&bytes, false) {
-            Ok(Picture::Gray(gray)) if (gray.width, gray.height) == (pose.width, pose.height) => Ok(gray),
+        // Never a mosaic, not even at the sensor's size.
+        let read = PictureFile::open(&bytes).and_then(PictureFile::single).and_then(|file| file.read_any(0));
+        let size = (pose.width, pose.height);
+        match read {
+            Ok(DynamicImage::ImageLuma8(gray)) if (gray.width() as usize, gray.height() as usize) == size => {
+                let (width, height) = size;
+                Ok(GrayImage { width, height, data: gray.into_raw().into_iter().map(f32::from).collect() })
+            }
             Ok(_) => {
-                let error = DecodeError::OtherPixels(format!("not {}x{} gray", pose.width, pose.height));
+                let error = DecodeError::OtherPixels(format!("not {}x{} gray of 8 bit", pose.width, pose.height));
                 Err(ScanError::Picture { path, error })
             }
             Err(error) => Err(ScanError::Picture { path, error }),

@@ -235,7 +235,40 @@ fn numbers(of: &[usize]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use parfocal_imaging::{GrayImage, SENSOR_SIZE};
+
     use super::*;
+
+    #[test]
+    fn a_picture_of_the_sensors_size_is_read_back_as_it_was_stored() {
+        let folder = tempfile::tempdir().unwrap();
+        let focal_powers = vec![FocalPower::MIN, FocalPower::MAX];
+        let header = Header {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            software: "a test".to_owned(),
+            camera: "a colour camera".to_owned(),
+            lens: None,
+            simulated: true,
+            calibration: None,
+            seed: 1,
+            order: PictureOrder::Unknown,
+            poses: 1,
+            focal_powers: focal_powers.clone(),
+        };
+
+        let (width, height) = SENSOR_SIZE;
+        let picture = |level: f32| GrayImage { width, height, data: vec![level; width * height] };
+        let images = focal_powers.into_iter().zip([picture(40.0), picture(200.0)]).collect();
+        let patch = PatchArea::central(width, height, None).unwrap();
+        let pose = TakenPose { pose: 1, images, patch, optimum: FocalPower::MIN, truth: None };
+        ScanRecording::open(folder.path(), &header).unwrap().store(&pose).unwrap();
+
+        let scan = ScanFolder::open(folder.path()).unwrap();
+        let stored = &scan.poses()[&1];
+        let levels = stored.images.iter().map(|image| scan.picture(stored, image).unwrap().data[0]);
+        assert_eq!(levels.collect::<Vec<f32>>(), [40.0, 200.0]);
+    }
 
     #[test]
     fn numbers_are_listed_as_ranges() {

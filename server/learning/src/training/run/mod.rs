@@ -301,12 +301,9 @@ impl Run {
     fn figures(&self, bytes: Vec<u8>, scans: &Benchmark) -> Result<Row, TrainError> {
         let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
         let design = self.design;
-        shipped::build(design, &bytes).map_err(|error| diverged(&error))?;
-
         let name = PolicyName::new(&self.recipe.policy);
-        let registry = Registry::default().with(name.as_str(), "in training", move || {
-            shipped::build(design, &bytes).unwrap_or_else(|_| Box::new(parfocal_autofocus::Fixed::default()))
-        });
+        let registry =
+            Registry::default().made_of_weights(name.as_str(), "in training", move || shipped::build(design, &bytes));
 
         let outcomes = evaluate(&registry, &[name], scans, &|_| ()).map_err(|error| diverged(&error))?;
         outcomes.last().map(Outcome::row).ok_or_else(|| diverged(&"nothing was evaluated"))
