@@ -53,7 +53,7 @@ struct Capture {
 #[derive(Debug, clap::Args)]
 struct Import {
     /// A calibration as TOML: any of `name`, `unit`, `bit_depth`, `centre_nm`, `fwhm_nm`, `dark`,
-    /// `white`, `spectral_correction`.
+    /// `white`, `spectral_correction`. What it leaves out stays as it is.
     #[arg(value_name = "FILE")]
     from: Option<PathBuf>,
     /// The responses of the bands: the maker's own XML file of the sensor, or a CSV file with a line per wavelength, nm
@@ -163,8 +163,10 @@ fn import(arguments: &Import) -> Result<(), Failure> {
     let mut changed = Vec::new();
 
     if let Some(path) = &arguments.from {
-        calibration = Calibration { version: calibration.version, ..calibration::read(path)? };
-        changed = vec!["dark", "white"];
+        let before = calibration.clone();
+        calibration = Calibration { version: before.version, ..calibration::read_into(calibration, path)? };
+        let references = [("dark", calibration.dark != before.dark), ("white", calibration.white != before.white)];
+        changed.extend(references.into_iter().filter(|(_, is_new)| *is_new).map(|(name, _)| name));
     }
 
     if let Some(path) = &arguments.responses {

@@ -66,8 +66,8 @@ pub struct Arguments {
     /// A video (its first 1500 frames), an image or a folder of images instead of drawn pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
-    /// What the scenes are for: each purpose has its own, and of five recordings or more every fifth is not for
-    /// training.
+    /// What the scenes are for: each purpose has drawn scenes of its own, and of five recordings or more every fifth is
+    /// not for training. Footage is the same for all.
     #[arg(long, value_enum, default_value = "training")]
     split: Purpose,
     /// Scenes of each kind to draw.
@@ -116,6 +116,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
+    if !arguments.footage.is_empty() && !arguments.scans.iter().any(|scans| scans == "simulated") {
+        return Err("--footage needs simulated scans; add simulated to --scans".into());
+    }
+    if !arguments.footage.is_empty() && arguments.split != Purpose::Training {
+        tell(format_args!("note: footage is the same for training, validation and test"));
+    }
+
     let split = Split::from(arguments.split);
     let mut groups: Vec<Vec<Scene>> = Vec::new();
     let mut folders = Vec::new();

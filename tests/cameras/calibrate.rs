@@ -72,11 +72,19 @@ fn a_calibration_that_cannot_be_kept_leaves_the_one_before_and_its_history() {
     fs::remove_dir(&aside).unwrap();
     assert!(done(&capture("white", "phantom:white", &out)).contains("version 2 of 20"));
 
+    // What an imported file leaves out stays as it is: the measured references too.
+    let part = folder.path().join("part.toml");
+    fs::write(&part, "unit = \"77\"\n").unwrap();
+    done(&["calibrate", "import", part.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    let kept: toml::Table = toml::from_str(&fs::read_to_string(&current).unwrap()).unwrap();
+    assert_eq!((kept["unit"].as_str(), kept["version"].as_str()), (Some("77"), Some("3")));
+    assert_eq!((kept["dark"].as_str(), kept["white"].as_str()), (Some("dark-1.tiff"), Some("white-2.tiff")));
+
     // A folder with earlier versions but no current one is not used: their names are taken.
     fs::remove_file(&current).unwrap();
     let dark = fs::read(out.join("dark-1.tiff")).unwrap();
     let said = refused(&capture("dark", "phantom:dark", &out));
-    assert!(said.contains("copy calibration-1.toml to that name"), "{said}");
+    assert!(said.contains("copy calibration-2.toml to that name"), "{said}");
     assert_eq!(fs::read(out.join("dark-1.tiff")).unwrap(), dark);
 }
 

@@ -285,6 +285,24 @@ fn diarist() -> (Fixture, Arc<Mutex<Vec<String>>>) {
 }
 
 #[test]
+fn after_an_outage_of_the_lens_the_policy_forgets_before_it_is_asked_again() {
+    let (mut fixture, diary) = diarist();
+    fixture.lens.fail(Some(LensError::Gone("unplugged".into())));
+    // The first of these frames still shows what was asked for before.
+    fixture.step();
+    diary.lock().unwrap().clear();
+    for _ in 0..SECOND {
+        fixture.step();
+    }
+    assert_eq!(*diary.lock().unwrap(), [""; 0]);
+
+    fixture.lens.fail(None);
+    fixture.recover();
+    fixture.step();
+    assert_eq!(diary.lock().unwrap()[..2], ["forgets", "sees"]);
+}
+
+#[test]
 fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first() {
     let (mut fixture, diary) = diarist();
     let content = ContentArea { x: 32.0, y: 32.0, radius: 20.0, confidence: 1.0 };

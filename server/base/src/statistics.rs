@@ -94,10 +94,7 @@ impl SignedRank {
 /// rank. p is exact for at most 50 pairs that differ, with or without ties.
 #[must_use]
 pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
-    let mut differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).filter(|d| *d != 0.0).collect();
-    differences.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let ranks = doubled_ranks(&differences);
-    let positive = ranks.iter().zip(&differences).filter(|(_, d)| **d > 0.0).map(|(rank, _)| rank).sum();
+    let (ranks, positive) = signed_ranks(a.iter().zip(b).map(|(a, b)| a - b));
 
     let (p, method) = if ranks.len() <= MOST_EXACT {
         (exact(&ranks, positive), Method::Exact)
@@ -113,6 +110,23 @@ pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
         positive: 0.5 * positive as f64,
         negative: 0.5 * (all - positive) as f64,
     }
+}
+
+/// The rank-biserial correlation of [`SignedRank::rank_biserial`] without the test, which takes much longer.
+#[must_use]
+pub fn rank_biserial(differences: &[f64]) -> Option<f64> {
+    let (ranks, positive) = signed_ranks(differences.iter().copied());
+    let all: usize = ranks.iter().sum();
+    (all > 0).then(|| (2.0 * positive as f64 - all as f64) / all as f64)
+}
+
+/// Twice the ranks of the differences that are not 0, and the sum of those of differences above 0.
+fn signed_ranks(differences: impl Iterator<Item = f64>) -> (Vec<usize>, usize) {
+    let mut differing: Vec<f64> = differences.filter(|d| *d != 0.0).collect();
+    differing.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let ranks = doubled_ranks(&differing);
+    let positive = ranks.iter().zip(&differing).filter(|(_, d)| **d > 0.0).map(|(rank, _)| rank).sum();
+    (ranks, positive)
 }
 
 /// Twice the rank of each of `differences`, which must rise in size. Twice a rank is a whole number even where ties

@@ -153,7 +153,8 @@ fn watch(
 ) -> Result<(), Failure> {
     let spinner = ProgressBar::new_spinner();
     let clock = SystemClock;
-    let mut seen = (0, clock.now());
+    // Of a disk that hangs, frames are lost; only the camera can keep both numbers from rising.
+    let mut seen = ((0, 0), clock.now());
     let mut first = None;
 
     loop {
@@ -163,8 +164,9 @@ fn watch(
         spinner.set_message(format!("{} frames, {} lost", progress.frames, progress.lost));
         spinner.tick();
 
-        if progress.frames != seen.0 {
-            seen = (progress.frames, now);
+        let taken = (progress.frames, progress.lost);
+        if taken != seen.0 {
+            seen = (taken, now);
             first = first.or(Some(now));
         }
 

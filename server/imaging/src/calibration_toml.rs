@@ -66,8 +66,20 @@ impl Calibration {
         text: &str,
         picture: impl Fn(&str) -> Result<MosaicFrame, String>,
     ) -> Result<Self, CalibrationError> {
+        Self::default().changed_by_toml(text, picture)
+    }
+
+    /// This calibration with the values of the keys that `text` has.
+    ///
+    /// # Errors
+    /// As [`Calibration::from_toml_with`].
+    pub fn changed_by_toml(
+        self,
+        text: &str,
+        picture: impl Fn(&str) -> Result<MosaicFrame, String>,
+    ) -> Result<Self, CalibrationError> {
         let mut keys = Keys::parse(text)?;
-        let mut calibration = Self::default();
+        let mut calibration = self;
 
         if let Some(name) = keys.text("name")? {
             calibration.name = name;
@@ -75,12 +87,12 @@ impl Calibration {
         if let Some(version) = keys.text("version")? {
             calibration.version = version;
         }
-        calibration.unit = keys.text("unit")?;
-        calibration.date = keys.text("date")?;
+        calibration.unit = keys.text("unit")?.or(calibration.unit);
+        calibration.date = keys.text("date")?.or(calibration.date);
 
-        if let Some(bit_depth) =
-            keys.take::<u8>("bit_depth", "a whole number", |&bits| check((8..=16).contains(&bits), "must be 8 to 16"))?
-        {
+        let bit_depth =
+            keys.take::<u8>("bit_depth", "a whole number", |&bits| check((8..=16).contains(&bits), "must be 8 to 16"))?;
+        if let Some(bit_depth) = bit_depth.filter(|&bits| bits != calibration.bit_depth) {
             calibration.bit_depth = bit_depth;
             // White follows the bit depth unless the text gives its own counts.
             calibration.white = Reference::PerBand([full_scale(bit_depth); BANDS]);
@@ -191,7 +203,9 @@ impl<'a> Keys<'a> {
             })?,
         };
 
-        calibration.dark = dark.unwrap_or(Reference::PerBand(calibration.dark.band_means()));
+        if let Some(dark) = dark {
+            calibration.dark = dark;
+        }
         if let Some(white) = white {
             calibration.white = white;
         }

@@ -4,6 +4,7 @@
 use std::io::{Read, Write};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::time::Duration;
 
 use reqwest::header::{COOKIE, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
@@ -239,6 +240,7 @@ async fn locking_and_unblinding_ask_for_the_passphrase_once_more() {
 async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     let (_protocols, mut server) = server_within();
     let shared = server.key("surgeon").to_owned();
+    let operators_link = server.key("operator").to_owned();
     sign_in_as_lead(&mut server).await;
     open(&server).await;
     let mut shared_page = Page::open(&server, "surgeon").await;
@@ -270,6 +272,13 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     let said: Value = stolen.json().await.unwrap();
     assert!(said["error"].as_str().unwrap().contains("for one session, which has ended"), "{said}");
     assert_eq!(self::status(&server, "/api/surgeon/session", &cookie).await, 200);
+
+    // Whoever moves the lens of a study's session by hand is known.
+    let by_hand = json!({"focal_power": 0.3});
+    let focus = client().post(server.url("/api/operator/focus")).bearer_auth(operators_link).json(&by_hand);
+    assert_eq!(focus.send().await.unwrap().status(), StatusCode::FORBIDDEN);
+    let (status, said) = ask(&server, "operator", Method::POST, "/api/operator/focus", &by_hand).await;
+    assert!(status.is_success(), "{said}");
 
     // After the operator has closed the session, the tablet has no access, but the server accepts what it still holds.
     post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
@@ -426,9 +435,13 @@ async fn a_live_view_ends_when_its_account_is_disabled() {
     server.use_key("operator", &token);
     let mut page = Page::open(&server, "operator").await;
     page.watch(2).await;
+    let stream = client().get(server.url("/stream.mjpeg")).bearer_auth(&token).send().await.unwrap();
+    assert_eq!(stream.status(), StatusCode::OK);
 
     assert_eq!(change(&server, "operator", json!({"change": "disable"}), PASSPHRASE).await.0, 200);
     assert_eq!(closed(&mut page).await, CloseCode::Policy);
+    let pictures = tokio::time::timeout(Duration::from_secs(20), stream.bytes()).await;
+    assert!(pictures.expect("the stream of pictures ends, too").unwrap().len() > 100);
 }
 
 /// Runs `parfocal account` with these arguments in a terminal of its own. Types each of `lines` after its prompt, and

@@ -1,7 +1,7 @@
 // The backup of the database: started here, made by the server, and downloaded here. The page asks whether it is ready,
 // and may be closed meanwhile.
 
-import { get, post } from "../shared/api.js";
+import { get, post, Refused } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 
@@ -44,7 +44,8 @@ export function offerBackup() {
       show(await get(PATH));
     } catch (error) {
       tellTrouble(trouble, error);
-      setTimeout(ask, ASK_AGAIN_MS);
+      // Asked again at once, the server would ask to sign in every second.
+      if (!(error instanceof Refused)) setTimeout(ask, ASK_AGAIN_MS);
     }
   }
 
@@ -58,6 +59,7 @@ export function offerBackup() {
     if (isRunning) setTimeout(ask, ASK_AGAIN_MS);
   }
 
+  document.addEventListener("signed-in", ask);
   ask();
 }
 

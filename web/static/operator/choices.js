@@ -143,6 +143,8 @@ export function followChoices(drawn, prepare) {
   protocols.addEventListener("change", drawSummary);
   byId("new-session", HTMLFormElement).addEventListener("submit", async (event) => {
     event.preventDefault();
+    const go = event.submitter;
+    if (go instanceof HTMLButtonElement) go.disabled = true;
     try {
       const wanted = {
         participant: participants.value,
@@ -153,6 +155,8 @@ export function followChoices(drawn, prepare) {
       tell(byId("session-trouble"), "");
     } catch (error) {
       tellTrouble(byId("session-trouble"), error);
+    } finally {
+      if (go instanceof HTMLButtonElement) go.disabled = false;
     }
   });
 

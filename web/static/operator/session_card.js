@@ -26,8 +26,8 @@ export class SessionCard {
   #session = null;
   /** When the setting's time ends, by the page's clock. @type {number | null} */
   #endsAt = null;
-  /** The pause whose reason is being written. @type {number | undefined} */
-  #reasonFor;
+  /** The pause whose reason is asked for. It stays the same while a reason is being written. @type {View["reason_wanted"]} */
+  #reasonFor = null;
 
   /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */
   constructor(followAnswer) {
@@ -36,6 +36,10 @@ export class SessionCard {
       event.preventDefault();
       this.#giveReason();
     };
+    byId("pause-reason").addEventListener(
+      "input",
+      () => this.#session && this.#drawReasonWanted(this.#session),
+    );
   }
 
   /** @param {View | null} session */
@@ -99,19 +103,21 @@ export class SessionCard {
   }
 
   /**
-   * A reason that is being written stays in the box while the session moves on.
+   * A reason that is being written stays in the box, and with its pause, while the session moves on.
    *
    * @param {View} session
    */
   #drawReasonWanted({ reason_wanted: wanted }) {
+    const isWriting = byId("pause-reason", HTMLInputElement).value !== "";
+    if (!isWriting || this.#reasonFor === null) this.#reasonFor = wanted;
+    const about = this.#reasonFor;
     byId("reason-wanted").hidden = !wanted;
-    if (wanted) setText(byId("pause-reason-label"), reasonWords(clockOf(wanted.at), wanted));
-    this.#reasonFor = byId("pause-reason", HTMLInputElement).value === "" ? wanted?.event : this.#reasonFor;
+    if (about) setText(byId("pause-reason-label"), reasonWords(clockOf(about.at), about));
   }
 
   async #giveReason() {
     const box = byId("pause-reason", HTMLInputElement);
-    const event = this.#reasonFor ?? this.#session?.reason_wanted?.event;
+    const event = this.#reasonFor?.event;
     const reason = box.value.trim();
     if (event === undefined || reason === "") return;
     if (await this.#act({ action: "give-reason", event, reason })) box.value = "";

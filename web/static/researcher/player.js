@@ -6,6 +6,7 @@ import { Pictures } from "./pictures.js";
 import { PlayerSpectra } from "./player_spectra.js";
 import { chosenPatchAt, momentText, valuesAt } from "./player_words.js";
 import { Playhead } from "./playhead.js";
+import { lengthOf } from "./timeline.js";
 import { Track } from "./track.js";
 
 /** How many pictures are requested ahead of playback: one second at 25 pictures a second. */
@@ -45,10 +46,9 @@ export class Player {
    * @param {Api.Timeline} options.timeline
    * @param {string[]} options.policies the policy of each setting
    * @param {Api.RecordingCourse[]} options.recordings at least one
-   * @param {number} options.length of the timeline, seconds
    * @param {(seconds: number, playing: boolean) => void} options.moved called when the playhead has moved
    */
-  constructor({ session, timeline, policies, recordings, length, moved }) {
+  constructor({ session, timeline, policies, recordings, moved }) {
     this.#session = session;
     this.#timeline = timeline;
     this.#policies = policies;
@@ -63,7 +63,7 @@ export class Player {
     });
 
     this.#spectra = new PlayerSpectra(session, this.#canvas);
-    this.#scrub.max = String(length);
+    this.#scrub.max = String(lengthOf(timeline, this.spans));
     byId("player").hidden = false;
     const hasMosaics = recordings.some(({ kind }) => kind === "mosaic");
     byId("player-sizes").hidden = !hasMosaics;

@@ -79,7 +79,6 @@ async function openPlayer(shown) {
       timeline: shown,
       policies,
       recordings,
-      length: lengthOf(shown),
       moved: followPlayhead,
     });
     byId("comment-list").classList.add("beside-player");
@@ -247,8 +246,8 @@ function draw() {
   showKey(timeline);
 
   const figure = byId("timeline");
-  scale = new Scale(lengthOf(timeline), Math.max(figure.clientWidth, NARROWEST_DRAWING));
   const recorded = player?.spans ?? [];
+  scale = new Scale(lengthOf(timeline, recorded), Math.max(figure.clientWidth, NARROWEST_DRAWING));
   const drawn = drawTimeline(figure, timeline, { scale, withPath, policies, recorded, zone, choose, jump });
   pointOut = drawn.pointOut;
 

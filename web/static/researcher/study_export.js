@@ -1,7 +1,7 @@
 // The study's export. It is started here, made by the server, and downloaded here. The page asks for its progress, and
 // may be closed meanwhile.
 
-import { get, post } from "../shared/api.js";
+import { get, post, Refused } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { failedWords, progressShare, progressWords, readyWords } from "./study_export_words.js";
@@ -40,7 +40,8 @@ export function showExport(study) {
       show(await get(PATH, { study }));
     } catch (error) {
       tellTrouble(trouble, error);
-      setTimeout(ask, ASK_AGAIN_MS);
+      // Asked again at once, the server would ask to sign in every second.
+      if (!(error instanceof Refused)) setTimeout(ask, ASK_AGAIN_MS);
     }
   }
 
@@ -60,5 +61,6 @@ export function showExport(study) {
     }
   }
 
+  document.addEventListener("signed-in", ask);
   ask();
 }

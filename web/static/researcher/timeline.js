@@ -18,12 +18,16 @@ const LONGEST_TICK_STEP = 900;
 const TICK_WIDTH = 90;
 
 /**
- * Seconds from the start to the last thing that happened, at least 1.
+ * Seconds from the start to the last thing that happened or was recorded, at least 1.
  *
  * @param {Timeline} timeline
+ * @param {{ from: number, to: number }[]} [recorded]
  */
-export function lengthOf({ settings, pauses, absences, points, comments, set_aside: setAside }) {
-  const spans = [...settings, ...pauses, ...absences].map(({ from, to }) => to ?? from);
+export function lengthOf(
+  { settings, pauses, absences, points, comments, set_aside: setAside },
+  recorded = [],
+) {
+  const spans = [...settings, ...pauses, ...absences, ...recorded].map(({ from, to }) => to ?? from);
   const moments = [...points.slice(-1), ...comments, ...setAside].map(({ seconds }) => seconds);
   return Math.max(1, ...spans, ...moments);
 }

@@ -3,20 +3,29 @@
 //! The headers of the next part are sent directly after each frame. A browser shows a part only when it sees the end of
 //! it, so it would otherwise be a frame late.
 
+use std::time::Duration;
+
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt, stream};
+use tokio::time::sleep;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::credentials::Pass;
+use super::error::Error;
+use super::people::SignedIn;
 use super::roles::Roles;
 use super::shutdown::ended;
 use super::tablets;
 use parfocal_imaging::Size;
+use parfocal_records::accounts::Token;
+
+/// Time between two looks at whether a sign-in has ended, as for a page.
+const SIGN_IN_CHECK: Duration = Duration::from_secs(5);
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
@@ -26,19 +35,35 @@ const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
-async fn mjpeg(State(app): State<AppState>, roles: Roles) -> impl IntoResponse {
-    // If the browser's only role comes from a surgeon's link, the stream ends when the link is no longer valid.
+async fn mjpeg(
+    State(app): State<AppState>,
+    roles: Roles,
+    SignedIn(person): SignedIn,
+) -> Result<impl IntoResponse, Error> {
+    // If the browser's only role comes from a surgeon's link, the stream ends when the link is no longer valid. If it
+    // comes from an account alone, it ends with the sign-in.
     let pass = roles.pass().filter(|_| roles.is_surgeon_alone());
-    ([(CONTENT_TYPE, KIND)], Body::from_stream(parts(app, pass).map(Ok::<_, std::convert::Infallible>)))
+    let role = roles.choose(None)?;
+    let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
+    let parts = parts(app, pass, token).map(Ok::<_, std::convert::Infallible>);
+    Ok(([(CONTENT_TYPE, KIND)], Body::from_stream(parts)))
 }
 
-fn parts(app: AppState, pass: Option<Pass>) -> impl Stream<Item = Bytes> {
+/// Waits until the sign-in with `token` has ended.
+async fn signed_out(app: &AppState, token: &Token) {
+    while !matches!(app.accounts.has_ended(token).await, Ok(true)) {
+        sleep(SIGN_IN_CHECK).await;
+    }
+}
+
+fn parts(app: AppState, pass: Option<Pass>, token: Option<Token>) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
     let guard = AppState::clone(&app);
     let over = async move {
-        match pass {
-            Some(pass) => drop(tablets::no_longer_admitted(&guard, pass).await),
-            None => std::future::pending().await,
+        match (pass, token) {
+            (Some(pass), _) => drop(tablets::no_longer_admitted(&guard, pass).await),
+            (None, Some(token)) => signed_out(&guard, &token).await,
+            (None, None) => std::future::pending().await,
         }
     };
     let watcher = app.live.watch(Size::Cell);

@@ -169,7 +169,11 @@ async fn focus(
     State(app): State<AppState>,
     JsonBody(focus): JsonBody<Focus>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.focus(by.actor(), &focus).await?;
+    let by = match app.study_session() {
+        Some(session) => by.for_session(&app, session).await?,
+        None => by.actor(),
+    };
+    app.conductor.focus(by, &focus).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -17,7 +17,7 @@ use parfocal_session::recorder::{RecordingStatus, StartError};
     (status = 200, body = RecordingStatus),
 ))]
 async fn status(_: Operator, State(app): State<AppState>) -> Json<RecordingStatus> {
-    Json(app.recordings.status())
+    Json(app.recordings.status().await)
 }
 
 /// Whether to start or to stop recording.
@@ -42,7 +42,7 @@ async fn order(
     } else {
         app.recordings.stop().await;
     }
-    Ok(Json(app.recordings.status()))
+    Ok(Json(app.recordings.status().await))
 }
 
 impl From<StartError> for Error {

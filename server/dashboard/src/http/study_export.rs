@@ -15,6 +15,7 @@ use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::people::Acting;
 use super::roles::{ResearchReader, Researcher};
+use parfocal_records::store::Access;
 use parfocal_records::store::export::ZipStream;
 use parfocal_results::study_export::{StudyExportError, StudyExportState, check};
 
@@ -84,10 +85,18 @@ async fn study_export_zip(
     State(app): State<AppState>,
     Path(study): Path<String>,
 ) -> Result<impl IntoResponse, Error> {
-    by.personally()?;
+    let person = by.personally()?;
     let missing = || Error::NotFound("No export of this study is ready. Start one on the study's page.".to_owned());
     let made = app.study_exports.made(app.store.reader(), &study).await?;
     let made = made.ok_or_else(missing)?;
+
+    // Whoever started the export is already recorded as having exported each session.
+    if made.by.as_ref() != Some(&person.account) {
+        let access_log = app.access_log(by.actor());
+        for &session in &made.sessions {
+            access_log.record(&Access::Exported { session, unblinded: made.unblinded }).await?;
+        }
+    }
 
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
     let (zip, bytes) = ZipStream::new(name.clone());

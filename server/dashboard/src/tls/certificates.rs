@@ -98,7 +98,7 @@ impl Certificates {
     pub fn host(&self, address: SocketAddr) -> String {
         let shown = self.shown.load();
         let names = &shown.facts.names;
-        let name = names.hosts.iter().find(|host| !host.starts_with('*'));
+        let name = names.hosts.iter().find(|host| !host.starts_with('*') && *host != "localhost");
         // The machine has just got another address. Within a minute, its local certificate will list that too.
         let is_new = matches!(self.source, Source::Local { .. }) && !shown.wanted.addresses.contains(&address.ip());
 

@@ -131,6 +131,12 @@ impl AccessLog {
         &self.folder
     }
 
+    /// The account of the person whose accesses it records; `None` if nobody is signed in.
+    #[must_use]
+    pub const fn account(&self) -> Option<&AccountName> {
+        self.account.as_ref()
+    }
+
     /// The reader of the same database.
     #[must_use]
     pub const fn reader(&self) -> &Reader {

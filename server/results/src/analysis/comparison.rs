@@ -13,7 +13,7 @@ use super::statistics::{
 };
 use super::words::{counted, decimals, interval_words, method_words, p_words};
 use parfocal_base::ids::SessionId;
-use parfocal_base::statistics::{Method, bootstrap_statistic, holm, mean, wilcoxon};
+use parfocal_base::statistics::{Method, bootstrap_statistic, holm, mean, rank_biserial, wilcoxon};
 
 /// Significance level: a p below it counts as shown.
 pub const LEVEL: f64 = 0.05;
@@ -261,7 +261,7 @@ fn pair([a, b]: [&String; 2], of_a: &[f64], of_b: &[f64], seed: u64) -> Pair {
     let test = wilcoxon(&differences, &zeros);
 
     let drawn = |places: &[usize]| places.iter().map(|&place| differences[place]).collect::<Vec<f64>>();
-    let biserial_of = |places: &[usize]| wilcoxon(&drawn(places), &zeros).rank_biserial();
+    let biserial_of = |places: &[usize]| rank_biserial(&drawn(places));
     Pair {
         a: a.clone(),
         b: b.clone(),
@@ -340,22 +340,30 @@ fn repeats(policies: &[String], sessions: &[Vec<&Observation>]) -> Repeats {
     Repeats { said, subjects: count, agreement: Some(found) }
 }
 
+/// Tests for a trend over positions. As in every test a surgeon is one unit, with the mean over its `sessions`.
 fn position(sessions: &[Vec<&Observation>]) -> Position {
-    let blocks: Vec<Vec<f64>> =
-        sessions.iter().map(|session| session.iter().filter_map(|one| one.value).collect()).collect();
-    let positions = blocks.first().map_or(0, Vec::len);
-    let mean_at = |place: usize| mean(&blocks.iter().filter_map(|block| block.get(place).copied()).collect::<Vec<_>>());
-    let means: Vec<f64> = (0..positions).map(mean_at).collect();
+    let values = |session: &Vec<&Observation>| session.iter().filter_map(|one| one.value).collect::<Vec<f64>>();
+    let all: Vec<Vec<f64>> = sessions.iter().map(values).collect();
+    let means = mean_at_each_position(&all);
+    let positions = means.len();
 
-    let unknown = |said: String, means| Position { said, sessions: blocks.len(), means, trend: None };
+    let mut surgeons: BTreeMap<&str, Vec<Vec<f64>>> = BTreeMap::new();
+    for (session, values) in sessions.iter().zip(&all) {
+        let surgeon = session.first().map_or("", |one| one.surgeon.as_str());
+        surgeons.entry(surgeon).or_default().push(values.clone());
+    }
+    let blocks: Vec<Vec<f64>> = surgeons.values().map(|sessions| mean_at_each_position(sessions)).collect();
+
+    let unknown = |said: String, means| Position { said, sessions: sessions.len(), means, trend: None };
     if blocks.len() < 2 {
-        return unknown("Fewer than two sessions have all values: no trend can be tested.".to_owned(), means);
+        let said = "Fewer than two surgeons have a session with all values: no trend can be tested.";
+        return unknown(said.to_owned(), means);
     }
     if positions < 3 {
         return unknown("A session has fewer than three settings: no trend can be tested.".to_owned(), means);
     }
     let Some(found) = trend(&blocks) else {
-        return unknown("Within each session all values are the same: there is no trend.".to_owned(), means);
+        return unknown("For each surgeon all positions are the same: there is no trend.".to_owned(), means);
     };
 
     let finding = match (found.p < LEVEL, found.l > found.expected) {
@@ -369,9 +377,17 @@ fn position(sessions: &[Vec<&Observation>]) -> Position {
         decimals(found.expected, 1),
         p_words(found.p),
         method_words(found.method),
-        counted(blocks.len(), "session"),
+        counted(blocks.len(), "surgeon"),
     );
-    Position { said, sessions: blocks.len(), means, trend: Some(found) }
+    Position { said, sessions: sessions.len(), means, trend: Some(found) }
+}
+
+/// The mean of `sessions` at each position.
+fn mean_at_each_position(sessions: &[Vec<f64>]) -> Vec<f64> {
+    let positions = sessions.first().map_or(0, Vec::len);
+    let mean_at =
+        |place: usize| mean(&sessions.iter().filter_map(|values| values.get(place).copied()).collect::<Vec<f64>>());
+    (0..positions).map(mean_at).collect()
 }
 
 /// The 95 % bootstrap interval of `statistic` over `count` surgeons; `None` if there are too few.

@@ -11,8 +11,10 @@ use tempfile::TempDir;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
-use super::making::{Progress, export_study};
+use super::making::{Progress, export_study, sessions_of};
+use parfocal_base::ids::SessionId;
 use parfocal_records::store::{AccessLog, Reader, StoreError};
+use parfocal_trial::account::AccountName;
 
 /// The folder within the data folder in which exports are made.
 const FOLDER: &str = "study-exports";
@@ -51,8 +53,10 @@ pub struct FinishedExport {
     pub unblinded: bool,
     /// Folder of the package.
     pub folder: PathBuf,
-    /// Number of sessions in the export.
-    sessions: usize,
+    /// The sessions in the export.
+    pub sessions: Vec<SessionId>,
+    /// The account of the person who started it; `None` if nobody was signed in.
+    pub by: Option<AccountName>,
     /// Number of withdrawals and erasures in the study when the export began.
     taken_back: i64,
     /// Temporary folder around the package; dropping it removes the files.
@@ -186,7 +190,7 @@ impl LatestExport {
         match &self.stage {
             Stage::Running(progress) => StudyExportState::Running { unblinded, progress: *progress },
             Stage::Failed(reason) => StudyExportState::Failed { unblinded, reason: reason.clone() },
-            Stage::Ready(made) => StudyExportState::Ready { unblinded, sessions: made.sessions },
+            Stage::Ready(made) => StudyExportState::Ready { unblinded, sessions: made.sessions.len() },
         }
     }
 }
@@ -223,6 +227,7 @@ impl Job {
         let room = tempfile::Builder::new().prefix("export-").tempdir_in(folder).map_err(unwritable)?;
         let package = room.path().join(&self.study);
         let taken_back = access_log.reader().taken_back(&self.study).await?;
+        let (sessions, _) = sessions_of(access_log.reader(), &self.study, self.unblinded).await?;
 
         let exports = self.exports.clone();
         let study = self.study.clone();
@@ -231,11 +236,16 @@ impl Job {
                 latest.stage = Stage::Running(progress);
             }
         };
-        let summary = export_study(access_log, &self.study, self.unblinded, &package, Arc::new(report)).await?;
+        export_study(access_log, &self.study, self.unblinded, &package, Arc::new(report)).await?;
 
-        let room = Arc::new(room);
-        let sessions = summary.sessions;
-        Ok(FinishedExport { unblinded: self.unblinded, folder: package, sessions, taken_back, _room: room })
+        Ok(FinishedExport {
+            unblinded: self.unblinded,
+            folder: package,
+            sessions,
+            by: access_log.account().cloned(),
+            taken_back,
+            _room: Arc::new(room),
+        })
     }
 
     fn stands_at(&self, stage: Stage) {

@@ -85,7 +85,7 @@ pub async fn check(reader: &Reader, study: &str, unblinded: bool) -> Result<(), 
 }
 
 /// The sessions of `study` to export, and those that are left out because they are withdrawn.
-async fn sessions_of(
+pub(super) async fn sessions_of(
     reader: &Reader,
     study: &str,
     unblinded: bool,

@@ -116,11 +116,13 @@ impl Recordings {
     }
 
     /// The state of recording, for the operator's page.
-    #[must_use]
-    pub fn status(&self) -> RecordingStatus {
+    pub async fn status(&self) -> RecordingStatus {
         let parts = &self.0.parts;
+        let folder = parts.folder.clone();
+        // A disk that hangs must not keep a thread that serves others.
+        let room = spawn_blocking(move || room(&folder)).await.ok().and_then(Result::ok);
+
         let status = parts.status.borrow().clone();
-        let room = room(&parts.folder).ok();
         let state = self.0.state();
 
         let mut report = RecordingStatus {

@@ -34,13 +34,21 @@ const CAMERA_BITS: u8 = 10;
 /// # Errors
 /// If it cannot be read, or is invalid.
 pub fn read(path: &Path) -> Result<Calibration, CalibrationFault> {
+    read_into(Calibration::default(), path)
+}
+
+/// `calibration` with the values that the calibration in the file `path`, or the current one of the folder `path`, has.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_into(calibration: Calibration, path: &Path) -> Result<Calibration, CalibrationFault> {
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
     let text = fs::read_to_string(&path)
         .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
 
     let folder = path.parent().unwrap_or(Path::new("."));
-    let calibration = Calibration::from_toml_with(&text, |name| picture(folder, name));
-    Ok(calibration.map_err(|error| format!("calibration {}, {error}", path.display()))?)
+    let changed = calibration.changed_by_toml(&text, |name| picture(folder, name));
+    Ok(changed.map_err(|error| format!("calibration {}, {error}", path.display()))?)
 }
 
 /// The calibration of `path` if one is given, else that of a typical unit.

@@ -164,9 +164,12 @@ impl<'a> Session<'a> {
     }
 
     fn change(&mut self, setting: Setting, value: f64) {
-        self.changes.retain(|(known, _)| *known != setting);
         match self.device.change(setting, value) {
-            Ok(()) => self.changes.push((setting, value)),
+            Ok(()) => {
+                self.changes.retain(|(known, _)| *known != setting);
+                self.changes.push((setting, value));
+            }
+            // What was accepted before still holds, also for the next connection.
             Err(error) => {
                 tracing::warn!(?setting, value, %error, "the camera refused a setting");
                 self.shared.controls.refuse(setting, &error.to_string());
