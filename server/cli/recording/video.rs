@@ -30,12 +30,12 @@ pub struct Arguments {
     /// End so many seconds after the first frame; at the last frame if left out.
     #[arg(long, value_name = "S", value_parser = parse_seconds)]
     to: Option<f64>,
-    /// Size of the pictures: one pixel per mosaic cell, two by two per cell, or one per sample.
-    #[arg(long, value_enum, default_value_t = Size::Cell)]
-    size: Size,
-    /// Content of the folder: developed pictures (png), or the raw mosaics with 16 bit per sample (tiff).
-    #[arg(long, value_enum, default_value_t = Pictures::Png)]
-    pictures: Pictures,
+    /// Size of developed pictures: one pixel per mosaic cell (by default), two by two per cell, or one per sample.
+    #[arg(long, value_enum)]
+    size: Option<Size>,
+    /// Content of the folder: developed pictures (png, by default), or the raw mosaics with 16 bit per sample (tiff).
+    #[arg(long, value_enum)]
+    pictures: Option<Pictures>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -52,10 +52,18 @@ enum Pictures {
 /// If a frame cannot be read, `ffmpeg` is missing or fails, or a file cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = format(&arguments.out)?;
+    if format.is_some() && arguments.pictures.is_some() {
+        return Err("--pictures is for a folder of pictures; a video is always developed".into());
+    }
+    if arguments.pictures == Some(Pictures::Tiff) && arguments.size.is_some() {
+        return Err("--size is for developed pictures; raw mosaics have the size that they were recorded with".into());
+    }
+
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
     let frames = chosen(arguments, &recording)?;
-    let mut developer = SizedDeveloper { developer: Developer::new(&calibration), size: arguments.size };
+    let mut developer =
+        SizedDeveloper { developer: Developer::new(&calibration), size: arguments.size.unwrap_or(Size::Cell) };
 
     if let Some(format) = format {
         let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
@@ -225,7 +233,7 @@ fn save_pictures(
     for &frame in frames {
         let mosaic = recording.frame(frame)?;
         let mut bytes = Cursor::new(Vec::new());
-        let (ending, written) = match arguments.pictures {
+        let (ending, written) = match arguments.pictures.unwrap_or(Pictures::Png) {
             Pictures::Png => {
                 developer.develop(&mosaic, &mut picture);
                 let (width, height) = (picture.width as u32, picture.height as u32);

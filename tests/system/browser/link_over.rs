@@ -38,6 +38,7 @@ async fn what_was_half_written_when_the_link_ended_is_sent_and_nothing_stays_out
     tablet.open(&server.url("/surgeon")).await;
     tablet.sees("main", "which has ended").await;
     tablet.sees("#held", "Everything on this tablet has been saved.").await;
+    super::screenshots::shoot(&tablet, "surgeon-link-over").await;
 
     let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
     let pool = SqlitePool::connect_with(file).await.unwrap();
