@@ -218,8 +218,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 /// Waits until the server is to end.
 ///
 /// # Errors
-/// If `conducting`, which keeps sessions' time limits, has failed. Nobody would notice; but a service manager starts the
-/// server again.
+/// If `conducting`, which keeps sessions' time limits, has failed. Nobody would notice otherwise, and a service manager
+/// starts the server again.
 async fn end_of_serving(signals: &mut Signals, conducting: &mut JoinHandle<()>) -> Result<(), Failure> {
     tokio::select! {
         () = signals.any() => Ok(()),

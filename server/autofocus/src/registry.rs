@@ -89,8 +89,8 @@ impl Registry {
         self.trying(name, summary, move || Ok(build()))
     }
 
-    /// Adds policy `name`, which `build` makes of weights that were checked before. Should it fail nevertheless, for want
-    /// of memory say, the policy is unavailable for so long.
+    /// Adds policy `name`, which `build` makes of weights that were checked before. While that fails nevertheless, for
+    /// example for want of memory, the policy is unavailable.
     #[must_use]
     pub fn made_of_weights<E: Display>(
         self,

@@ -26,7 +26,11 @@ export class SessionCard {
   #session = null;
   /** When the setting's time ends, by the page's clock. @type {number | null} */
   #endsAt = null;
-  /** The pause whose reason is asked for. It stays the same while a reason is being written. @type {View["reason_wanted"]} */
+  /**
+   * The pause whose reason is asked for. It stays the same while a reason is being written.
+   *
+   * @type {View["reason_wanted"]}
+   */
   #reasonFor = null;
 
   /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */

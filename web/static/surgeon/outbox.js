@@ -85,7 +85,7 @@ export class Outbox {
     this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
   }
 
-  /** Sends what this device keeps, also what a tab has left that was closed meanwhile. Each entry is saved only once. */
+  /** Sends what this device keeps, also what a closed tab has left. Each entry is saved only once. */
   wake() {
     for (const entry of this.#stored()) {
       const isKnown = this.#entries.has(entry.id) || this.#refused.has(entry.id) || this.#done.has(entry.id);

@@ -36,8 +36,8 @@ impl Attribution {
         }
     }
 
-    /// Records that the lens was lost, and goes to its destination again from `now`. Where it stood meanwhile is unknown;
-    /// so it counts as arrived only when it would have come from the farther end.
+    /// Records that the lens was lost, and goes to its destination again from `now`. Where it stood meanwhile is
+    /// unknown, so it counts as arrived only when it would have come from the farther end.
     pub fn regained(&mut self, now: Moment) {
         let farther = if self.destination < FocalPower::MIDDLE { FocalPower::MAX } else { FocalPower::MIN };
         self.way = Response::new(self.way.dynamics(), 0.0, farther);

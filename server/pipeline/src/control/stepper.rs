@@ -286,8 +286,8 @@ impl Stepper {
         self.lens_fault = failure.map(|error| HoldReason::new(Hold::LensFailed, &format!("{error}; trying again")));
     }
 
-    /// The lens may have moved meanwhile, and the tissue has. So the policy is asked only when the lens has arrived, and
-    /// compares nothing with what it saw before.
+    /// The lens may have moved meanwhile, and the tissue has. So the policy is asked only when the lens has arrived,
+    /// and compares nothing with what it saw before.
     fn regain_lens(&mut self) {
         self.attribution.regained(self.clock.now());
         self.placed = false;
