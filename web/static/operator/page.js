@@ -58,6 +58,7 @@ const choices = followChoices(redrawFocus, followAnswer);
 
 /** @param {Api.OperatorView | null} next */
 function followSession(next) {
+  const isOver = isAtWork() && !(next && isUnderWay(next));
   if (session && !next) {
     choices.refresh();
     // After practice the same participant comes next, after a real session another one.
@@ -66,6 +67,7 @@ function followSession(next) {
   if (known && next && next.session !== session?.session) forgetNotice();
   session = next;
   known = true;
+  if (isOver) checkAgain();
   sessionCard.follow(session);
   followLink(session);
   focus.follow(session);
@@ -73,6 +75,11 @@ function followSession(next) {
   redrawFocus();
   drawTheWarnings();
   drawNow();
+}
+
+/** Whether a surgeon is at work. */
+function isAtWork() {
+  return session !== null && isUnderWay(session);
 }
 
 /** @param {boolean} hold */
@@ -126,7 +133,8 @@ function drawNow() {
 function followStatus(next) {
   const changed = status !== null && checked(status) !== checked(next);
   status = next;
-  if (changed) checkAgain();
+  // The checks read the whole database, and what a surgeon says would wait for the disk.
+  if (changed && !isAtWork()) checkAgain();
   contact.certifiedUntil(status.certificate_until);
   sign.draw(status);
   drawLamps(byId("devices"), status);
@@ -146,7 +154,7 @@ function checked({ camera, lens, tablet }) {
 }
 
 function drawTheWarnings() {
-  if (status) drawWarnings(byId("warnings"), status, session !== null && isUnderWay(session));
+  if (status) drawWarnings(byId("warnings"), status, isAtWork());
 }
 
 function redrawFocus() {
