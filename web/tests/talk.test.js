@@ -96,7 +96,7 @@ test("a recording belongs to the moment of the press, and ends with its reason",
   assert.deepEqual([page.talk.state, page.talk.trouble], ["idle", ""]);
 });
 
-test("a piece that the browser cannot give back ends the recording, and what was said before and after it counts", async () => {
+test("a piece that the browser cannot give back ends the recording and loses nothing else", async () => {
   const page = openPage();
   await begin(page);
   page.microphone.heard?.piece(SOUND);

@@ -309,7 +309,7 @@ impl Day {
 
         // Nothing told the surgeon which policy ran.
         let seen = blinding::check(&self.theatre.proxy.recorded());
-        assert!(seen.texts > 20 && seen.pictures > 5, "{} texts, {} pictures", seen.texts, seen.pictures);
+        assert!(seen.texts > 20 && seen.pictures > 20, "{} texts, {} pictures", seen.texts, seen.pictures);
         for browser in [&self.theatre.surgeon, &self.theatre.operator] {
             assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
         }
@@ -348,7 +348,7 @@ fn succeeds(arguments: &[&str], folder: &Path) -> String {
 fn start(data: Arc<TempDir>, address: &str, protocols: &Path, lens: &Emulator, camera: &Camera) -> Server {
     let lens = format!("optotune:{}", lens.path().display());
     let protocols = protocols.to_str().unwrap();
-    let mut arguments = vec!["--bind", address, "--fps", "5", "--protocols", protocols, "--lens", &lens];
+    let mut arguments = vec!["--bind", address, "--fps", "10", "--protocols", protocols, "--lens", &lens];
     arguments.extend(camera.arguments());
     Server::on(data, &arguments)
 }

@@ -1,10 +1,11 @@
 // Connects everything that this device keeps to the browser: to its storage, clocks, tabs and network.
 
-import { keep, keepAudio } from "../shared/api.js";
+import { keep, keepAudio, post } from "../shared/api.js";
 import { storeOn } from "../shared/storage.js";
 import { uuid } from "../shared/uuid.js";
 import { diskStoreOn } from "./disk_store.js";
 import { Drafts } from "./drafts.js";
+import { Holding } from "./holding.js";
 import { LastView } from "./last_view.js";
 import { Origins } from "./origin.js";
 import { Outbox } from "./outbox.js";
@@ -69,6 +70,24 @@ export function openVoiceOutbox() {
     if (!outbox.durable) event.preventDefault();
   });
   return outbox;
+}
+
+/**
+ * Tells the server how much of a session this device holds.
+ *
+ * @param {Outbox} outbox
+ * @param {VoiceOutbox} voice
+ * @param {() => boolean} unsent whether the page's comment box holds a text
+ */
+export function openHolding(outbox, voice, unsent) {
+  return new Holding({
+    outbox,
+    voice,
+    drafts,
+    unsent,
+    later,
+    post: (session, holding) => post("/api/surgeon/holding", { session, device: origins.device(), holding }),
+  });
 }
 
 const RELOADED = "parfocal.reloaded-for-microphone";

@@ -1,12 +1,10 @@
 // The page of a tablet whose link is no longer valid. What the tablet still holds is sent nevertheless.
 
-import { post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { say } from "../shared/language.js";
 import { sendLeftAnswers } from "./answers.js";
 import { Comments } from "./comments.js";
-import { drafts, lastView, later, openOutbox, openVoiceOutbox, origins } from "./device.js";
-import { Holding } from "./holding.js";
+import { drafts, lastView, openHolding, openOutbox, openVoiceOutbox } from "./device.js";
 import { speakAsThePage } from "./languages.js";
 import { forgetPage } from "./offline.js";
 
@@ -31,16 +29,8 @@ voice.subscribe(draw);
 new Comments(outbox, drafts, () => null, voice).follow(null);
 sendLeftAnswers(outbox, drafts, null);
 
-const holding = new Holding({
-  outbox,
-  voice,
-  drafts,
-  later,
-  unsent: () => false,
-  post: (session, count) =>
-    post("/api/surgeon/holding", { session, device: origins.device(), holding: count }),
-});
-holding.tellOf(lastView.session);
+// There is no comment box.
+openHolding(outbox, voice, () => false).tellOf(lastView.session);
 
 // The next person to hold the tablet must not see the state of this session.
 lastView.forget();

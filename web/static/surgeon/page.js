@@ -20,6 +20,7 @@ import {
   drafts,
   lastView,
   later,
+  openHolding,
   openOutbox,
   openVoiceOutbox,
   origins,
@@ -28,7 +29,6 @@ import {
   store,
 } from "./device.js";
 import { followDimmer } from "./dimmer.js";
-import { Holding } from "./holding.js";
 import { learn, showLanguage, speakAsThePage } from "./languages.js";
 import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
@@ -99,15 +99,7 @@ const talk = new Talk({
   changed: () => talking.draw(),
 });
 const talking = talkButton(talk, voice, mayRecord);
-const holding = new Holding({
-  outbox,
-  voice,
-  drafts,
-  later,
-  unsent: () => comments.unsent,
-  post: (session, count) =>
-    post("/api/surgeon/holding", { session, device: origins.device(), holding: count }),
-});
+const holding = openHolding(outbox, voice, () => comments.unsent);
 const notice = noticeDialog(byId("comment", HTMLTextAreaElement), (segment) =>
   act({ action: "acknowledge", segment }),
 );
