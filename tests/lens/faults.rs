@@ -59,8 +59,10 @@ fn every_fault_of_the_line_is_noticed_in_words_and_heals() {
         emulator.set_fault(fault);
         let mut seen = String::new();
         until("the fault is noticed", || {
-            seen = lens.health().message.to_string();
-            !lens.health().working
+            // Read at once: between two looks the lens's health may change.
+            let health = lens.health();
+            seen = health.message.to_string();
+            !health.working
         });
 
         assert!(seen.contains(words), "{fault:?}: {seen}");

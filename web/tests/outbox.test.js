@@ -244,37 +244,6 @@ test("waiting for answers ends at once if one fails or the server does not answe
   assert.deepEqual(outbox.waiting, []);
 });
 
-test("while the server is missed, entries wait at once, long before a request gives up", async () => {
-  const page = openPage();
-  /** @type {() => void} */
-  let answer = () => {};
-  const outbox = new Outbox({
-    ...page,
-    send: () => new Promise((resolve) => (answer = resolve)),
-    wall: page.time.wall,
-    later: page.time.later,
-  });
-  /** @type {string[]} */
-  const told = [];
-  outbox.subscribe(({ state, reason }) => told.push(`${state}: ${reason}`));
-
-  outbox.add("/answers", { session: "s", value: 4 }, "q");
-  const settled = outbox.settled("/answers");
-  outbox.follow(true);
-  assert.equal(await settled, false);
-  outbox.add("/answers", { session: "s", value: 5 }, "q");
-  const waiting = "waiting: No connection. This page keeps trying.";
-  assert.deepEqual(told, ["saving: null", waiting, waiting]);
-  assert.equal(await outbox.settled("/answers"), false);
-
-  outbox.follow(false);
-  assert.equal(outbox.trouble, null);
-  answer();
-  await settle();
-  assert.equal(told.at(-1), "saved: null");
-  assert.equal(outbox.waiting.length, 1, "the second answer is on its way");
-});
-
 test("what a closed tab has left is sent by an open one", async () => {
   const page = openPage();
   const open = page.open();

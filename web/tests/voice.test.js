@@ -70,17 +70,6 @@ test("a recording is sent while it is spoken, in order, and taken off the device
   assert.deepEqual([outbox.waiting, outbox.held("s"), outbox.status.text], [0, 0, "Recording saved"]);
 });
 
-test("while the server is missed, recordings are held up at once", async () => {
-  const page = openPage();
-  const outbox = page.open();
-  outbox.begin(PLACE, page.origins.stamp());
-  assert.equal(outbox.heldUp, 0);
-  outbox.follow(true);
-  assert.deepEqual([outbox.heldUp, outbox.trouble], [1, say("no-connection")]);
-  outbox.follow(false);
-  assert.deepEqual([outbox.heldUp, outbox.trouble], [0, null]);
-});
-
 test("what a closed tab has left is sent by an open one, once", async () => {
   const page = openPage();
   const open = page.open();

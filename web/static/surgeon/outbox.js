@@ -51,6 +51,9 @@ const LONGEST_WAIT_MS = 8000;
  */
 
 export class Outbox {
+  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
+  trouble = null;
+
   /** Resolves once the entries that only the spare copy has are restored. @type {Promise<void>} */
   ready;
 
@@ -62,9 +65,6 @@ export class Outbox {
   /** @type {Set<(change: Change) => void>} */
   #listeners = new Set();
   #flushing = false;
-  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
-  #failure = null;
-  #missed = false;
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
@@ -117,24 +117,6 @@ export class Outbox {
   subscribe(listener) {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
-  }
-
-  /**
-   * Call this often. While the server is missed, entries count as waiting at once: the request that sends them may take
-   * long to give up.
-   *
-   * @param {boolean} missed whether the server has been silent for too long
-   */
-  follow(missed) {
-    if (missed === this.#missed) return;
-    this.#missed = missed;
-    if (!missed) return;
-    for (const entry of this.waiting) this.#tell(entry, "waiting", this.trouble, false);
-  }
-
-  /** Why entries wait: why the last attempt to send failed, or that the server is missed. Null if neither is so. */
-  get trouble() {
-    return this.#failure ?? (this.#missed ? say("no-connection") : null);
   }
 
   /** Whether this device keeps every unsaved entry over a reload. */
@@ -206,8 +188,7 @@ export class Outbox {
     if (slot) this.#forgetRefused(slot);
     this.#entries.set(entry.id, entry);
     entry.stored = this.#store(entry);
-    if (this.#missed) this.#tell(entry, "waiting", this.trouble, false);
-    else this.#tell(entry, "saving");
+    this.#tell(entry, "saving");
     this.nudge();
     return entry;
   }
@@ -241,14 +222,13 @@ export class Outbox {
 
   /**
    * Waits until no entry for `path` is waiting, and returns true. Returns false as soon as such an entry could not be
-   * sent, or the server does not answer.
+   * sent, or the server did not answer.
    *
    * @param {string} path
    */
   async settled(path) {
     this.nudge();
     while (this.waiting.some((entry) => entry.path === path)) {
-      if (this.#missed) return false;
       const { entry, state, heard } = await this.#nextChange();
       if (state === "waiting" && (entry.path === path || !heard)) return false;
     }
@@ -293,7 +273,7 @@ export class Outbox {
     entry.sending = true;
     try {
       await this.#around.send(entry.path, { ...entry.body, ...this.#around.origins.tell(entry.given) });
-      this.#failure = null;
+      this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");
       return true;
@@ -324,9 +304,9 @@ export class Outbox {
       return true;
     }
 
-    this.#failure = inWords(error, say("no-connection"));
+    this.trouble = inWords(error, say("no-connection"));
     const heard = error instanceof Refused;
-    this.#tell(entry, "waiting", this.#failure, heard);
+    this.#tell(entry, "waiting", this.trouble, heard);
     return heard;
   }
 

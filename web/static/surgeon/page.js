@@ -507,8 +507,6 @@ function tick() {
   drawTime();
   byId("reduced").hidden = !sight.isReduced(performance.now());
   if (contact.isMissed) followLastView();
-  outbox.follow(contact.isMissed);
-  voice.follow(contact.isMissed);
   drawNow();
 }
 

@@ -54,6 +54,9 @@ const LONGEST_WAIT_MS = 8000;
  */
 
 export class VoiceOutbox {
+  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
+  trouble = null;
+
   /** Resolves once the steps that an earlier load of the page left are loaded. @type {Promise<void>} */
   ready;
 
@@ -67,9 +70,6 @@ export class VoiceOutbox {
   /** @type {Set<() => void>} */
   #listeners = new Set();
   #flushing = false;
-  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
-  #failure = null;
-  #missed = false;
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
@@ -108,23 +108,6 @@ export class VoiceOutbox {
   subscribe(listener) {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
-  }
-
-  /**
-   * Call this often. While the server is missed, recordings count as held up at once: the request that sends them may
-   * take long to give up.
-   *
-   * @param {boolean} missed whether the server has been silent for too long
-   */
-  follow(missed) {
-    if (missed === this.#missed) return;
-    this.#missed = missed;
-    this.#tell();
-  }
-
-  /** Why recordings wait: why the last attempt to send failed, or that the server is missed. Null if neither is so. */
-  get trouble() {
-    return this.#failure ?? (this.#missed ? say("no-connection") : null);
   }
 
   /** Whether this device keeps every unsaved step over a reload. */
@@ -276,7 +259,7 @@ export class VoiceOutbox {
       return this.#failed(step, error);
     }
 
-    this.#failure = null;
+    this.trouble = null;
     this.#wait = FIRST_WAIT_MS;
     this.#hasSaved = step.kind === "piece" && step.ended !== null;
     this.#done.add(step.id);
@@ -308,7 +291,7 @@ export class VoiceOutbox {
       this.#tell();
       return true;
     }
-    this.#failure = inWords(error, say("no-connection"));
+    this.trouble = inWords(error, say("no-connection"));
     this.#tell();
     return false;
   }
