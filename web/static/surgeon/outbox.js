@@ -7,10 +7,9 @@
 
 import { inWords, Refused } from "../shared/api.js";
 import { say } from "../shared/language.js";
+import { Delivery } from "./delivery.js";
 
 const PREFIX = "parfocal.outbox.";
-const FIRST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 8000;
 
 /** @typedef {import("./origin.js").Stamp} Stamp */
 
@@ -64,9 +63,8 @@ export class Outbox {
   #refused = new Map();
   /** @type {Set<(change: Change) => void>} */
   #listeners = new Set();
-  #flushing = false;
-  #wait = FIRST_WAIT_MS;
-  #cancel = () => {};
+  /** @type {Delivery<Entry>} */
+  #delivery;
   #latest = 0;
   /** Ids of the entries that this page has removed from the device. @type {Set<string>} */
   #done = new Set();
@@ -74,6 +72,8 @@ export class Outbox {
   /** @param {Surroundings} around */
   constructor(around) {
     this.#around = around;
+    const send = (/** @type {Entry} */ entry) => this.#send(entry);
+    this.#delivery = new Delivery({ waiting: () => this.waiting, send, later: around.later });
     for (const entry of this.#stored()) this.#take(entry);
     this.ready = this.#restore();
     this.nudge();
@@ -215,9 +215,7 @@ export class Outbox {
 
   /** Tries to send now, without waiting any longer. */
   nudge() {
-    this.#cancel();
-    this.#wait = FIRST_WAIT_MS;
-    this.#flush();
+    this.#delivery.nudge();
   }
 
   /**
@@ -243,24 +241,6 @@ export class Outbox {
         resolve(change);
       });
     });
-  }
-
-  async #flush() {
-    if (this.#flushing) return;
-    this.#flushing = true;
-
-    const tried = new Set();
-    const next = () => this.waiting.find((entry) => !tried.has(entry.id));
-    for (let entry = next(); entry; entry = next()) {
-      tried.add(entry.id);
-      if (!(await this.#send(entry))) break;
-    }
-
-    this.#flushing = false;
-    if (this.#entries.size > 0) {
-      this.#cancel = this.#around.later(() => this.#flush(), this.#wait);
-      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
-    }
   }
 
   /**

@@ -6,9 +6,7 @@
 import { inWords, Refused } from "../shared/api.js";
 import { say } from "../shared/language.js";
 import { PATH as COMMENTS } from "./comments.js";
-
-const FIRST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 8000;
+import { Delivery } from "./delivery.js";
 
 /** @typedef {import("./origin.js").Stamp} Stamp */
 /** @typedef {"released" | "limit" | "microphone-lost" | "left"} Ending */
@@ -69,9 +67,8 @@ export class VoiceOutbox {
   #unkept = new Set();
   /** @type {Set<() => void>} */
   #listeners = new Set();
-  #flushing = false;
-  #wait = FIRST_WAIT_MS;
-  #cancel = () => {};
+  /** @type {Delivery<Step>} */
+  #delivery;
   #latest = 0;
   /** Ids of the steps that this page has sent. @type {Set<string>} */
   #done = new Set();
@@ -81,6 +78,8 @@ export class VoiceOutbox {
   /** @param {Surroundings} around */
   constructor(around) {
     this.#around = around;
+    const send = (/** @type {Step} */ step) => this.#send(step);
+    this.#delivery = new Delivery({ waiting: () => this.#queue(), send, later: around.later });
     this.ready = this.#load();
   }
 
@@ -174,9 +173,7 @@ export class VoiceOutbox {
 
   /** Tries to send now, without waiting any longer. */
   nudge() {
-    this.#cancel();
-    this.#wait = FIRST_WAIT_MS;
-    this.#flush();
+    this.#delivery.nudge();
   }
 
   /** How many recordings wait because they could not be sent, or because this device cannot keep them. */
@@ -212,7 +209,7 @@ export class VoiceOutbox {
     this.#steps.set(step.id, step);
     this.#keep(step);
     this.#tell();
-    if (!this.#flushing) this.nudge();
+    if (!this.#delivery.isSending) this.nudge();
   }
 
   /** @param {Step} step */
@@ -233,20 +230,6 @@ export class VoiceOutbox {
     return open.sort((a, b) => (a.id < b.id ? -1 : 1));
   }
 
-  async #flush() {
-    if (this.#flushing) return;
-    this.#flushing = true;
-    for (let step = this.#queue()[0]; step; step = this.#queue()[0]) {
-      if (!(await this.#send(step))) break;
-    }
-    this.#flushing = false;
-
-    if (this.#queue().length > 0) {
-      this.#cancel = this.#around.later(() => this.#flush(), this.#wait);
-      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
-    }
-  }
-
   /**
    * Sends one step. Returns whether the next step is worth trying.
    *
@@ -260,7 +243,7 @@ export class VoiceOutbox {
     }
 
     this.trouble = null;
-    this.#wait = FIRST_WAIT_MS;
+    this.#delivery.hurry();
     this.#hasSaved = step.kind === "piece" && step.ended !== null;
     this.#done.add(step.id);
     this.#steps.delete(step.id);
