@@ -335,6 +335,25 @@ fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first(
 }
 
 #[test]
+fn where_the_content_area_is_found_far_away_the_policy_forgets_the_old_place() {
+    let (mut fixture, diary) = diarist();
+    let mut see = |x: f64| {
+        let area = ContentArea { x, y: 80.0, radius: 40.0, confidence: 1.0 };
+        fixture.stepper.obey(Command::ContentArea(Some(area)));
+        fixture.clock.advance(FRAME);
+        fixture.number += 1;
+        fixture.stepper.step(sized_frame(fixture.number, fixture.clock.now(), 160)).unwrap().jumps
+    };
+
+    // Half of a patch (32 cells) and less is no jump, a cell more is one.
+    see(60.0);
+    diary.lock().unwrap().clear();
+    let jumps = [60.0, 76.0, 60.0, 77.0, 78.0, 61.0].map(&mut see);
+    assert_eq!(jumps.map(|count| count - jumps[0]), [0, 0, 0, 1, 1, 2]);
+    assert_eq!(diary.lock().unwrap().join(" "), "sees sees sees forgets sees sees forgets sees");
+}
+
+#[test]
 fn tissue_that_is_lost_brings_the_patch_back_to_the_centre() {
     let (mut fixture, diary) = diarist();
     let content = ContentArea { x: 80.0, y: 80.0, radius: 70.0, confidence: 1.0 };

@@ -40,6 +40,8 @@ pub struct Stepper {
     following: Following,
     /// How often the policy has been made to forget what it saw.
     jumps: u64,
+    /// Where the patch was in the latest frame since then.
+    latest_patch: Option<PatchArea>,
     /// What people can point at.
     geometry: PictureGeometry,
     /// The last focal power that the lens accepted.
@@ -70,6 +72,7 @@ impl Stepper {
             tracker: None,
             following: Following::Screen,
             jumps: 0,
+            latest_patch: None,
             geometry: PictureGeometry::default(),
             asked: start,
             wanted: start,
@@ -114,6 +117,19 @@ impl Stepper {
     fn forget(&mut self) {
         self.pilot.forget();
         self.jumps += 1;
+        self.latest_patch = None;
+    }
+
+    /// A chosen place is relative to the content area. Where that was found anew far from where it was, the patch shows
+    /// another place. Half of a patch away, two frames still share enough to be compared.
+    fn notice_jump(&mut self, patch: PatchArea) {
+        let is_far = |latest: PatchArea| {
+            2 * patch.x.abs_diff(latest.x) > patch.width || 2 * patch.y.abs_diff(latest.y) > patch.height
+        };
+        if self.tracker.is_none() && self.latest_patch.is_some_and(is_far) {
+            self.forget();
+        }
+        self.latest_patch = Some(patch);
     }
 
     /// Where the patch is that was at `patch` in the frame before, if it follows the tissue. It is the same tissue, so
@@ -177,6 +193,7 @@ impl Stepper {
         let content_area = self.geometry.content_area;
         let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;
         let patch = self.follow(&frame.image, patch)?;
+        self.notice_jump(patch);
 
         let asks = self.asks_policy(&frame);
         let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
