@@ -41,9 +41,9 @@ pub struct Arguments {
     /// a scan over the phantom as a robotic arm would record it; or the folder of a recorded scan.
     #[arg(long, value_name = "simulated|relief|phantom|DIR", default_value = "simulated")]
     scans: String,
-    /// What a recorded scan shows between two of its focal powers.
-    #[arg(long, value_enum, default_value_t)]
-    between: Interpolation,
+    /// What a recorded scan shows between two of its focal powers; `nearest` by default.
+    #[arg(long, value_enum)]
+    between: Option<Interpolation>,
     /// Evaluate on a photographed focal stack instead: a folder of pictures of one still scene in order of focus.
     /// `DIR:K` makes K of its planes the range 0 to 1, by default two fifths of them. Each stack runs at two scales and
     /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
@@ -342,14 +342,16 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     }
 
     if arguments.scans == "relief" {
+        refuse_between(arguments)?;
         let seed = arguments.seed();
         let count = arguments.count.unwrap_or(COUNT);
         let set = Benchmark { seed, ..Benchmark::relief(count)? };
         return Ok(Scans { set: Box::new(PartOf::new(set, part)), seed, count, between: None });
     }
 
-    let between = Some(arguments.between);
-    let recorded = |scans| Box::new(RecordedScans { scans, between: arguments.between });
+    let between = arguments.between.unwrap_or_default();
+    let recorded = |scans| Box::new(RecordedScans { scans, between });
+    let between = Some(between);
 
     if arguments.scans == "phantom" {
         if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {
@@ -376,6 +378,9 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     if part != Part::WHOLE {
         return Err("a folder holds one scan, which cannot be split; leave out --shard".into());
     }
+    if arguments.seed.is_some() {
+        return Err("a recorded scan has its own seed; leave out --seed".into());
+    }
 
     let folder = ScanFolder::open(folder)?;
     let bar = bar(folder.poses().len(), 0);
@@ -383,6 +388,13 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     bar.finish_and_clear();
 
     Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
+}
+
+fn refuse_between(arguments: &Arguments) -> Result<(), Failure> {
+    match arguments.between {
+        Some(_) => Err("--between is for recorded scans, which have pictures at some focal powers only".into()),
+        None => Ok(()),
+    }
 }
 
 fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
@@ -394,6 +406,7 @@ fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
 }
 
 fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
+    refuse_between(arguments)?;
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);

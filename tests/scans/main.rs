@@ -126,6 +126,12 @@ fn what_is_recorded_is_what_is_evaluated_on() {
     let table = parfocal(&["evaluate", "--scans", text(&out), "--policies", "fixed"]);
     assert!(said(&table).contains("at the nearest focal power"), "{}", said(&table));
     assert!(said(&table).contains("0.262 ± 0.161"), "the paper's robotic column: {}", said(&table));
+
+    let refused = |options: &[&str]| complaint(&parfocal(&[&["evaluate", "--policies", "fixed"], options].concat()));
+    assert!(refused(&["--scans", text(&out), "--seed", "8"]).contains("its own seed; leave out --seed"));
+    for drawn in ["simulated", "relief"] {
+        assert!(refused(&["--scans", drawn, "--between", "nearest"]).contains("--between is for recorded scans"));
+    }
 }
 
 /// Waits until a recording has stored `poses` of its poses.
