@@ -3,6 +3,7 @@
 mod arguments;
 mod given;
 mod navigation;
+mod upkeep;
 
 use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
@@ -21,6 +22,7 @@ use tracing_subscriber::EnvFilter;
 
 pub use self::arguments::Arguments;
 use self::given::Given;
+use self::upkeep::keep_up;
 use super::announce::announcement;
 use super::output::Failure;
 use parfocal_autofocus::Registry;
@@ -121,7 +123,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
 
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
-    tokio::spawn(device_log::record(store.clone(), Arc::clone(&clock), control.status.clone()));
+    log_devices(&store, &clock, &control.status);
 
     // A colour picture has only one size.
     let largest = if mosaics.is_some() { Size::Full } else { Size::Cell };
@@ -155,10 +157,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     });
 
     let health = HealthWatch::new(Arc::clone(&clock), control.status.clone(), conductor.operator_view(), store.clone());
-    let watching = tokio::spawn(health.clone().run());
+    let watching = keep_up("what watches the health of the server", &health, HealthWatch::run);
 
     let mut conducting = tokio::spawn(conductor.clone().run());
-    let recording = tokio::spawn(recordings.clone().run());
+    let recording = keep_up("what begins and ends recordings", &recordings, Recordings::run);
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
@@ -318,6 +320,12 @@ fn keep_in_time(certificates: Option<&Arc<Certificates>>, clock: &Arc<dyn Clock>
     if let Some(certificates) = certificates {
         tokio::spawn(keep_current(Arc::clone(certificates), Arc::clone(clock)));
     }
+}
+
+/// Keeps in the database what happens to camera and lens.
+fn log_devices(store: &Store, clock: &Arc<dyn Clock>, status: &watch::Receiver<Arc<ControlStatus>>) {
+    let of = (store.clone(), Arc::clone(clock), status.clone());
+    keep_up("the log of the devices", &of, |(store, clock, status)| device_log::record(store, clock, status));
 }
 
 /// A random source that may be predictable; real sessions draw nothing from it.
