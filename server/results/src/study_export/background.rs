@@ -1,9 +1,7 @@
-//! Exports of studies while the server runs. Each study has one export at a time. It is made in the background, kept
-//! for a while so that an interrupted download can be repeated, and then removed.
+//! Exports of studies that are made while the server runs, to be downloaded.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -13,6 +11,7 @@ use utoipa::ToSchema;
 use super::error::StudyExportError;
 use super::making::{Progress, export_study, sessions_of};
 use parfocal_base::ids::SessionId;
+use parfocal_records::downloads::{Downloads, Stage};
 use parfocal_records::store::{AccessLog, Reader, StoreError};
 use parfocal_trial::account::AccountName;
 
@@ -25,26 +24,9 @@ const KEPT: Duration = Duration::from_hours(1);
 /// The reason that people see when a finished export is discarded.
 const OUTDATED: &str = "a surgeon has withdrawn or words were erased after this export was begun; export again";
 
-/// The latest export of each study.
+/// The latest export of each study. What is ordered is whether it contains the policies.
 #[derive(Clone)]
-pub struct StudyExports {
-    folder: PathBuf,
-    latest: Arc<Mutex<BTreeMap<String, LatestExport>>>,
-}
-
-/// The latest export of a study.
-struct LatestExport {
-    unblinded: bool,
-    stage: Stage,
-    /// Number of the export, which distinguishes it from the one before.
-    number: u64,
-}
-
-enum Stage {
-    Running(Progress),
-    Failed(String),
-    Ready(FinishedExport),
-}
+pub struct StudyExports(Downloads<bool, Progress, FinishedExport>);
 
 /// A finished export. Its folder is removed when the last clone is dropped.
 #[derive(Clone)]
@@ -96,14 +78,7 @@ impl StudyExports {
     /// Starts without exports. Removes those that an earlier server left in the data folder `data`.
     #[must_use]
     pub fn new(data: &Path) -> Self {
-        let folder = data.join(FOLDER);
-        match std::fs::remove_dir_all(&folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                tracing::warn!("{} is left from earlier exports and cannot be removed: {error}", folder.display());
-            }
-            _ => {}
-        }
-        Self { folder, latest: Arc::default() }
+        Self(Downloads::new(data.join(FOLDER), KEPT))
     }
 
     /// The state of the latest export of `study`.
@@ -112,7 +87,16 @@ impl StudyExports {
     /// If the database failed.
     pub async fn state(&self, reader: &Reader, study: &str) -> Result<StudyExportState, StoreError> {
         self.give_up_outdated(reader, study).await?;
-        Ok(self.lock().get(study).map_or(StudyExportState::None, LatestExport::state))
+        Ok(self.latest(study))
+    }
+
+    fn latest(&self, study: &str) -> StudyExportState {
+        let Some((unblinded, stage)) = self.0.latest(study) else { return StudyExportState::None };
+        match stage {
+            Stage::Running(progress) => StudyExportState::Running { unblinded, progress },
+            Stage::Failed(reason) => StudyExportState::Failed { unblinded, reason },
+            Stage::Ready(made) => StudyExportState::Ready { unblinded, sessions: made.sessions.len() },
+        }
     }
 
     /// The latest export of `study`, if it is finished.
@@ -121,143 +105,60 @@ impl StudyExports {
     /// If the database failed.
     pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<FinishedExport>, StoreError> {
         self.give_up_outdated(reader, study).await?;
-        Ok(self.lock().get(study).and_then(LatestExport::made))
+        Ok(match self.0.latest(study) {
+            Some((_, Stage::Ready(made))) => Some(made),
+            _ => None,
+        })
     }
 
     /// Discards the finished export of `study` if a surgeon has withdrawn or words were erased since it was begun,
     /// because it still contains them.
     async fn give_up_outdated(&self, reader: &Reader, study: &str) -> Result<(), StoreError> {
         let taken_back = reader.taken_back(study).await?;
-        let mut exports = self.lock();
-        let Some(latest) = exports.get_mut(study) else { return Ok(()) };
-        if latest.made().is_none_or(|made| made.taken_back == taken_back) {
-            return Ok(());
-        }
-
-        let given_up = LatestExport { stage: Stage::Failed(OUTDATED.to_owned()), ..*latest };
-        let before = std::mem::replace(latest, given_up);
-        drop(exports);
-        forget(Some(before));
+        self.0.give_up(study, |made| made.taken_back != taken_back, OUTDATED);
         Ok(())
     }
 
-    /// Starts an export of `study`, unless one is already running, and returns the state. `recorder` records the
+    /// Starts an export of `study`, unless one is already running, and returns the state. `access_log` records the
     /// export.
     #[must_use]
     pub fn start(&self, access_log: AccessLog, study: &str, unblinded: bool) -> StudyExportState {
-        let mut latest = self.lock();
-        let number = match latest.get(study) {
-            Some(running) if matches!(running.stage, Stage::Running(_)) => return running.state(),
-            Some(earlier) => earlier.number + 1,
-            None => 1,
-        };
-
-        // Removes the previous export now, because the disk may not have room for two packages of a study.
-        let started = LatestExport { unblinded, stage: Stage::Running(Progress::default()), number };
-        let state = started.state();
-        let before = latest.insert(study.to_owned(), started);
-        drop(latest);
-        forget(before);
-
-        let job = Job { exports: self.clone(), study: study.to_owned(), unblinded, number };
-        tokio::spawn(job.run(access_log));
-        state
-    }
-
-    /// Removes export `number` of `study` from the list, unless a later one has replaced it.
-    fn take(&self, study: &str, number: u64) -> Option<LatestExport> {
-        let mut latest = self.lock();
-        let same = latest.get(study).is_some_and(|latest| latest.number == number);
-        if same { latest.remove(study) } else { None }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, LatestExport>> {
-        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+        let job = Job { exports: self.clone(), access_log, study: study.to_owned(), unblinded };
+        self.0.start(study, unblinded, async move { job.run().await.map_err(|error| error.to_string()) });
+        self.latest(study)
     }
 }
 
-impl LatestExport {
-    /// The export, if it is finished.
-    fn made(&self) -> Option<FinishedExport> {
-        match &self.stage {
-            Stage::Ready(made) => Some(made.clone()),
-            Stage::Running(_) | Stage::Failed(_) => None,
-        }
-    }
-
-    fn state(&self) -> StudyExportState {
-        let unblinded = self.unblinded;
-        match &self.stage {
-            Stage::Running(progress) => StudyExportState::Running { unblinded, progress: *progress },
-            Stage::Failed(reason) => StudyExportState::Failed { unblinded, reason: reason.clone() },
-            Stage::Ready(made) => StudyExportState::Ready { unblinded, sessions: made.sessions.len() },
-        }
-    }
-}
-
-/// A running export.
+/// An export to make.
 struct Job {
     exports: StudyExports,
+    access_log: AccessLog,
     study: String,
     unblinded: bool,
-    number: u64,
 }
 
 impl Job {
-    async fn run(self, access_log: AccessLog) {
-        let stage = match self.make(&access_log).await {
-            Ok(made) => Stage::Ready(made),
-            Err(error) => {
-                tracing::warn!(study = %self.study, "a study could not be exported: {error}");
-                Stage::Failed(error.to_string())
-            }
-        };
-        self.stands_at(stage);
-        // Dropped before the wait, so that a server that stops meanwhile can close its database.
-        drop(access_log);
-
-        tokio::time::sleep(KEPT).await;
-        forget(self.exports.take(&self.study, self.number));
-    }
-
-    async fn make(&self, access_log: &AccessLog) -> Result<FinishedExport, StudyExportError> {
-        let folder = &self.exports.folder;
+    async fn run(self) -> Result<FinishedExport, StudyExportError> {
+        let Self { exports: StudyExports(downloads), access_log, study, unblinded } = self;
+        let folder = downloads.folder().to_owned();
         let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
-        std::fs::create_dir_all(folder).map_err(unwritable)?;
-        let room = tempfile::Builder::new().prefix("export-").tempdir_in(folder).map_err(unwritable)?;
-        let package = room.path().join(&self.study);
-        let taken_back = access_log.reader().taken_back(&self.study).await?;
-        let (sessions, _) = sessions_of(access_log.reader(), &self.study, self.unblinded).await?;
+        std::fs::create_dir_all(&folder).map_err(unwritable)?;
+        let room = tempfile::Builder::new().prefix("export-").tempdir_in(&folder).map_err(unwritable)?;
+        let package = room.path().join(&study);
+        let taken_back = access_log.reader().taken_back(&study).await?;
+        let (sessions, _) = sessions_of(access_log.reader(), &study, unblinded).await?;
 
-        let exports = self.exports.clone();
-        let study = self.study.clone();
-        let report = move |progress| {
-            if let Some(latest) = exports.lock().get_mut(&study) {
-                latest.stage = Stage::Running(progress);
-            }
-        };
-        export_study(access_log, &self.study, self.unblinded, &package, Arc::new(report)).await?;
+        let name = study.clone();
+        let report = move |progress| downloads.report(&name, progress);
+        export_study(&access_log, &study, unblinded, &package, Arc::new(report)).await?;
 
         Ok(FinishedExport {
-            unblinded: self.unblinded,
+            unblinded,
             folder: package,
             sessions,
             by: access_log.account().cloned(),
             taken_back,
             _room: Arc::new(room),
         })
-    }
-
-    fn stands_at(&self, stage: Stage) {
-        if let Some(latest) = self.exports.lock().get_mut(&self.study) {
-            latest.stage = stage;
-        }
-    }
-}
-
-/// Removes an export's files on a thread that may block on the disk.
-fn forget(export: Option<LatestExport>) {
-    if export.is_some() {
-        tokio::task::spawn_blocking(move || drop(export));
     }
 }
