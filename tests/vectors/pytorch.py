@@ -81,7 +81,7 @@ class MetricLearned(nn.Module):
 
 
 class Belief(nn.Module):
-    """Inputs `[N, T, 177]`, as `server/autofocus/src/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
+    """Inputs `[N, T, 295]`, as `server/autofocus/src/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
     optimum's bins.
     """
 
@@ -115,6 +115,7 @@ def main():
     fill(cnn)
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
     values = cnn(patches, wave(8, 0.7, 1.0))
+    # Fewer inputs than the shipped network has: it is the same for any number.
     inputs, units, bins = 177, 192, 41
     belief = Belief(inputs, units, bins)
     fill(belief)

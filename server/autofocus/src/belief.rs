@@ -9,6 +9,7 @@ use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT,
 use super::registration::{CHANGES, changes};
 use super::sharpness_memory::SharpnessMemory;
 use super::spectrum::{FEATURES, PatchTransform, SHARPNESS, features, spectrum};
+use super::tiles::ViewTrace;
 use super::weights::{self, WeightsError};
 use super::{Decision, FieldOfView, Observation, Policy};
 use parfocal_base::BlurRate;
@@ -43,6 +44,7 @@ pub struct Trace {
     asked: Option<f32>,
     stand: SharpnessSinceMove,
     sharpness: SharpnessMemory,
+    views: ViewTrace,
 }
 
 /// The sharpness of the picture since the lens last moved.
@@ -149,7 +151,9 @@ impl Trace {
         self.sharpness.see(focal_power, now.near.features[SHARPNESS]);
 
         let mut input = [0.0; BELIEF_INPUT];
-        let (seen, known) = input.split_at_mut(SEEN_INPUT);
+        let (seen, rest) = input.split_at_mut(SEEN_INPUT);
+        let (known, around) = rest.split_at_mut(2);
+        around.copy_from_slice(&self.views.see(view.surroundings.as_ref(), focal_power));
         let (near, wider) = seen.split_at_mut(NEAR_INPUT);
         let rest = now.near.describe(&before.near, near);
         let (stands, moved) = rest.split_at_mut(BINS);
@@ -344,7 +348,7 @@ impl BeliefTracker {
 
 impl Policy for BeliefTracker {
     fn field_of_view(&self) -> FieldOfView {
-        FieldOfView::Wide
+        FieldOfView::Surroundings
     }
 
     fn step(&mut self, seen: &Observation<'_>) -> Decision {

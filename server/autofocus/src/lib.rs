@@ -14,6 +14,7 @@ pub mod scripted;
 mod sharpness_memory;
 pub mod shipped;
 pub mod spectrum;
+mod tiles;
 pub mod tracking;
 pub mod weights;
 

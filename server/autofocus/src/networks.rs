@@ -5,6 +5,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::registration::CHANGES;
 use super::spectrum::FEATURES;
+use super::tiles::VIEW_INPUT;
 use parfocal_imaging::{PATCH_SIDE, WIDER};
 
 /// Number of latest frames that the paper's networks see.
@@ -22,11 +23,11 @@ pub const MEMORY: usize = 192;
 pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
 /// Inputs from a wider patch: features and changes like those of the patch, and whether the wider patch exists.
 pub const WIDER_INPUT: usize = 2 * FEATURES + CHANGES + 1;
-/// Inputs from a frame: the patch first, then the wider ones.
+/// Inputs from a frame's patches: the patch first, then the wider ones.
 pub const SEEN_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
-/// All inputs of the belief tracker: those from the frame, whether the blur rate of the optics is known, and the blur
-/// rate.
-pub const BELIEF_INPUT: usize = SEEN_INPUT + 2;
+/// All inputs of the belief tracker: those from the patches, whether the blur rate of the optics is known, the blur
+/// rate, and those from the whole view.
+pub const BELIEF_INPUT: usize = SEEN_INPUT + 2 + VIEW_INPUT;
 
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
@@ -188,11 +189,13 @@ mod tests {
 
     #[test]
     fn the_belief_tracker_gives_what_pytorch_gives() {
+        /// As many as in `tests/vectors/pytorch.py`. The network is the same for any number of inputs.
+        const INPUTS: usize = 177;
         let store = nn::VarStore::new(Device::Cpu);
-        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
+        let network = BeliefNetwork::new(&store.root(), INPUTS);
         fill(&store);
 
-        let inputs = wave(2 * 5 * BELIEF_INPUT, 0.29, 1.0, 0.0).view([2, 5, BELIEF_INPUT as i64]);
+        let inputs = wave(2 * 5 * INPUTS, 0.29, 1.0, 0.0).view([2, 5, INPUTS as i64]);
         let (logits, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
         let found = logits.select(1, 4).contiguous().view([-1]);
         assert!(found.allclose(&from_pytorch("belief_logits"), 1e-4, 1e-5, false));

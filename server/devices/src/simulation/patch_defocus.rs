@@ -3,12 +3,12 @@
 use multiversion::multiversion;
 
 use super::gaussian;
-use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch, Square, fill_block_means};
+use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch, Square, Surroundings, fill_block_means};
 
 /// Widest supported reach of a kernel, in pixels either side: four times the largest sigma of the scans, 8.
 const MAX_REACH: usize = 32;
-/// Pixels a row that the widest kernel needs.
-pub(super) const MAX_SIDE: usize = PATCH_SIDE + 2 * MAX_REACH;
+/// Pixels a row of the largest square with what the widest kernel needs around it.
+pub(super) const MAX_SIDE: usize = Surroundings::SIDE + 2 * MAX_REACH;
 /// Widest blur, in pixels of standard deviation.
 const MOST_SIGMA: f64 = 8.0;
 /// From this sigma on, squares are blurred at half the resolution: no detail is left that would show the difference.
@@ -49,21 +49,16 @@ impl Defocus {
     /// As [`Defocus::patch`], of a scene that `look` shows. `look` gets the number of pixels around the patch that
     /// matter, the number of pixels in a row, and the slice to fill row after row.
     pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
-        let sigma = sigma.clamp(0.0, MOST_SIGMA);
-        let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
-
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        let kernel = || single(gaussian::kernel(sigma, reach));
-        self.blur(PATCH_SIDE, reach, Blur { sigma, spot, kernel }, look, &mut patch.0);
+        self.fill(PATCH_SIDE, sigma, spot, look, &mut patch.0);
         patch
     }
 
-    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide blur is made from
-    /// means of 2x2 pixels. Each of the square's values is then twice as wide and high as a pixel.
+    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A [wide](Self::is_wide) blur
+    /// is made from means of 2x2 pixels.
     pub fn square(&mut self, image: &GrayImage, square: Square, sigma: f64, spot: Spot) -> Vec<f32> {
         let Square { x, y, side } = square;
-        let sigma = sigma.clamp(0.0, MOST_SIGMA);
-        if sigma >= WIDE_SIGMA {
+        if Self::is_wide(sigma) {
             return self.coarse_square(side, sigma, spot, |reach, coarse_side, source| {
                 let margin = (COARSE * reach) as isize;
                 let fine_side = COARSE * coarse_side;
@@ -73,15 +68,43 @@ impl Defocus {
             });
         }
 
-        let reach = if sigma < LEAST_SIGMA { 0 } else { (4.0 * sigma).ceil() as usize };
-        let mut levels = vec![0.0; side * side];
-        let look = |reach: usize, side: usize, source: &mut [f32]| {
-            gather(image, (x as isize - reach as isize, y as isize - reach as isize), side, source);
-        };
+        self.square_of(side, sigma, spot, |reach, width, source| {
+            gather(image, (x as isize - reach as isize, y as isize - reach as isize), width, source);
+        })
+    }
 
-        let kernel = || single(gaussian::kernel(sigma, reach));
-        self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
+    /// Gray levels of a square of `side` pixels (at most 128) of a scene that `look` shows, as in
+    /// [`Defocus::patch_of`].
+    pub fn square_of(
+        &mut self,
+        side: usize,
+        sigma: f64,
+        spot: Spot,
+        look: impl FnOnce(usize, usize, &mut [f32]),
+    ) -> Vec<f32> {
+        let mut levels = vec![0.0; side * side];
+        self.fill(side, sigma, spot, look, &mut levels);
         levels
+    }
+
+    /// Whether a blur of `sigma` leaves so little detail that a square may be made from means of 2x2 pixels.
+    #[must_use]
+    pub fn is_wide(sigma: f64) -> bool {
+        sigma >= WIDE_SIGMA
+    }
+
+    fn fill(
+        &mut self,
+        side: usize,
+        sigma: f64,
+        spot: Spot,
+        look: impl FnOnce(usize, usize, &mut [f32]),
+        out: &mut [f32],
+    ) {
+        let sigma = sigma.clamp(0.0, MOST_SIGMA);
+        let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
+        let kernel = || single(gaussian::kernel(sigma, reach));
+        self.blur(side, reach, Blur { sigma, spot, kernel }, look, out);
     }
 
     /// Gray levels of a square of `side` pixels of a scene that `look` shows in means of 2x2
@@ -108,7 +131,7 @@ impl Defocus {
             self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
         }
 
-        repeated(&levels, side)
+        expanded(&levels, side)
     }
 
     /// Fills `out` (`width` x `width` values) with what `look` shows, blurred by `blur`, whose kernel reaches `reach`
@@ -148,10 +171,25 @@ struct Blur<K> {
     kernel: K,
 }
 
-/// Repeats each of `levels` (`side` in a row) for [`COARSE`] x [`COARSE`] pixels.
-fn repeated(levels: &[f32], side: usize) -> Vec<f32> {
-    let wide = |line: &[f32]| -> Vec<f32> { line.iter().flat_map(|&level| [level; COARSE]).collect() };
-    levels.chunks_exact(side).map(wide).flat_map(|line| [line.clone(), line]).flatten().collect()
+/// Twice as wide and as high: each of the `side` x `side` values becomes 2x2 on the slope between its neighbours, whose
+/// mean is the value. A mere repetition would have edges where there are none.
+fn expanded(levels: &[f32], side: usize) -> Vec<f32> {
+    let mut out = vec![0.0; COARSE * COARSE * side * side];
+    for y in 0..side {
+        let line = |row: usize| &levels[row * side..][..side];
+        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(side - 1)));
+        let (upper, lower) = out[COARSE * COARSE * side * y..][..COARSE * COARSE * side].split_at_mut(COARSE * side);
+        for x in 0..side {
+            // The new values lie a quarter of a step from the old ones, whose neighbours are two steps apart.
+            let right = 0.125 * (here[(x + 1).min(side - 1)] - here[x.saturating_sub(1)]);
+            let down = 0.125 * (below[x] - above[x]);
+            upper[COARSE * x] = here[x] - right - down;
+            upper[COARSE * x + 1] = here[x] + right - down;
+            lower[COARSE * x] = here[x] - right + down;
+            lower[COARSE * x + 1] = here[x] + right + down;
+        }
+    }
+    out
 }
 
 /// Fills `source`, `side` pixels a row, from `image`'s `(left, top)` on.

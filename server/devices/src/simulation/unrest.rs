@@ -8,7 +8,7 @@ use rand::Rng;
 use super::normal::standard_normal;
 use super::patch_defocus::MAX_SIDE;
 use super::walk::{Motion, Walk};
-use parfocal_imaging::{GrayImage, PATCH_SIDE};
+use parfocal_imaging::GrayImage;
 
 /// Knots of the contrast's field along each axis; beyond them it repeats.
 const KNOTS: usize = 32;
@@ -59,16 +59,15 @@ impl Unrest {
         self.strain.iter_mut().chain(&mut self.drift).for_each(|walk| walk.advance(rng));
     }
 
-    /// Fills `out`, `side` pixels a row, with the part of `image` around a patch whose top left pixel
-    /// lies at `corner`. Outside the image its border pixels are repeated. The image has at least 2x2
-    /// pixels, `side` is at most [`MAX_SIDE`].
-    pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
-        let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
+    /// Fills `out`, `side` pixels a row, with the part of `image` around a square of `width` pixels whose top left pixel
+    /// lies at `corner`. Outside the image its border pixels are repeated. The image has at least 2x2 pixels, `side` is
+    /// at most [`MAX_SIDE`].
+    pub fn gather(&self, image: &GrayImage, corner: (f64, f64), width: usize, side: usize, out: &mut [f32]) {
+        let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * width as f32);
         self.fill(image, centre, self.cell, None, side, out);
     }
 
-    /// As [`Unrest::gather`], around a square of `width` pixels whose top left pixel lies at `corner`, where `image`
-    /// holds means of 2x2 pixels.
+    /// As [`Unrest::gather`], where `image` holds means of 2x2 pixels.
     pub fn gather_coarsely(&self, image: &GrayImage, corner: (f64, f64), width: usize, side: usize, out: &mut [f32]) {
         let centre = [corner.0, corner.1].map(|at| 0.5 * (at as f32 + 0.5 * width as f32));
         let cell = 0.5 * self.cell;
@@ -191,7 +190,7 @@ mod tests {
             *walk = Walk::new((0.0, 0.0), Motion { speed: 0.0, memory: 1.0 }, &mut rng);
         }
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), (20.0, 30.5), 32, &mut seen);
+        unrest.gather(&slope(), (20.0, 30.5), 32, 32, &mut seen);
         for (index, value) in seen.iter().enumerate() {
             let x = 20.0 + (index % 32) as f32;
             let y = 30.5 + (index / 32) as f32;
@@ -216,7 +215,7 @@ mod tests {
         let at = |place, rng: &mut _| Walk::new((place, place), Motion { speed: 0.0, memory: 1.0 }, rng);
         unrest.strain = [-0.1, 0.0, 0.0, 0.1].map(|strain| at(strain, &mut rng));
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), (20.0, 30.0), 32, &mut seen);
+        unrest.gather(&slope(), (20.0, 30.0), 32, 32, &mut seen);
         assert!((seen[33] - seen[32] - 0.45).abs() < 1e-3);
         assert!((seen[64] - seen[32] - 1.1).abs() < 1e-3);
     }

@@ -87,7 +87,7 @@ fn recording(
     doubts: &mut Vec<String>,
 ) -> Result<Vec<Scene>, BenchError> {
     if Path::new(folder).join(HEADER).exists() {
-        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Patches, &|| ())?;
+        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Surroundings, &|| ())?;
         if scan.poses().len() < 2 {
             return Err(BenchError::OnePose(folder.to_owned()));
         }

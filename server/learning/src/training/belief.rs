@@ -205,6 +205,8 @@ impl Actor {
     fn see(&mut self) -> [f32; BELIEF_INPUT] {
         let mut view = if self.wider > 0 { self.environment.view() } else { View::from(self.environment.observe()) };
         view.wider[self.wider..].fill(None);
+        // A picture that is too small for the widest patch has no surroundings either.
+        view.surroundings = view.surroundings.filter(|_| self.wider == WIDER.len());
         self.trace.input(&view, self.environment.focal_power().get())
     }
 }

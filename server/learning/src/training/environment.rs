@@ -78,7 +78,7 @@ impl Environment {
         self.scan.observe(self.shown())
     }
 
-    /// The view of this frame.
+    /// The view of this frame, with surroundings.
     pub fn view(&mut self) -> View {
         self.scan.view(self.shown())
     }

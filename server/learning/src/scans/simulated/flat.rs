@@ -13,7 +13,7 @@ use parfocal_base::FocalPower;
 use parfocal_devices::simulation::patch_defocus::{Defocus, Spot};
 use parfocal_devices::simulation::unrest::Unrest;
 use parfocal_devices::simulation::walk::Walk;
-use parfocal_imaging::{Patch, Square, View};
+use parfocal_imaging::{PATCH_SIDE, Patch, Square, View};
 
 /// Sharp pictures, and what happens to their light.
 #[derive(Debug, Clone)]
@@ -108,9 +108,9 @@ impl FlatLook {
         let picture = self.clip.at(time);
         match &self.unrest {
             None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, self.spot),
-            Some((unrest, _)) => {
-                self.defocus.patch_of(sigma, self.spot, |_, side, out| unrest.gather(picture, corner, side, out))
-            }
+            Some((unrest, _)) => self
+                .defocus
+                .patch_of(sigma, self.spot, |_, side, out| unrest.gather(picture, corner, PATCH_SIDE, side, out)),
         }
     }
 
@@ -126,6 +126,12 @@ impl FlatLook {
             };
 
             let place = [(square.x, corner.0), (square.y, corner.1)].map(|(pixel, at)| pixel as f64 + at.fract());
+            if !Defocus::is_wide(sigma) {
+                let picture = self.clip.at(time);
+                return self.defocus.square_of(square.side, sigma, self.spot, |_, side, out| {
+                    unrest.gather(picture, (place[0], place[1]), square.side, side, out);
+                });
+            }
             let coarse = self.clip.coarse_at(time);
             self.defocus.coarse_square(square.side, sigma, self.spot, |_, side, out| {
                 unrest.gather_coarsely(coarse, (place[0], place[1]), square.side, side, out);

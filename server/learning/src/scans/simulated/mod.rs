@@ -88,13 +88,8 @@ impl Scan {
         patch
     }
 
-    /// The patch of [`Scan::observe`], and the wider ones around it; without surroundings.
+    /// The patch of [`Scan::observe`], the wider ones around it, and its surroundings.
     pub fn view(&mut self, focal_power: FocalPower) -> View {
-        View { surroundings: None, ..self.view_of_light(focal_power) }
-    }
-
-    /// As [`Scan::view`], with surroundings. They cost as much again, mostly for their noise.
-    pub fn whole_view(&mut self, focal_power: FocalPower) -> View {
         let mut view = self.view_of_light(focal_power);
         if let Some(light) = view.surroundings.take() {
             view.surroundings = Some(self.sensor.record_surroundings(&light, &view.patch, self.course.contrast));
@@ -138,7 +133,7 @@ fn look_at_recorded(scan: &RecordedScan, time: usize, focal_power: FocalPower) -
 
 impl FocalTimeScan for Scan {
     fn observe(&mut self, focal_power: FocalPower) -> View {
-        self.whole_view(focal_power)
+        self.view(focal_power)
     }
 
     fn patch(&mut self, focal_power: FocalPower) -> Patch {

@@ -22,8 +22,8 @@ pub(super) fn validated(made: &Provenance<'_>, row: &Row, count: usize) -> Strin
 
     let input = match design(made.policy) {
         Some(Design::Belief) => {
-            "32x32 gray patches (0..255), two wider patches around each (32x32 means of 2x2 and of 4x4 pixels), and \
-             focal powers (0..1)"
+            "32x32 gray patches (0..255), two wider patches around each (32x32 means of 2x2 and of 4x4 pixels), the \
+             128x128 pixels around each, and focal powers (0..1)"
         }
         Some(Design::Values(_)) | None => "32x32 gray patches (0..255) and focal powers (0..1)",
     };

@@ -1,0 +1,418 @@
+//! What the whole view tells of focus, tile by tile: how sharp it is, and how its blur changed since earlier frames.
+//!
+//! The patch holds little detail. Where everything in view lies at one distance, all of the view tells of the same
+//! optimum. Where it does not, its tiles change differently, and the network can tell the two apart.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+
+use multiversion::multiversion;
+
+use crate::bisection::motion::ViewTransform;
+use parfocal_imaging::{PATCH_SIDE, Surroundings};
+
+/// Pixels along each side of the view.
+const SIDE: usize = Surroundings::SIDE;
+/// Pixels along each side of a tile.
+const TILE: usize = 16;
+/// Tiles along each side of the view.
+const ACROSS: usize = SIDE / TILE;
+const TILES: usize = ACROSS * ACROSS;
+/// Lags of the second differences, in pixels. Each passes frequencies around 1 / (2 lag) cycles per pixel.
+const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
+const BANDS: usize = LAGS.len();
+/// So many pixels at the ends of a picture have no second difference at the longest lag.
+const EDGE: usize = LAGS[BANDS - 1];
+/// How many frames ago the frames are that a new one is compared with.
+const AGO: [usize; 4] = [1, 2, 4, 8];
+/// Energy per pixel that rounding and noise add to a second difference.
+const FLOOR: f32 = 1.0;
+/// A tile is near the patch if its centre is at most so many pixels from the patch's centre along both axes.
+const NEAR: usize = 40;
+/// Least share of the tiles that both frames must show.
+const LEAST_SHARED: f32 = 0.1;
+
+/// Inputs from the frame by itself: energies of the patch, of the tiles near it, of all tiles, their deviation from
+/// tile to tile, the change of those of all tiles, and whether there is such a view.
+const BY_ITSELF: usize = 5 * BANDS + 1;
+/// Inputs from one comparison: changes of the patch, of the tiles near it, of all tiles, their deviation from tile to
+/// tile; how far the motion stands out, the difference of focal power, and the share of tiles in both frames.
+const COMPARED: usize = 4 * BANDS + 3;
+/// Length of the result of [`ViewTrace::see`].
+pub const VIEW_INPUT: usize = BY_ITSELF + AGO.len() * COMPARED;
+
+/// Mean squares of the second differences, down and along together, at each of [`LAGS`]; or a function of them.
+type Bands = [f32; BANDS];
+
+/// Energies of each tile, row after row; `None` for a tile that is not wholly seen.
+type Tiles = Vec<Option<Bands>>;
+
+/// An earlier frame.
+#[derive(Debug, Clone)]
+struct Earlier {
+    /// [`Surroundings::levels`].
+    levels: Arc<[f32]>,
+    focal_power: f32,
+    /// How far the scene moved from the frame before to this one (right, down), in pixels.
+    motion: (isize, isize),
+    /// How far the peak of that motion stands out ([`ViewTransform::registered_to`]).
+    stands_out: f32,
+}
+
+/// The latest frames' views.
+#[derive(Debug, Clone, Default)]
+pub struct ViewTrace {
+    /// The latest first, at most as many as the longest of [`AGO`].
+    earlier: VecDeque<Earlier>,
+    latest: Option<Box<ViewTransform>>,
+    /// The logarithms of all tiles' energies in the latest frame.
+    sharpness: Option<Bands>,
+}
+
+impl ViewTrace {
+    /// Takes in a frame at `focal_power`, and returns what the network gets of it, each number of the order of 1. All
+    /// are 0 where there are no surroundings, as in a picture that is too small.
+    pub fn see(&mut self, surroundings: Option<&Surroundings>, focal_power: f32) -> [f32; VIEW_INPUT] {
+        let mut input = [0.0; VIEW_INPUT];
+        let Some(surroundings) = surroundings else {
+            *self = Self::default();
+            return input;
+        };
+
+        let transform = ViewTransform::of(&surroundings.levels);
+        let registered = self.latest.as_ref().map(|latest| latest.registered_to(&transform));
+        let (motion, stands_out) = registered.unwrap_or_default();
+        let now = Now::of(surroundings);
+
+        let (by_itself, compared) = input.split_at_mut(BY_ITSELF);
+        self.describe(&now, by_itself);
+
+        // Motions from frame to frame add up to those over several frames. They are as sure as the least sure of them.
+        let mut moved = motion;
+        let mut least = stands_out;
+        for (index, earlier) in self.earlier.iter().enumerate() {
+            if let Some(which) = AGO.iter().position(|&ago| ago == index + 1) {
+                let part = &mut compared[which * COMPARED..][..COMPARED];
+                now.compare(earlier, moved, part);
+                part[4 * BANDS] = ((least - 7.0) / 5.0).clamp(-2.0, 3.0);
+                part[4 * BANDS + 1] = 10.0 * (focal_power - earlier.focal_power);
+            }
+            moved = (moved.0 + earlier.motion.0, moved.1 + earlier.motion.1);
+            least = least.min(earlier.stands_out);
+        }
+
+        let levels = Arc::clone(&surroundings.levels);
+        self.earlier.push_front(Earlier { levels, focal_power, motion, stands_out });
+        self.earlier.truncate(AGO[AGO.len() - 1]);
+        self.latest = Some(Box::new(transform));
+        input
+    }
+
+    /// Writes to `input` what a frame shows by itself.
+    fn describe(&mut self, now: &Now<'_>, input: &mut [f32]) {
+        let logarithms: Vec<Bands> = now.tiles.iter().flatten().map(|energies| energies.map(logarithm)).collect();
+        let (mean, deviation) = moments(&logarithms);
+        let before = self.sharpness.replace(mean).unwrap_or(mean);
+        let change = std::array::from_fn(|band| 4.0 * (mean[band] - before[band]));
+
+        let patch = seen_window(now.patch, (0, 0)).map_or([0.0; BANDS], |(x, y)| window(now.levels, x, y));
+        let near = pooled(&now.tiles, &now.near);
+        write(input, &[patch.map(logarithm), near.map(logarithm), mean, deviation, change]);
+        input[5 * BANDS] = 1.0;
+    }
+}
+
+/// The frame that is compared with earlier ones.
+struct Now<'a> {
+    levels: &'a [f32],
+    /// Column and row of the patch's upper left pixel in the view.
+    patch: (usize, usize),
+    tiles: Tiles,
+    /// Which tiles are near the patch.
+    near: Vec<bool>,
+}
+
+impl<'a> Now<'a> {
+    fn of(surroundings: &'a Surroundings) -> Self {
+        let Surroundings { levels, patch } = surroundings;
+        let centre = |tile: usize| tile * TILE + TILE / 2;
+        let is_near = |tile: usize, corner: usize| centre(tile).abs_diff(corner + PATCH_SIDE / 2) <= NEAR;
+        let near = (0..TILES).map(|tile| is_near(tile % ACROSS, patch.0) && is_near(tile / ACROSS, patch.1));
+        Self { levels, patch: *patch, tiles: tiles(levels, &(0..SIDE), &(0..SIDE)), near: near.collect() }
+    }
+
+    /// Writes to `input` how blur changed since the frame `before`, from where the scene has `moved` (right, down).
+    fn compare(&self, before: &Earlier, moved: (isize, isize), input: &mut [f32]) {
+        // Columns and rows that the frame before shows, too.
+        let shared = |by: isize| by.max(0) as usize..(SIDE as isize + by.min(0)).max(0) as usize;
+        let (columns, rows) = (shared(moved.0), shared(moved.1));
+        if columns.len() <= 2 * EDGE || rows.len() <= 2 * EDGE {
+            return;
+        }
+        let earlier = carried(&before.levels, moved, &columns, &rows);
+
+        // The whole patch, beside the same piece of the scene.
+        let patch = seen_window(self.patch, moved)
+            .map_or([0.0; BANDS], |(x, y)| change(&window(self.levels, x.clone(), y.clone()), &window(&earlier, x, y)));
+        write(input, &[patch]);
+
+        let then = tiles(&earlier, &columns, &rows);
+        let pairs: Vec<Option<(Bands, Bands)>> =
+            self.tiles.iter().zip(&then).map(|(now, then)| Some(((*now)?, (*then)?))).collect();
+        let share = pairs.iter().flatten().count() as f32 / TILES as f32;
+        input[4 * BANDS + 2] = share;
+        if share < LEAST_SHARED {
+            return;
+        }
+
+        let both: Vec<bool> = self.near.iter().zip(&pairs).map(|(near, pair)| *near && pair.is_some()).collect();
+        let near = change(&pooled(&self.tiles, &both), &pooled(&then, &both));
+        let changes: Vec<Bands> = pairs.iter().flatten().map(|(now, then)| change(now, then)).collect();
+        let (mean, deviation) = moments(&changes);
+        write(&mut input[BANDS..], &[near, mean, deviation]);
+    }
+}
+
+fn write(input: &mut [f32], values: &[Bands]) {
+    input[..values.len() * BANDS].copy_from_slice(values.as_flattened());
+}
+
+fn logarithm(energy: f32) -> f32 {
+    0.5 * ((energy + FLOOR).ln() - 3.0)
+}
+
+/// The log ratio of energies, positive if it is sharper `now`.
+fn change(now: &Bands, then: &Bands) -> Bands {
+    std::array::from_fn(|band| (3.0 * ((now[band] + FLOOR) / (then[band] + FLOOR)).ln()).clamp(-4.0, 4.0))
+}
+
+/// Mean and standard deviation of each band; zeros of nothing.
+fn moments(values: &[Bands]) -> (Bands, Bands) {
+    let count = values.len().max(1) as f32;
+    let mean: Bands = std::array::from_fn(|band| values.iter().map(|value| value[band]).sum::<f32>() / count);
+    let variance = |band: usize| values.iter().map(|value| (value[band] - mean[band]).powi(2)).sum::<f32>() / count;
+    (mean, std::array::from_fn(|band| variance(band).sqrt()))
+}
+
+/// The mean energies of the tiles that are seen and in `which`; zeros if there are none.
+fn pooled(tiles: &Tiles, which: &[bool]) -> Bands {
+    let mut sum = [0.0; BANDS];
+    let mut count = 0.0f32;
+    for energies in tiles.iter().zip(which).filter_map(|(energies, is_in)| energies.filter(|_| *is_in)) {
+        count += 1.0;
+        for (sum, energy) in sum.iter_mut().zip(energies) {
+            *sum += energy;
+        }
+    }
+    sum.map(|sum| sum / count.max(1.0))
+}
+
+/// The columns and rows of the patch at `patch` whose second differences are known, both now and before the scene
+/// `moved`; `None` if hardly anything of it is left.
+fn seen_window(patch: (usize, usize), moved: (isize, isize)) -> Option<(Range<usize>, Range<usize>)> {
+    let axis = |corner: usize, by: isize| {
+        let low = corner.max(EDGE + by.max(0) as usize);
+        let high = (corner + PATCH_SIDE).min((SIDE - EDGE).saturating_sub((-by).max(0) as usize));
+        low..high
+    };
+    let (x, y) = (axis(patch.0, moved.0), axis(patch.1, moved.1));
+    (x.len() >= PATCH_SIDE / 4 && y.len() >= PATCH_SIDE / 4).then_some((x, y))
+}
+
+/// An earlier view's `levels`, carried `by` the motion to where the scene is now. Outside `columns` and `rows`, of which
+/// it shows nothing, they are 0.
+fn carried(levels: &[f32], by: (isize, isize), columns: &Range<usize>, rows: &Range<usize>) -> Vec<f32> {
+    let mut out = vec![0.0; SIDE * SIDE];
+    let left = columns.start.wrapping_add_signed(-by.0);
+    for y in rows.clone() {
+        let from = y.wrapping_add_signed(-by.1) * SIDE + left;
+        out[y * SIDE..][columns.clone()].copy_from_slice(&levels[from..from + columns.len()]);
+    }
+    out
+}
+
+/// Energies in a window of a view that lies [`EDGE`] pixels or more from its ends.
+fn window(levels: &[f32], x: Range<usize>, y: Range<usize>) -> Bands {
+    let line = |row: usize, column: usize| &levels[row * SIDE + column..][..x.len()];
+    let pixels = (x.len() * y.len()).max(1) as f32;
+    LAGS.map(|lag| {
+        let mut sum = 0.0;
+        for row in y.clone() {
+            let here = line(row, x.start);
+            sum += squares(line(row - lag, x.start), here, line(row + lag, x.start));
+            sum += squares(line(row, x.start - lag), here, line(row, x.start + lag));
+        }
+        sum / pixels
+    })
+}
+
+/// The sum of the squares of the second differences of three lines of equal length.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn squares(before: &[f32], here: &[f32], after: &[f32]) -> f32 {
+    const LANES: usize = 8;
+
+    let mut sums = [0.0f32; LANES];
+    let (before, before_rest) = before.as_chunks::<LANES>();
+    let (here, here_rest) = here.as_chunks::<LANES>();
+    let (after, after_rest) = after.as_chunks::<LANES>();
+    for ((before, here), after) in before.iter().zip(here).zip(after) {
+        for lane in 0..LANES {
+            let difference = before[lane] - 2.0 * here[lane] + after[lane];
+            sums[lane] += difference * difference;
+        }
+    }
+
+    let rest = before_rest.iter().zip(here_rest).zip(after_rest);
+    let rest: f32 = rest.map(|((before, here), after)| (before - 2.0 * here + after).powi(2)).sum();
+    rest + sums.iter().sum::<f32>()
+}
+
+/// Energies of the tiles that lie [`EDGE`] pixels or more within `columns` and `rows`.
+fn tiles(levels: &[f32], columns: &Range<usize>, rows: &Range<usize>) -> Tiles {
+    let sums = tile_sums(levels);
+    let is_seen =
+        |tile: usize, seen: &Range<usize>| tile * TILE >= seen.start + EDGE && (tile + 1) * TILE + EDGE <= seen.end;
+    let energies = |tile: usize| std::array::from_fn(|band| sums[band][tile] / (TILE * TILE) as f32);
+    let tile = |tile: usize| {
+        let seen = is_seen(tile % ACROSS, columns) && is_seen(tile / ACROSS, rows);
+        seen.then(|| energies(tile))
+    };
+    (0..TILES).map(tile).collect()
+}
+
+/// The sum of the squares of the second differences in each tile, at each lag. The outermost tiles, which have none at
+/// the longest lag at their outer pixels, have 0.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn tile_sums(levels: &[f32]) -> [[f32; TILES]; BANDS] {
+    let rows = levels.as_chunks::<SIDE>().0;
+    let mut out = [[0.0; TILES]; BANDS];
+    for (sums, lag) in out.iter_mut().zip(LAGS) {
+        for row in 1..ACROSS - 1 {
+            let mut columns = [0.0f32; SIDE];
+            for y in row * TILE..(row + 1) * TILE {
+                let (above, here, below) = (&rows[y - lag], &rows[y], &rows[y + lag]);
+                for x in TILE..SIDE - TILE {
+                    let down = above[x] - 2.0 * here[x] + below[x];
+                    let along = here[x - lag] - 2.0 * here[x] + here[x + lag];
+                    columns[x] += down * down + along * along;
+                }
+            }
+            for column in 1..ACROSS - 1 {
+                sums[row * ACROSS + column] = columns[column * TILE..][..TILE].iter().sum();
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use parfocal_devices::simulation::blur::gaussian_blur;
+    use parfocal_devices::simulation::texture::texture;
+    use parfocal_imaging::GrayImage;
+
+    const SCENE: usize = 300;
+
+    /// What is seen of `scene` from `(x, y)` on, with the patch in its middle.
+    fn seen(scene: &GrayImage, (x, y): (usize, usize)) -> Surroundings {
+        let level = |i: usize| scene.data[(y + i / SIDE) * scene.width + x + i % SIDE].round();
+        Surroundings { levels: (0..SIDE * SIDE).map(level).collect(), patch: (48, 48) }
+    }
+
+    /// The inputs from the comparison with the frame so many frames ago.
+    fn compared(input: &[f32; VIEW_INPUT], ago: usize) -> &[f32] {
+        let which = AGO.iter().position(|&frames| frames == ago).unwrap();
+        &input[BY_ITSELF + which * COMPARED..][..COMPARED]
+    }
+
+    #[test]
+    fn energies_are_those_of_a_wave() {
+        // The second difference of A sin(w x) at lag l is -2 A (1 - cos(w l)) sin(w x), and the mean square of a sine
+        // is 1/2. A wave along both axes has the sum of both.
+        let (amplitude, rate) = (40.0, [TAU / 8.0, TAU / 16.0]);
+        let wave = |i: usize| {
+            let place = [i % SIDE, i / SIDE];
+            let sum: f64 = place.iter().zip(rate).map(|(at, rate)| (rate * *at as f64).sin()).sum();
+            (128.0 + amplitude * sum) as f32
+        };
+        let levels: Vec<f32> = (0..SIDE * SIDE).map(wave).collect();
+        let expected = LAGS.map(|lag| {
+            let along = |rate: f64| 0.5 * (2.0 * amplitude * (1.0 - (rate * lag as f64).cos())).powi(2);
+            (along(rate[0]) + along(rate[1])) as f32
+        });
+
+        let alike =
+            |found: &Bands| found.iter().zip(expected).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-3);
+        let tiles = tiles(&levels, &(0..SIDE), &(0..SIDE));
+        assert_eq!(tiles.iter().flatten().count(), (ACROSS - 2) * (ACROSS - 2), "the outermost are not wholly seen");
+        assert!(tiles.iter().flatten().all(alike), "{tiles:?} {expected:?}");
+        assert!(alike(&window(&levels, 16..48, 32..64)));
+    }
+
+    #[test]
+    fn what_moves_unblurred_has_not_changed_however_long_ago() {
+        let scene = texture(3, SCENE);
+        let mut trace = ViewTrace::default();
+        let mut input = [0.0; VIEW_INPUT];
+        for frame in 0..9 {
+            input = trace.see(Some(&seen(&scene, (40 + 3 * frame, 60 - 2 * frame))), 0.5);
+        }
+
+        for ago in AGO {
+            let part = compared(&input, ago);
+            assert!(part[..4 * BANDS].iter().all(|change| change.abs() < 1e-5), "{ago}: {part:?}");
+            assert!(part[4 * BANDS] > 0.5 && part[4 * BANDS + 1] == 0.0, "{ago}: {part:?}");
+            // Tiles that both frames show, of the 36 that one shows.
+            let across = (2..ACROSS - 1).filter(|tile| tile * TILE < SIDE - 3 * ago - EDGE).count();
+            assert!(part[4 * BANDS + 2] <= (across + 1) as f32 * 6.0 / 64.0, "{ago}: {part:?}");
+        }
+    }
+
+    #[test]
+    fn blur_shows_in_the_patch_near_it_and_everywhere_and_most_in_what_is_fine() {
+        let sharp = texture(5, SCENE);
+        let blurred = gaussian_blur(&sharp, 0.8);
+        let mut trace = ViewTrace::default();
+        trace.see(Some(&seen(&sharp, (60, 60))), 0.4);
+        let input = trace.see(Some(&seen(&blurred, (64, 57))), 0.5);
+
+        let part = compared(&input, 1);
+        for bands in part[..3 * BANDS].chunks_exact(BANDS) {
+            // Of the finest detail the scene has hardly more than the noise that is allowed for.
+            assert!(bands.iter().all(|change| *change < -0.1) && bands[1..].is_sorted(), "{part:?}");
+        }
+        assert!((part[4 * BANDS + 1] - 1.0).abs() < 1e-6, "ten times the difference of focal power: {part:?}");
+        assert!(input[4 * BANDS..5 * BANDS].iter().all(|change| *change < 0.0), "the frame's own energies fell");
+    }
+
+    #[test]
+    fn where_half_of_the_view_is_blurred_tiles_differ() {
+        let sharp = texture(6, SCENE);
+        let blurred = gaussian_blur(&sharp, 1.5);
+        let mut half = sharp.clone();
+        for (i, level) in half.data.iter_mut().enumerate().filter(|(i, _)| i % SCENE < 60 + SIDE / 2) {
+            *level = blurred.data[i];
+        }
+
+        let deviation = |now: &GrayImage| {
+            let mut trace = ViewTrace::default();
+            trace.see(Some(&seen(&sharp, (60, 60))), 0.5);
+            compared(&trace.see(Some(&seen(now, (60, 60))), 0.5), 1)[3 * BANDS]
+        };
+        assert!(deviation(&half) > 3.0 * deviation(&blurred), "{} {}", deviation(&half), deviation(&blurred));
+    }
+
+    #[test]
+    fn without_surroundings_nothing_is_told_and_nothing_remembered() {
+        let scene = texture(7, SCENE);
+        let mut trace = ViewTrace::default();
+        trace.see(Some(&seen(&scene, (60, 60))), 0.5);
+        assert!(trace.see(None, 0.5).iter().all(|input| input.to_bits() == 0));
+        let first = ViewTrace::default().see(Some(&seen(&scene, (61, 60))), 0.6);
+        assert_eq!(trace.see(Some(&seen(&scene, (61, 60))), 0.6).map(f32::to_bits), first.map(f32::to_bits));
+    }
+}
