@@ -78,6 +78,11 @@ impl Environment {
         self.scan.observe(self.shown())
     }
 
+    /// The patch of this frame and the wider ones around it; without surroundings.
+    pub fn wide_view(&mut self) -> View {
+        self.scan.wide_view(self.shown())
+    }
+
     /// The view of this frame, with surroundings.
     pub fn view(&mut self) -> View {
         self.scan.view(self.shown())

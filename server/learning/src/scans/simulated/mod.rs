@@ -88,7 +88,12 @@ impl Scan {
         patch
     }
 
-    /// The patch of [`Scan::observe`], the wider ones around it, and its surroundings.
+    /// The patch of [`Scan::observe`], and the wider ones around it; without surroundings.
+    pub fn wide_view(&mut self, focal_power: FocalPower) -> View {
+        View { surroundings: None, ..self.view_of_light(focal_power) }
+    }
+
+    /// As [`Scan::wide_view`], with surroundings. They cost as much again, mostly for their noise.
     pub fn view(&mut self, focal_power: FocalPower) -> View {
         let mut view = self.view_of_light(focal_power);
         if let Some(light) = view.surroundings.take() {
@@ -97,7 +102,7 @@ impl Scan {
         view
     }
 
-    /// [`Scan::view`] with surroundings as the light has them: without exposure, noise and rounding.
+    /// [`Scan::view`] with the surroundings as the light has them: without exposure, noise and rounding.
     fn view_of_light(&mut self, focal_power: FocalPower) -> View {
         let patch = self.observe(focal_power);
         let around = match &mut self.look {

@@ -137,7 +137,7 @@ fn show(slot: &mut Slot, shows: Shows, bytes: &mut [u8]) {
     match shows {
         Shows::Patch => fill(bytes, &slot.environment.observe()),
         Shows::View => {
-            let view = slot.environment.view();
+            let view = slot.environment.wide_view();
             let wider = view.wider.iter().map(Option::as_ref);
             let patches = std::iter::once(Some(&view.patch)).chain(wider);
             for (bytes, patch) in bytes.chunks_exact_mut(PATCH_BYTES).zip(patches) {
