@@ -68,6 +68,9 @@ impl Drop for Port {
         // would outlast this process if another one has the port open too.
         let _ = tcflush(&self.0, QueueSelector::OFlush);
         let _ = ioctl_tiocnxcl(&self.0);
+        // So would the lock, for a moment, in a program that this one is just starting: it has the port open until its
+        // own code replaces ours.
+        let _ = self.0.unlock();
     }
 }
 
@@ -160,7 +163,24 @@ fn group_of(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use parfocal_base::clock::SystemClock;
+
     use super::*;
+    use crate::lens::emulator::{Emulator, Model};
+
+    #[test]
+    fn a_port_is_free_at_once_though_a_program_that_is_just_starting_still_has_it() {
+        let emulator = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
+        let port = Port::open(emulator.path()).unwrap();
+        assert!(Port::open(emulator.path()).unwrap_err().to_string().contains("another program uses it"));
+        // Between fork and exec a child shares the open file, as this copy does.
+        let shared = port.file().try_clone().unwrap();
+        drop(port);
+        Port::open(emulator.path()).unwrap();
+        drop(shared);
+    }
 
     #[test]
     fn finds_the_one_driver_by_its_usb_name() {
