@@ -83,7 +83,7 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
 
     let exported = measured(async || export_study(&recorder, STUDY, unblinded, &out, Arc::new(told)).await).await;
     row(what, "60 s", &exported);
-    assert_eq!(exported.value.as_ref().expect("the study can be exported").sessions, made.sessions.len());
+    assert_eq!(exported.value.as_ref().expect("the study can be exported").summary.sessions, made.sessions.len());
 
     let sessions = Duration::from_nanos(exported_after.load(Ordering::Relaxed));
     let joining = exported.took.saturating_sub(sessions);

@@ -333,6 +333,11 @@ struct Scans {
 }
 
 fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure> {
+    let are_drawn = ["simulated", "relief"].contains(&arguments.scans.as_str());
+    if are_drawn && arguments.between.is_some() {
+        return Err("--between is for recorded scans, which have pictures at some focal powers only".into());
+    }
+
     if arguments.scans == "simulated" {
         return simulated(arguments, part);
     }
@@ -342,7 +347,6 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     }
 
     if arguments.scans == "relief" {
-        refuse_between(arguments)?;
         let seed = arguments.seed();
         let count = arguments.count.unwrap_or(COUNT);
         let set = Benchmark { seed, ..Benchmark::relief(count)? };
@@ -390,13 +394,6 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
 }
 
-fn refuse_between(arguments: &Arguments) -> Result<(), Failure> {
-    match arguments.between {
-        Some(_) => Err("--between is for recorded scans, which have pictures at some focal powers only".into()),
-        None => Ok(()),
-    }
-}
-
 fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
     let bar = bar(POSES, 0);
     let trajectory = Trajectory::new(seed, POSES, HASTE);
@@ -406,7 +403,6 @@ fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
 }
 
 fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
-    refuse_between(arguments)?;
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);

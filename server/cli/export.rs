@@ -80,7 +80,7 @@ async fn write_study(access_log: &AccessLog, study: &str, arguments: &Arguments)
 
     let exported = export_study(access_log, study, arguments.unblinded, &arguments.out, Arc::new(report)).await;
     steps.end();
-    tell(&exported?, arguments.json)
+    tell(&exported?.summary, arguments.json)
 }
 
 /// Writes the package of `sources`, shows the progress, and prints what the package holds.

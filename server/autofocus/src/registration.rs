@@ -17,7 +17,7 @@ use parfocal_imaging::{PATCH_SIDE, Patch};
 pub const CHANGES: usize = LAGS.len() + 2;
 
 /// Lags of the second differences, in pixels. Each passes frequencies around 1 / (2 lag) cycles per pixel.
-const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
+pub(super) const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
 /// Largest displacement considered along each axis, in pixels. Beyond it the overlap is too small.
 const FARTHEST: isize = 15;
 /// Highest frequency used to find the displacement, in cycles per patch. Higher ones do not survive blur.
@@ -26,7 +26,7 @@ const FINEST: usize = 10;
 const FAINT: f32 = 300.0;
 /// Energy per pixel that rounding to whole gray levels adds to a second difference, (1 + 4 + 1) / 12, plus as much
 /// again for noise.
-const FLOOR: f32 = 1.0;
+pub(super) const FLOOR: f32 = 1.0;
 
 type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];
 
@@ -40,7 +40,7 @@ pub fn changes(before: (&Patch, &PatchTransform), now: (&Patch, &PatchTransform)
     let rows = overlap(dy);
     let columns = overlap(dx);
 
-    let mut energies = [[FLOOR; 2]; LAGS.len()];
+    let mut energies = [[0.0; 2]; LAGS.len()];
     for (square, which) in [(&moved, 0), (&still, 1)] {
         let down = second_differences(square, rows.clone(), columns.clone());
         let along = second_differences(&transposed(square), columns.clone(), rows.clone());
@@ -51,12 +51,17 @@ pub fn changes(before: (&Patch, &PatchTransform), now: (&Patch, &PatchTransform)
 
     let mut out = [0.0; CHANGES];
     for (ratio, [before, now]) in out.iter_mut().zip(energies) {
-        *ratio = (3.0 * (now / before).ln()).clamp(-4.0, 4.0);
+        *ratio = log_ratio(now, before);
     }
 
     out[LAGS.len() + 1] = (rows.len() * columns.len()) as f32 / (PATCH_SIDE * PATCH_SIDE) as f32;
     out[LAGS.len()] = correlation(&moved, &still, rows, columns);
     out
+}
+
+/// The log ratio of the energies of second differences, positive if it is sharper `now`; of the order of 1.
+pub(super) fn log_ratio(now: f32, before: f32) -> f32 {
+    (3.0 * ((now + FLOOR) / (before + FLOOR)).ln()).clamp(-4.0, 4.0)
 }
 
 /// The displacement `(x, y)` in whole pixels: `now` at a place shows what `before` shows at that place plus the

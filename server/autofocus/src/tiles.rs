@@ -10,6 +10,7 @@ use std::sync::Arc;
 use multiversion::multiversion;
 
 use crate::bisection::motion::ViewTransform;
+use crate::registration::{FLOOR, LAGS, log_ratio};
 use parfocal_imaging::{PATCH_SIDE, Surroundings};
 
 /// Pixels along each side of the view.
@@ -19,15 +20,11 @@ const TILE: usize = 16;
 /// Tiles along each side of the view.
 const ACROSS: usize = SIDE / TILE;
 const TILES: usize = ACROSS * ACROSS;
-/// Lags of the second differences, in pixels. Each passes frequencies around 1 / (2 lag) cycles per pixel.
-const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
 const BANDS: usize = LAGS.len();
 /// So many pixels at the ends of a picture have no second difference at the longest lag.
 const EDGE: usize = LAGS[BANDS - 1];
 /// How many frames ago the frames are that a new one is compared with.
 const AGO: [usize; 4] = [1, 2, 4, 8];
-/// Energy per pixel that rounding and noise add to a second difference.
-const FLOOR: f32 = 1.0;
 /// A tile is near the patch if its centre is at most so many pixels from the patch's centre along both axes.
 const NEAR: usize = 40;
 /// Least share of the tiles that both frames must show.
@@ -182,9 +179,9 @@ fn logarithm(energy: f32) -> f32 {
     0.5 * ((energy + FLOOR).ln() - 3.0)
 }
 
-/// The log ratio of energies, positive if it is sharper `now`.
+/// How each band changed since `then`.
 fn change(now: &Bands, then: &Bands) -> Bands {
-    std::array::from_fn(|band| (3.0 * ((now[band] + FLOOR) / (then[band] + FLOOR)).ln()).clamp(-4.0, 4.0))
+    std::array::from_fn(|band| log_ratio(now[band], then[band]))
 }
 
 /// Mean and standard deviation of each band; zeros of nothing.

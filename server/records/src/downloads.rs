@@ -97,7 +97,8 @@ where
             let stage = match making.await {
                 Ok(made) => Stage::Ready(made),
                 Err(reason) => {
-                    tracing::warn!(folder = %downloads.folder.display(), name, "nothing to download: {reason}");
+                    let folder = downloads.folder.display();
+                    tracing::warn!(%folder, name, "a file to download could not be made: {reason}");
                     Stage::Failed(reason)
                 }
             };

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
-use super::making::{Progress, export_study, sessions_of};
+use super::making::{ExportedStudy, Progress, export_study};
 use parfocal_base::ids::SessionId;
 use parfocal_records::downloads::{Downloads, Stage};
 use parfocal_records::store::{AccessLog, Reader, StoreError};
@@ -146,11 +146,11 @@ impl Job {
         let room = tempfile::Builder::new().prefix("export-").tempdir_in(&folder).map_err(unwritable)?;
         let package = room.path().join(&study);
         let taken_back = access_log.reader().taken_back(&study).await?;
-        let (sessions, _) = sessions_of(access_log.reader(), &study, unblinded).await?;
 
         let name = study.clone();
         let report = move |progress| downloads.report(&name, progress);
-        export_study(&access_log, &study, unblinded, &package, Arc::new(report)).await?;
+        let exported = export_study(&access_log, &study, unblinded, &package, Arc::new(report)).await?;
+        let ExportedStudy { sessions, .. } = exported;
 
         Ok(FinishedExport {
             unblinded,

@@ -44,6 +44,14 @@ pub struct Progress {
 /// A callback that is given the progress of an export.
 pub type ProgressCallback = Arc<dyn Fn(Progress) + Send + Sync>;
 
+/// A package, and the sessions in it.
+pub struct ExportedStudy {
+    /// What the package holds.
+    pub summary: Summary,
+    /// The sessions that were exported for it.
+    pub sessions: Vec<SessionId>,
+}
+
 /// Exports the study `study` as a package into the folder `out`. The folder must be new or empty, and appears complete
 /// or not at all. Each session's export is recorded in the database as an export of its own.
 ///
@@ -56,8 +64,9 @@ pub async fn export_study(
     unblinded: bool,
     out: &Path,
     progress: ProgressCallback,
-) -> Result<Summary, StudyExportError> {
+) -> Result<ExportedStudy, StudyExportError> {
     let (sessions, left_out) = sessions_of(access_log.reader(), study, unblinded).await?;
+    let exported = sessions.clone();
     let making =
         Making { access_log: access_log.clone(), sessions, left_out, unblinded, out: out.to_owned(), progress };
 
@@ -72,7 +81,8 @@ pub async fn export_study(
     };
 
     thread.spawn(work).map_err(|error| StudyExportError::Unwritable { path: out.to_owned(), error })?;
-    made.await.map_err(|_| StudyExportError::Broken)?
+    let summary = made.await.map_err(|_| StudyExportError::Broken)??;
+    Ok(ExportedStudy { summary, sessions: exported })
 }
 
 /// Checks that `study` can be exported, before anything is recorded or started.
@@ -85,7 +95,7 @@ pub async fn check(reader: &Reader, study: &str, unblinded: bool) -> Result<(), 
 }
 
 /// The sessions of `study` to export, and those that are left out because they are withdrawn.
-pub(super) async fn sessions_of(
+async fn sessions_of(
     reader: &Reader,
     study: &str,
     unblinded: bool,
