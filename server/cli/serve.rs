@@ -33,8 +33,8 @@ use parfocal_dashboard::health::device_log;
 use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, ServerAddress, TabletTrials};
 use parfocal_dashboard::openigtlink;
 use parfocal_dashboard::tls::{Certificates, keep_current};
-use parfocal_imaging::{Calibration, Developer, Size};
-use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Settings};
+use parfocal_imaging::{Calibration, Developer, Reconstructor, Size};
+use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Eye, Settings};
 use parfocal_pipeline::live;
 use parfocal_recording as recording;
 use parfocal_records::accounts::{Accounts, Cost};
@@ -125,9 +125,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     log_devices(&store, &clock, &control.status);
 
-    // A colour picture has only one size.
-    let largest = if mosaics.is_some() { Size::Full } else { Size::Cell };
-    let (live, imaging) = live::start(control.clone(), &developer, largest, &clock)?;
+    let onlooking = (Eye::new(Reconstructor::new(&calibration)), registry.clone());
+    let (live, imaging) = live::start(control.clone(), &developer, largest_size(mosaics), onlooking, &clock)?;
 
     let conductor = Conductor::open(Parts {
         store: store.clone(),
@@ -290,6 +289,12 @@ fn bound_real_time() -> std::io::Result<()> {
     });
 
     Ok(())
+}
+
+/// The largest size of pictures of a camera with mosaics of `mosaics` samples, if it delivers any: a colour picture has
+/// only one size.
+const fn largest_size(mosaics: Option<(usize, usize)>) -> Size {
+    if mosaics.is_some() { Size::Full } else { Size::Cell }
 }
 
 async fn open_store(

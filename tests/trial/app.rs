@@ -7,7 +7,8 @@ use parfocal_base::clock::Clock;
 use parfocal_dashboard::health::HealthWatch;
 use parfocal_dashboard::http::keys::Keys;
 use parfocal_dashboard::http::{App, Equipment, Metrics, OpenTablets, ServerAddress, TabletTrials};
-use parfocal_imaging::{Calibration, Developer, Size};
+use parfocal_imaging::{Calibration, Developer, Reconstructor, Size};
+use parfocal_pipeline::control::Eye;
 use parfocal_pipeline::live;
 use parfocal_records::store::Backups;
 use parfocal_results::study_export::StudyExports;
@@ -23,7 +24,9 @@ pub fn app(trial: &Trial, folder: &Path, address: ServerAddress, shutdown: watch
     let clock: Arc<dyn Clock> = trial.clock.clone();
     let control = trial.control.clone();
     let calibration = Arc::new(Calibration::default());
-    let (live, _) = live::start(control.clone(), &Developer::new(&calibration), Size::Full, &clock).unwrap();
+    let registry = parfocal_autofocus::Registry::standard();
+    let onlooking = (Eye::new(Reconstructor::default()), registry.clone());
+    let (live, _) = live::start(control.clone(), &Developer::new(&calibration), Size::Full, onlooking, &clock).unwrap();
     let conductor = trial.conductor.clone();
     let recordings = folder.join("recordings");
 
@@ -57,7 +60,7 @@ pub fn app(trial: &Trial, folder: &Path, address: ServerAddress, shutdown: watch
         conductor,
         reports: trial.reports.clone(),
         library: trial.library.clone(),
-        registry: parfocal_autofocus::Registry::standard(),
+        registry,
         keys: Keys::load_or_create(folder).unwrap(),
         address,
         equipment: Equipment::new(None, calibration, None),

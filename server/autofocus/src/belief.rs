@@ -1,7 +1,7 @@
 //! The policy `parfocal`. It tracks a belief about the optimum, corrects it by the sharpness seen lately, and goes to
 //! where the picture is most likely in focus. If that is in doubt, it moves to find out more.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use tch::{Device, Kind, Tensor, nn};
 
@@ -12,8 +12,7 @@ use super::spectrum::{FEATURES, PatchTransform, SHARPNESS, features, spectrum};
 use super::tiles::ViewTrace;
 use super::weights::{self, WeightsError};
 use super::{Decision, FieldOfView, Observation, Policy};
-use parfocal_base::BlurRate;
-use parfocal_base::IN_FOCUS;
+use parfocal_base::{BlurRate, FocalPower, IN_FOCUS};
 use parfocal_imaging::{Patch, View, WIDER};
 
 /// Largest change of focal power per frame. The lens could jump, but the surgeon should not see it.
@@ -356,6 +355,12 @@ impl Policy for BeliefTracker {
         let target = self.trace.aim(seen.focal_power.get(), &belief);
         self.trace.ask(target);
         Decision { target, metric: None, belief: Some(belief.into()) }
+    }
+
+    fn look_on(&mut self, seen: &Observation<'_>, asked: FocalPower) -> Option<Arc<[f32]>> {
+        let belief = self.believe(seen);
+        self.trace.ask(asked.get());
+        Some(belief.into())
     }
 
     fn learn_of(&mut self, blur: BlurRate) {

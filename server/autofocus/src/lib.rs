@@ -40,6 +40,12 @@ pub trait Policy: Send {
     /// Decides for one frame. The decision is not trusted: the control loop checks it.
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
 
+    /// Takes in one frame while something else moves the lens, which was then asked for `asked`. Returns the belief about
+    /// the optimum (see [`Decision::belief`]); `None` if the policy has none. Call it in place of [`Policy::step`].
+    fn look_on(&mut self, _seen: &Observation<'_>, _asked: FocalPower) -> Option<Arc<[f32]>> {
+        None
+    }
+
     /// The patch has jumped to another place: what this policy remembers of the old one is no longer comparable. From
     /// the next step on it decides as a new instance would that begins at that focal power. What it knows of the optics
     /// stays. A policy without a memory of frames has nothing to do.

@@ -1,11 +1,11 @@
-//! What the operator's page says of the focus outside sessions: whether it is held, and whether the patch follows the
-//! tissue.
+//! What the operator's page says of the focus outside sessions: whether it is held, where else the picture is in focus,
+//! and whether the patch follows the tissue.
 
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::accessible;
 use super::driver::{Browser, Driver};
@@ -70,13 +70,60 @@ async fn nobody_sees_it_in_a_session() {
     let theatre = Theatre::seeing(&driver).await;
     theatre.operator.sees("#lock", WORDS[0]).await;
     theatre.operator.sees("#follow-choice", "Follow the tissue").await;
+    theatre.operator.click("#depths").await;
+    theatre.operator.sees("#depths-key", "Disc: in focus.").await;
     theatre.begin("P-04", "pointing").await;
     theatre.tap_notice(1).await;
     theatre.operator.sees_no("#lock").await;
     theatre.operator.sees_no("#follow-choice").await;
+    theatre.operator.sees_no("#depths-choice").await;
+    theatre.operator.sees_no("#depths-key").await;
     assert_eq!(theatre.operator.text("#lock-words").await, "");
     assert_eq!(theatre.surgeon.count(".lock, #lock, #follow-tissue").await, 0);
     shoot(&theatre.operator, "lock-none-in-a-session").await;
+}
+
+/// The green of a place in focus.
+const IN_FOCUS: [u8; 3] = [125, 255, 155];
+/// The pink of a place that would be in focus at a lower focal power.
+const LOWER: [u8; 3] = [255, 157, 225];
+
+/// How many pixels over the picture have the colour `colour`.
+async fn coloured(operator: &Browser, colour: [u8; 3]) -> u64 {
+    let script = "const canvas = document.querySelector('.viewer-overlay');
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        let count = 0;
+        for (let at = 0; at < data.length; at += 4) {
+            if ([...arguments[0], 255].every((value, part) => data[at + part] === value)) count += 1;
+        }
+        return count;";
+    operator.run(script, &[json!(colour)]).await.as_u64().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_depth_map_marks_the_places_that_are_in_focus() {
+    let driver = Driver::start();
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", BRAIN, "--fps", "20"]);
+    let operator = operator(&driver, &server).await;
+    assert_eq!(coloured(&operator, IN_FOCUS).await, 0);
+
+    operator.click("#depths").await;
+    operator.sees("#depths-key", "Disc: in focus.").await;
+    // It learns while the lens moves.
+    operator.select("#policy", "parfocal").await;
+    until("places in focus", || async { coloured(&operator, IN_FOCUS).await > 100 }).await;
+    operator.run("scrollTo(0, 0)", &[]).await;
+    shoot(&operator, "depth-map").await;
+
+    let far = server.post_as("operator", "/api/operator/focus").json(&json!({"focal_power": 0.9}));
+    assert!(far.send().await.unwrap().status().is_success());
+    until("places that are not", || async { coloured(&operator, LOWER).await > 100 }).await;
+    operator.run("scrollTo(0, 0)", &[]).await;
+    shoot(&operator, "depth-map-away").await;
+
+    operator.click("#depths").await;
+    until("no places", || async { coloured(&operator, LOWER).await == 0 }).await;
+    operator.sees_no("#depths-key").await;
 }
 
 /// The middle of what is drawn over the picture, in pixels of the overlay; none if nothing is.
@@ -111,7 +158,7 @@ async fn a_place_follows_the_tissue_while_the_operator_wants_it() {
     let before = marked(&operator).await.expect("the patch at the centre");
     operator.focus("#view").await;
     for _ in 0..2 {
-        let right = serde_json::json!({ "type": "keyDown", "key": "ArrowRight", "code": "ArrowRight", "modifiers": 8 });
+        let right = json!({ "type": "keyDown", "key": "ArrowRight", "code": "ArrowRight", "modifiers": 8 });
         operator.tools("Input.dispatchKeyEvent", right).await;
     }
     until("the place", || async { marked(&operator).await.is_some_and(|at| at.0 > before.0 + 10.0) }).await;

@@ -13,6 +13,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async, tungstenite};
 use tungstenite::Message;
 
+use super::recordings::begin;
 use crate::support::{BRAIN, Server};
 
 /// What does not come in this time never comes.
@@ -114,6 +115,17 @@ impl Page {
         };
         let in_time = tokio::time::timeout(PATIENCE, told).await.is_ok();
         assert!(in_time, "waited {PATIENCE:?} for a message; the last one: {:?}", self.told().last());
+    }
+
+    /// Waits until the server closes the connection, and returns its code.
+    async fn refused(&mut self) -> CloseCode {
+        loop {
+            match self.message().await {
+                Message::Close(Some(frame)) => return frame.code,
+                Message::Close(None) => panic!("no reason"),
+                _ => {}
+            }
+        }
     }
 
     /// Waits for a frame with a belief, and returns the belief.
@@ -282,6 +294,47 @@ async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
 }
 
 #[tokio::test]
+async fn depth_maps_go_to_an_operator_who_asks_outside_sessions_and_never_to_a_surgeon() {
+    let server = Server::seeing();
+    let mut operator = Page::open(&server, "operator").await;
+    operator.watch_until(|header| header["depths"].is_null()).await;
+    operator.say(json!({"type": "depths", "wanted": true})).await;
+    // It learns while the lens moves.
+    post(&server, "operator", "/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
+    let is_sure = |header: &Value| {
+        let places = header["depths"]["places"].as_array();
+        places.is_some_and(|places| places.iter().filter(|place| place["side"] == "in-focus").count() >= 3)
+    };
+    let frame = operator.watch_until(is_sure).await;
+    let area = &frame.header["area"];
+    let middle = |key: &str| area[key].as_f64().unwrap();
+    for place in frame.header["depths"]["places"].as_array().unwrap() {
+        let at = |key: &str| place[key].as_f64().unwrap() - middle(key);
+        assert!(at("x").hypot(at("y")) < middle("radius"), "{place} in {area}");
+        assert!(place["optimum"].as_f64().is_none_or(|at| (0.0..=1.0).contains(&at)), "{place}");
+    }
+
+    operator.say(json!({"type": "depths", "wanted": false})).await;
+    operator.watch_until(|header| header["depths"].is_null()).await;
+
+    let mut surgeon = Page::open(&server, "surgeon").await;
+    surgeon.say(json!({"type": "depths", "wanted": true})).await;
+    assert_eq!(surgeon.refused().await, CloseCode::Policy);
+    assert!(!format!("{:?}", surgeon.heard).contains("depths"));
+
+    operator.say(json!({"type": "depths", "wanted": true})).await;
+    operator.watch_until(is_sure).await;
+    let session = begin(&server, "practice").await;
+    operator.until(|told| told["view"]["session"] == session).await;
+    // The next frames were made after the session had begun, and so are all others.
+    for _ in 0..5 {
+        let frame = operator.frame().await;
+        assert_eq!(frame.header["depths"], Value::Null);
+        operator.drawn(&frame).await;
+    }
+}
+
+#[tokio::test]
 async fn a_role_that_is_not_held_is_not_served() {
     let server = Server::with(&["--bind", "0.0.0.0:0", "--insecure", "--camera", BRAIN]);
     let error =
@@ -293,16 +346,8 @@ async fn a_role_that_is_not_held_is_not_served() {
 async fn nonsense_closes_the_connection_with_a_reason() {
     let server = Server::seeing();
     let mut page = Page::open(&server, "operator").await;
-    page.socket.send(Message::text("{\"type\":\"drawn\"}")).await.unwrap();
-    let code = loop {
-        match page.message().await {
-            Message::Close(Some(frame)) => break frame.code,
-            Message::Close(None) => panic!("no reason"),
-            _ => {}
-        }
-    };
-
-    assert_eq!(code, CloseCode::Policy);
+    page.say(json!({"type": "drawn"})).await;
+    assert_eq!(page.refused().await, CloseCode::Policy);
 }
 
 #[tokio::test]

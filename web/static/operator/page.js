@@ -12,6 +12,7 @@ import { Viewer } from "../shared/viewer.js";
 import { drawCamera } from "./camera_card.js";
 import { followChecks } from "./checks_card.js";
 import { followChoices } from "./choices.js";
+import { drawDepths } from "./depths.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
 import { focusSign } from "./focus_sign.js";
@@ -52,6 +53,7 @@ const sign = focusSign(followTissue);
 /** What came with the latest picture. @type {Stream.Header | null} */
 let latest = null;
 const traces = new Traces(byId("traces"));
+viewer.addOverlay("depths", drawDepths);
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 const sessionCard = new SessionCard(followAnswer);
 const choices = followChoices(redrawFocus, followAnswer);
@@ -72,9 +74,17 @@ function followSession(next) {
   followLink(session);
   focus.follow(session);
   spectra.follow(session);
+  offerDepths();
   redrawFocus();
   drawTheWarnings();
   drawNow();
+}
+
+/** Offers the depth map, which nobody sees while a surgeon is at work. */
+function offerDepths() {
+  const offered = !isAtWork();
+  byId("depths-choice").hidden = !offered;
+  byId("depths-key").hidden = !offered || !byId("depths", HTMLInputElement).checked;
 }
 
 /** Whether a surgeon is at work. */
@@ -190,7 +200,11 @@ viewer.live.listen({
 
 followOverlayBoxes((name, on) => {
   if (name === "traces" || name === "belief") traces.show(name, on);
-  else viewer.overlay(/** @type {import("../shared/viewer.js").Overlay} */ (name), on);
+  else viewer.overlay(name, on);
+  if (name === "depths") {
+    viewer.live.wantDepths(on);
+    offerDepths();
+  }
 });
 
 offerLink();

@@ -48,6 +48,8 @@ export class Live {
   #reconnection = new Reconnection();
   /** Screen pixels that the picture covers from left to right. @type {number | null} */
   #screen = null;
+  /** Whether depth maps are to come with the pictures. */
+  #wantsDepths = false;
   /** Whether the page's link is no longer valid. */
   #over = false;
   /** Whether a timer runs that will send `#screen` to the server. */
@@ -89,6 +91,16 @@ export class Live {
     }, SCREEN_MS);
   }
 
+  /**
+   * Asks for depth maps with the pictures, or for none any more. Not for a surgeon's page.
+   *
+   * @param {boolean} wanted
+   */
+  wantDepths(wanted) {
+    this.#wantsDepths = wanted;
+    this.#sendDepths();
+  }
+
   #isSilent() {
     return isAlive(this.#socket) && this.#reconnection.isSilent(performance.now());
   }
@@ -121,6 +133,7 @@ export class Live {
       this.#reconnection.opened();
       this.#tellVisibility();
       this.#sendScreen();
+      if (this.#wantsDepths) this.#sendDepths();
       this.#tellConnection(true);
     };
     const take = (/** @type {any} */ data, /** @type {number} */ at) => {
@@ -186,6 +199,10 @@ export class Live {
 
   #sendScreen() {
     if (this.#socket && this.#screen !== null) send(this.#socket, { type: "screen", width: this.#screen });
+  }
+
+  #sendDepths() {
+    if (this.#socket) send(this.#socket, { type: "depths", wanted: this.#wantsDepths });
   }
 
   /** @param {boolean} open */

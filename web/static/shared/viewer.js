@@ -20,6 +20,12 @@ const LOOK_MS = 250;
 const TOOL_STEP = 8;
 
 /**
+ * Draws a page's own overlay. `pixels` is screen pixels per mosaic cell, `line` a line's width in screen pixels.
+ *
+ * @typedef {(context: CanvasRenderingContext2D, header: Stream.Header, pixels: number, line: number) => void} Draw
+ */
+
+/**
  * What can take the taps and keys that point, in place of pointing at what is to be in focus, and draws on the picture.
  * Places are in mosaic cells.
  *
@@ -53,6 +59,8 @@ export class Viewer {
   /** @type {Set<string>} */
   #shown = new Set();
   #peaking = new Peaking();
+  /** The page's own overlays, by name. @type {Map<string, Draw>} */
+  #own = new Map();
   #isOverlayClear = true;
   /** @type {{ header: Stream.Header, receivedAt: number } | null} */
   #last = null;
@@ -131,9 +139,19 @@ export class Viewer {
   }
 
   /**
+   * Adds an overlay of the page's own, drawn below the patch.
+   *
+   * @param {string} name
+   * @param {Draw} draw
+   */
+  addOverlay(name, draw) {
+    this.#own.set(name, draw);
+  }
+
+  /**
    * Switches an overlay on or off.
    *
-   * @param {Overlay} name
+   * @param {Overlay | string} name
    * @param {boolean} on
    */
   overlay(name, on) {
@@ -273,6 +291,9 @@ export class Viewer {
       this.#peaking.draw(context, cells.width * pixels, cells.height * pixels);
     }
     if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, pixels, line);
+    for (const [name, draw] of this.#own) {
+      if (this.#shown.has(name)) draw(context, header, pixels, line);
+    }
     if (corners) drawPatch(context, header.patch, pixels, line);
     if (ring) drawRing(context, ring, header.patch, pixels, line);
     marks?.draw(context, pixels, line);

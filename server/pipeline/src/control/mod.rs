@@ -15,6 +15,7 @@ mod tap;
 mod window;
 
 pub use eye::Eye;
+pub(crate) use eye::cells;
 pub use lock::{FocusLock, LockWatch};
 pub use pilot::HoldReason;
 pub use runner::keep_policies_quiet;

@@ -3,6 +3,7 @@
 
 mod area;
 mod counts;
+mod depth_map;
 mod follow;
 mod frame_encoder;
 mod larger_size;
@@ -13,6 +14,7 @@ mod thread;
 mod viewer;
 
 pub use counts::Counts;
+pub use depth_map::{DepthMap, DepthMaps, PlaceDepth, Side};
 pub use follow::Follower;
 pub use picture::{EncodedFrame, Insight, Picture};
 pub use thread::start;
@@ -39,6 +41,7 @@ pub struct LiveHandle {
     leaders: watch::Sender<Leaders>,
     /// The loop's frames, for those who make pictures of their own.
     taken: watch::Sender<Option<Arc<ControlledFrame>>>,
+    depth_maps: watch::Sender<Option<Arc<DepthMap>>>,
 }
 
 impl LiveHandle {
@@ -64,6 +67,12 @@ impl LiveHandle {
     #[must_use]
     pub fn frames(&self) -> watch::Receiver<Option<Arc<ControlledFrame>>> {
         self.taken.subscribe()
+    }
+
+    /// The latest depth map. Maps are made while somebody holds such a receiver, outside of a session's settings.
+    #[must_use]
+    pub fn depth_maps(&self) -> DepthMaps {
+        self.depth_maps.subscribe()
     }
 
     /// The largest size of the camera's pictures.

@@ -9,11 +9,13 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::area::AreaWatch;
+use super::depth_map::Surveyor;
 use super::frame_encoder::FrameEncoder;
 use super::larger_size::LargerSize;
 use super::publisher::Publisher;
 use super::{Counts, LiveHandle};
-use crate::control::{Command, ControlHandle, ControlledFrame};
+use crate::control::{Command, ControlHandle, ControlledFrame, Eye};
+use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
 use parfocal_imaging::{Developer, Size, content_area};
 
@@ -23,7 +25,8 @@ const DETECT_EVERY: u64 = 10;
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Starts the thread, and one for each larger size up to `largest`; they end when the loop closes its slot.
+/// Starts the thread, one for each larger size up to `largest`, and one for depth maps, of what `eye` sees and trackers
+/// of `registry` believe; they end when the loop closes its slot.
 ///
 /// # Errors
 /// If the system cannot create a thread or an encoder.
@@ -31,6 +34,7 @@ pub fn start(
     control: ControlHandle,
     developer: &Developer,
     largest: Size,
+    (eye, registry): (Eye, Registry),
     clock: &Arc<dyn Clock>,
 ) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
     let counts = Arc::new(Counts::default());
@@ -50,11 +54,14 @@ pub fn start(
 
     let frame_encoder = FrameEncoder::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
     let taken = watch::Sender::default();
+    let depth_maps = watch::Sender::default();
+    let surveyor = Surveyor::start(eye, registry, depth_maps.clone())?;
     let handle = LiveHandle {
         frames: frames.into(),
         counts: Arc::clone(&counts),
         leaders: watch::Sender::default(),
         taken: taken.clone(),
+        depth_maps,
     };
     let worker = Worker {
         control,
@@ -63,6 +70,7 @@ pub fn start(
         clock: Arc::clone(clock),
         frame_encoder,
         larger,
+        surveyor,
         taken,
         areas: AreaWatch::default(),
         looked: None,
@@ -79,6 +87,7 @@ struct Worker {
     clock: Arc<dyn Clock>,
     frame_encoder: FrameEncoder,
     larger: Vec<LargerSize>,
+    surveyor: Surveyor,
     /// Frames for those who make pictures of their own.
     taken: watch::Sender<Option<Arc<ControlledFrame>>>,
     areas: AreaWatch,
@@ -125,6 +134,7 @@ impl Worker {
         for larger in &self.larger {
             larger.offer(frame);
         }
+        self.surveyor.offer(frame);
         if self.taken.receiver_count() > 0 {
             self.taken.send_replace(Some(Arc::new(frame.clone())));
         } else if self.taken.borrow().is_some() {

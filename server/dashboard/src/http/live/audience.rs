@@ -7,7 +7,18 @@ use tokio::sync::watch;
 
 use crate::http::App;
 use parfocal_pipeline::control::ControlStatus;
-use parfocal_pipeline::live::EncodedFrame;
+use parfocal_pipeline::live::{DepthMap, DepthMaps, EncodedFrame};
+
+/// A picture's way to a page.
+#[derive(Debug, Clone, Copy)]
+pub struct Journey {
+    /// How old it is when it leaves, milliseconds.
+    pub age_ms: f64,
+    /// How long it will take, milliseconds.
+    pub travel_ms: f64,
+    /// Whether the link is too slow for the size that the screen can show.
+    pub reduced: bool,
+}
 
 /// Decides what may be sent to an audience: each implementation has its own types.
 pub trait Audience: Send + Sync + 'static {
@@ -21,9 +32,10 @@ pub trait Audience: Send + Sync + 'static {
     /// Whether a recording of the view keeps the size of pictures that this page gets.
     const LEADS: bool;
 
-    /// What is sent with `frame`, which is `age_ms` milliseconds old. It will arrive after about `travel_ms`,
-    /// and is `reduced` if the link is too slow for the size that the screen can show.
-    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> Self::Header;
+    /// The depth maps, if this audience may ever see them.
+    fn depth_maps(app: &App) -> Option<DepthMaps>;
+    /// What is sent with `frame`, how it travels, and the depth map of that time, if the page has asked for it.
+    fn header(frame: &EncodedFrame, journey: Journey, depths: Option<Arc<DepthMap>>, app: &App) -> Self::Header;
     /// Source of the session's changes.
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
     /// The state of the devices.

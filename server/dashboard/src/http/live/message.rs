@@ -25,6 +25,8 @@ pub(super) enum PageMessage {
     /// The whole picture, including the parts outside the view, covers this many pixels of the screen from left to
     /// right.
     Screen { width: u32 },
+    /// Whether depth maps are to come with the pictures. Not for a surgeon's page.
+    Depths { wanted: bool },
 }
 
 const fn yes() -> bool {

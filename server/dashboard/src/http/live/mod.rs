@@ -43,12 +43,12 @@ use super::people::SignedIn;
 use super::roles::Roles;
 use super::shutdown::ended;
 use admission::Admission;
-use audience::Audience;
+use audience::{Audience, Journey};
 use heartbeat::Heartbeat;
 use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis, whole_tens};
 use operator::ForOperator;
 use parfocal_pipeline::control::ControlStatus;
-use parfocal_pipeline::live::EncodedFrame;
+use parfocal_pipeline::live::{DepthMap, DepthMaps, EncodedFrame};
 use parfocal_records::accounts::Token;
 use parfocal_trial::role::Role;
 use pictures::Pictures;
@@ -61,6 +61,10 @@ const SEND_LIMIT: Duration = Duration::from_secs(10);
 /// Close code for a surgeon's page whose link is no longer valid here. It is one of the codes for private use, chosen
 /// to resemble HTTP's 403.
 const LINK_OVER: u16 = 4403;
+
+/// A depth map is sent with pictures exposed at most so long after its own frame. On a busy machine maps come more
+/// slowly than pictures.
+const MAP_AGE: Duration = Duration::from_secs(1);
 
 /// Largest message from a page, bytes: pages send nothing longer than acknowledgements.
 const LARGEST_REQUEST: usize = 1024;
@@ -121,6 +125,8 @@ struct PageConnection<A: Audience> {
     admission: Admission,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
+    /// The depth maps, while the page wants them.
+    depth_maps: Option<DepthMaps>,
     /// The last status sent, so that only changes are sent.
     sent_status: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
@@ -144,6 +150,7 @@ impl<A: Audience> PageConnection<A> {
             admission: Admission::new(&app, pass, token),
             sessions,
             statuses,
+            depth_maps: None,
             sent_status: None,
             shutdown: app.shutdown.clone(),
             tablet: None,
@@ -215,6 +222,11 @@ impl<A: Audience> PageConnection<A> {
             }
             Ok(PageMessage::Visible { visible }) => self.pictures.visible(visible),
             Ok(PageMessage::Screen { width }) => self.pictures.screen(width),
+            Ok(PageMessage::Depths { wanted: false }) => self.depth_maps = None,
+            Ok(PageMessage::Depths { wanted: true }) => match A::depth_maps(&self.app) {
+                Some(maps) => self.depth_maps = Some(maps),
+                None => return Ok(Some(close(close_code::POLICY, "not for this page"))),
+            },
             Err(_) => return Ok(Some(close(close_code::POLICY, "unknown message"))),
         }
 
@@ -253,9 +265,14 @@ impl<A: Audience> PageConnection<A> {
 
     fn picture(&mut self, frame: &EncodedFrame) -> Option<Message> {
         let picture = &frame.picture;
-        let age = tenth_millis(self.app.clock.now().since(picture.exposed_at));
-        let travel = whole_tens(self.pictures.travel());
-        let header = A::header(frame, age, travel, self.pictures.is_reduced(), &self.app);
+        let journey = Journey {
+            age_ms: tenth_millis(self.app.clock.now().since(picture.exposed_at)),
+            travel_ms: whole_tens(self.pictures.travel()),
+            reduced: self.pictures.is_reduced(),
+        };
+        let depths = self.depth_maps.as_ref().and_then(|maps| maps.borrow().clone());
+        let is_recent = |map: &Arc<DepthMap>| picture.exposed_at.since(map.exposed_at) < MAP_AGE;
+        let header = A::header(frame, journey, depths.filter(is_recent), &self.app);
         let message = pack(&header, &picture.jpeg)?;
 
         self.pictures.sent(picture);

@@ -1,7 +1,7 @@
 //! What the operator's and the researcher's pages get on `/live`: what the surgeon's page gets, and what the loop
 //! does. While a session is under way, even they do not get the policy, nor anything that gives it away: how the
 //! focal power moves (`fixed` never, hill-climbers by 0.05 each frame), how long a step takes, the metric (by its
-//! scale), the belief, which few policies have, and whether by it the patch is held in focus.
+//! scale), the belief, which few policies have, whether by it the patch is held in focus, and the depth map.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::audience::Audience;
+use super::audience::{Audience, Journey};
 use super::surgeon::{SurgeonFrame, coarse};
 use super::tablets::TabletSign;
 use crate::http::App;
@@ -21,7 +21,7 @@ use parfocal_base::step::Hold;
 use parfocal_devices::camera::{CameraHealth, CameraOffer};
 use parfocal_devices::lens::LensHealth;
 use parfocal_pipeline::control::{ControlStatus, FocusLock, Following};
-use parfocal_pipeline::live::{EncodedFrame, Insight};
+use parfocal_pipeline::live::{DepthMap, DepthMaps, EncodedFrame, Insight};
 use parfocal_trial::permission::{self, HoldTold};
 use parfocal_trial::view::OperatorView;
 
@@ -52,15 +52,18 @@ struct RevealingValues {
     /// The policy's belief, if it has one: for equally wide slices of 0..=1, the probability that each holds the
     /// optimum.
     belief: Option<Arc<[f32]>>,
+    /// At which focal power each place of the picture is in focus, if the page has asked for it.
+    depths: Option<Arc<DepthMap>>,
 }
 
 impl RevealingValues {
-    fn new(insight: &Insight) -> Self {
+    fn new(insight: &Insight, depths: Option<Arc<DepthMap>>) -> Self {
         Self {
             asked: Some(insight.asked),
             measured: insight.measured,
             metric: insight.metric,
             belief: insight.belief.clone(),
+            depths,
         }
     }
 }
@@ -154,17 +157,21 @@ impl Audience for ForOperator {
 
     const LEADS: bool = false;
 
-    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> OperatorFrame {
+    fn depth_maps(app: &App) -> Option<DepthMaps> {
+        Some(app.live.depth_maps())
+    }
+
+    fn header(frame: &EncodedFrame, journey: Journey, depths: Option<Arc<DepthMap>>, app: &App) -> OperatorFrame {
         // Ask only once: a session may begin between two questions.
         let blinded = app.blinded();
-        let (age, seen) = if blinded {
-            (coarse(age_ms), RevealingValues::default())
+        let (journey, seen) = if blinded {
+            (coarse(journey), RevealingValues::default())
         } else {
-            (age_ms, RevealingValues::new(&frame.insight))
+            (journey, RevealingValues::new(&frame.insight, depths))
         };
         let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));
 
-        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, travel_ms, reduced, app), held, seen }
+        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, journey, app), held, seen }
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<OperatorView>>> {

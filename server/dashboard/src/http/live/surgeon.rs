@@ -8,13 +8,13 @@ use serde::Serialize;
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-use super::audience::Audience;
+use super::audience::{Audience, Journey};
 use crate::http::App;
 use parfocal_base::PatchPlace;
 use parfocal_base::step::Hold;
 use parfocal_imaging::PatchArea;
 use parfocal_pipeline::control::ControlStatus;
-use parfocal_pipeline::live::{EncodedFrame, Picture};
+use parfocal_pipeline::live::{DepthMap, DepthMaps, EncodedFrame, Picture};
 use parfocal_trial::view::SurgeonView;
 
 /// A surgeon's page.
@@ -62,17 +62,17 @@ pub(super) struct Circle {
 }
 
 impl SurgeonFrame {
-    /// What is sent with `picture`, which is `age` milliseconds old and will arrive after about `travel`.
-    pub(super) fn new(picture: &Picture, age: f64, travel: f64, reduced: bool, app: &App) -> Self {
+    /// What is sent with `picture` on its `journey`.
+    pub(super) fn new(picture: &Picture, journey: Journey, app: &App) -> Self {
         Self {
             frame: picture.number,
             run: app.store.run(),
-            age,
-            travel,
+            age: journey.age_ms,
+            travel: journey.travel_ms,
             width: picture.width,
             height: picture.height,
             per_cell: picture.per_cell,
-            reduced,
+            reduced: journey.reduced,
             estimated: picture.estimated,
             patch: picture.patch,
             area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),
@@ -125,11 +125,11 @@ impl SurgeonStatus {
     }
 }
 
-/// A picture's age in whole hundreds of milliseconds. The exact age includes the policy's own time, from
-/// hundredths of a millisecond to some milliseconds on a busy machine, and would tell policies apart. A
-/// page needs to know only whether the picture is older than half a second.
-pub(super) fn coarse(age_ms: f64) -> f64 {
-    (age_ms / 100.0).floor() * 100.0
+/// The same journey with the picture's age in whole hundreds of milliseconds. The exact age includes the policy's own
+/// time, from hundredths of a millisecond to some milliseconds on a busy machine, and would tell policies apart. A page
+/// needs to know only whether the picture is older than half a second.
+pub(super) fn coarse(journey: Journey) -> Journey {
+    Journey { age_ms: (journey.age_ms / 100.0).floor() * 100.0, ..journey }
 }
 
 impl Audience for ForSurgeon {
@@ -139,8 +139,12 @@ impl Audience for ForSurgeon {
 
     const LEADS: bool = true;
 
-    fn header(frame: &EncodedFrame, age_ms: f64, travel_ms: f64, reduced: bool, app: &App) -> SurgeonFrame {
-        SurgeonFrame::new(&frame.picture, coarse(age_ms), travel_ms, reduced, app)
+    fn depth_maps(_: &App) -> Option<DepthMaps> {
+        None
+    }
+
+    fn header(frame: &EncodedFrame, journey: Journey, _: Option<Arc<DepthMap>>, app: &App) -> SurgeonFrame {
+        SurgeonFrame::new(&frame.picture, coarse(journey), app)
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<SurgeonView>>> {
@@ -158,7 +162,8 @@ mod tests {
 
     #[test]
     fn an_age_does_not_show_how_long_a_policy_took() {
-        assert!([3.1, 9.9, 24.0].into_iter().all(|age| coarse(age) == 0.0));
-        assert!((coarse(612.4) - 600.0).abs() < 1e-9);
+        let told = |age_ms| coarse(Journey { age_ms, travel_ms: 10.0, reduced: false }).age_ms;
+        assert!([3.1, 9.9, 24.0].into_iter().all(|age| told(age) == 0.0));
+        assert!((told(612.4) - 600.0).abs() < 1e-9);
     }
 }
