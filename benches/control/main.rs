@@ -21,7 +21,8 @@ use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::{self, Camera, CameraSettings, Frame, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
 use parfocal_imaging::{
-    GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, Surroundings, View, WIDER,
+    GrayImage, JpegEncoder, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, RgbImage, Surroundings, View,
+    WIDER,
 };
 use parfocal_pipeline::control::{
     Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper,
@@ -89,6 +90,26 @@ fn steps(criterion: &mut Criterion) {
     }
 }
 
+/// A depth map: what its trackers see of a mosaic, and what they make of it.
+fn depth_map(criterion: &mut Criterion) {
+    const PLACES: usize = 21;
+    let samples = (0..2048 * 1088).map(|index| texture(index) as u16).collect();
+    let image = FrameImage::Mosaic(Arc::new(MosaicFrame::new(2048, 1088, samples).expect("fits")));
+    let eye = Eye::new(Reconstructor::default());
+    let tracker = || Registry::standard().build(&PolicyName::new("parfocal")).expect("is available");
+    let mut trackers: Vec<_> = std::iter::repeat_with(tracker).take(PLACES).collect();
+    let patch = PatchArea { x: 240, y: 120, width: PATCH_SIDE, height: PATCH_SIDE };
+    let focal_power = FocalPower::MIDDLE;
+    criterion.bench_function("depth map/21 places", |bench| {
+        bench.iter(|| {
+            for tracker in &mut trackers {
+                let view = eye.look(&image, patch, tracker.field_of_view());
+                black_box(tracker.look_on(&Observation { view: &view, focal_power }, focal_power));
+            }
+        });
+    });
+}
+
 /// Exposure to lens command in the whole loop, with the phantom at 50 frames a second.
 fn latency(_: &mut Criterion) {
     let clock = Arc::new(SystemClock);
@@ -145,5 +166,5 @@ fn bench_devices(_: &mut Criterion) {
     println!("loop/gige  skipped: built without the feature aravis");
 }
 
-criterion_group!(benches, metrics, policies, steps, latency, bench_devices);
+criterion_group!(benches, metrics, policies, steps, depth_map, latency, bench_devices);
 criterion_main!(benches);

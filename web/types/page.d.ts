@@ -124,7 +124,7 @@ declare global {
       measured?: number | null;
       metric?: number | null;
       belief?: number[] | null;
-      /** At which focal power each place of the picture is in focus; for an operator who asks for it. */
+      /** Which places of the picture are in focus; for an operator who asks for it. */
       depths?: { places: PlaceDepth[] } | null;
     }
 
@@ -134,8 +134,6 @@ declare global {
       y: number;
       /** Where its optimum is, seen from the lens. */
       side: "in-focus" | "higher" | "lower" | "unknown";
-      /** The focal power at which the place is in focus; null while that is not known. */
-      optimum: number | null;
     }
 
     interface Frame {

@@ -14,16 +14,11 @@ const EDGE_COLOUR = "rgba(0, 0, 0, .75)";
 const DISC = 4;
 const TRIANGLE = 5;
 const RING = 2.2;
-const TEXT = 8;
 
 /** @type {import("../shared/viewer.js").Draw} */
-export function drawDepths(context, { depths, measured }, pixels, line) {
-  for (const { x, y, side, optimum } of depths?.places ?? []) {
+export function drawDepths(context, { depths }, pixels, line) {
+  for (const { x, y, side } of depths?.places ?? [])
     drawPlace(context, { x: x * pixels, y: y * pixels }, side, line);
-    if ((side !== "higher" && side !== "lower") || optimum === null || typeof measured !== "number") continue;
-    const words = Math.abs(optimum - measured).toFixed(2);
-    label(context, words, COLOURS[side], x * pixels + (TRIANGLE + 2) * line, y * pixels, line);
-  }
 }
 
 /**
@@ -72,22 +67,4 @@ function triangle(context, x, y, tip) {
   context.moveTo(x, y + tip);
   context.lineTo(x + half, y - 0.7 * tip);
   context.lineTo(x - half, y - 0.7 * tip);
-}
-
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {string} words
- * @param {string} colour
- * @param {number} x
- * @param {number} y
- * @param {number} line
- */
-function label(context, words, colour, x, y, line) {
-  context.font = `600 ${TEXT * line}px system-ui, sans-serif`;
-  context.textBaseline = "middle";
-  context.lineWidth = 2 * line;
-  context.strokeStyle = EDGE_COLOUR;
-  context.strokeText(words, x, y);
-  context.fillStyle = colour;
-  context.fillText(words, x, y);
 }
