@@ -132,6 +132,7 @@ kept-refused =
 still-saving = Bitte lassen Sie diese Seite offen. Einiges, was Sie gesagt haben, wird noch gespeichert.
 all-saved = Alles, was Sie gesagt haben, ist gespeichert.
 no-connection = Keine Verbindung. Diese Seite versucht es weiter.
+no-answer-yet = Noch keine Antwort. Diese Seite versucht es weiter.
 held-comments =
     { $count ->
         [one] 1 Kommentar

@@ -133,6 +133,7 @@ kept-refused =
 still-saving = Please keep this page open. Some of what you said is still being saved.
 all-saved = Everything you said is saved.
 no-connection = No connection. This page keeps trying.
+no-answer-yet = No answer yet. This page keeps trying.
 held-comments =
     { $count ->
         [one] 1 comment

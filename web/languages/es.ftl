@@ -132,6 +132,7 @@ kept-refused =
 still-saving = Deje esta página abierta. Parte de lo que ha dicho aún se está guardando.
 all-saved = Todo lo que ha dicho está guardado.
 no-connection = Sin conexión. Esta página sigue intentándolo.
+no-answer-yet = Aún no hay respuesta. Esta página sigue intentándolo.
 held-comments =
     { $count ->
         [one] 1 comentario

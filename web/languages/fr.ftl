@@ -132,6 +132,7 @@ kept-refused =
 still-saving = Gardez cette page ouverte. Une partie de ce que vous avez dit est en cours d’enregistrement.
 all-saved = Tout ce que vous avez dit est enregistré.
 no-connection = Pas de connexion. Cette page continue d’essayer.
+no-answer-yet = Pas encore de réponse. Cette page continue d’essayer.
 held-comments =
     { $count ->
         [one] { $count } commentaire

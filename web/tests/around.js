@@ -127,12 +127,16 @@ export function countedIds() {
 export class FakeServer {
   /** @type {{ path: string, body: any }[]} */
   got = [];
-  /** The answers, in order: an error to throw, or null to accept what was sent. @type {(Error | null)[]} */
+  /**
+   * The answers, in order, perhaps yet to come: an error to throw, or null to accept what was sent.
+   *
+   * @type {(Error | null | Promise<Error | null>)[]}
+   */
   answers = [];
 
   send = async (/** @type {string} */ path, /** @type {any} */ body) => {
     this.got.push({ path, body: structuredClone(body) });
-    const answer = this.answers.shift();
+    const answer = await this.answers.shift();
     if (answer) throw answer;
   };
 }

@@ -69,6 +69,37 @@ test("without a network the waits double up to eight seconds, and a nudge tries 
   assert.equal(new Set(page.server.got.map(({ body }) => body.key)).size, 1, "always under the same key");
 });
 
+test("what is not answered for two seconds is told as kept here, and its request goes on", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  /** @type {(answer: Error | null) => void} */
+  let answer = () => {};
+  const hangs = () =>
+    new Promise((/** @type {(answer: Error | null) => void} */ resolve) => (answer = resolve));
+  page.server.answers = [hangs(), null];
+  /** @type {string[]} */
+  const told = [];
+  outbox.subscribe(({ entry, state }) => told.push(`${entry.body.text} ${state}`));
+  outbox.add("/comments", { session: "s", text: "a" });
+  const settled = outbox.settled("/comments");
+
+  await page.time.pass(1999);
+  assert.deepEqual([told, outbox.trouble], [["a saving"], null]);
+  await page.time.pass(1);
+  assert.deepEqual(told, ["a saving", "a late"]);
+  assert.equal(outbox.trouble, "No answer yet. This page keeps trying.");
+  outbox.add("/comments", { session: "s", text: "b" });
+  outbox.nudge();
+  await settle();
+  assert.equal(page.server.got.length, 1, "it is not sent twice");
+
+  answer(null);
+  await settle();
+  assert.deepEqual(told.slice(2), ["b saving", "a saved", "b saved"]);
+  assert.deepEqual([outbox.trouble, page.time.nextIn], [null, null]);
+  assert.equal(await settled, true, "whoever waits for it waits on");
+});
+
 test("a reload sends what was left, in the order of entry", async () => {
   const page = openPage();
   const first = page.open();

@@ -11,6 +11,9 @@ import { Delivery } from "./delivery.js";
 
 const PREFIX = "parfocal.outbox.";
 
+/** An entry that is sent and not answered for so long is told as late. The request goes on. */
+const LATE_MS = 2000;
+
 /** @typedef {import("./origin.js").Stamp} Stamp */
 
 /**
@@ -29,11 +32,12 @@ const PREFIX = "parfocal.outbox.";
  */
 
 /**
- * A change of an entry's state. `heard` says whether the server answered.
+ * A change of an entry's state. `late`: it was sent, and the server has not answered yet. `heard` says whether the
+ * server answered.
  *
  * @typedef {object} Change
  * @property {Entry} entry
- * @property {"saving" | "saved" | "waiting" | "refused"} state
+ * @property {"saving" | "late" | "saved" | "waiting" | "refused"} state
  * @property {string | null} reason
  * @property {boolean} heard
  */
@@ -50,7 +54,7 @@ const PREFIX = "parfocal.outbox.";
  */
 
 export class Outbox {
-  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
+  /** Why the last attempt to send failed, or is late; null if it succeeded. @type {string | null} */
   trouble = null;
 
   /** Resolves once the entries that only the spare copy has are restored. @type {Promise<void>} */
@@ -251,6 +255,7 @@ export class Outbox {
    */
   async #send(entry) {
     entry.sending = true;
+    const answered = this.#around.later(() => this.#late(entry), LATE_MS);
     try {
       await this.#around.send(entry.path, { ...entry.body, ...this.#around.origins.tell(entry.given) });
       this.trouble = null;
@@ -260,7 +265,19 @@ export class Outbox {
     } catch (error) {
       entry.sending = false;
       return this.#failed(entry, error);
+    } finally {
+      answered();
     }
+  }
+
+  /**
+   * On a poor network a request may hang for long. What it carries is on this device already.
+   *
+   * @param {Entry} entry
+   */
+  #late(entry) {
+    this.trouble = say("no-answer-yet");
+    this.#tell(entry, "late", this.trouble, false);
   }
 
   /**

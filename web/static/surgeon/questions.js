@@ -3,7 +3,7 @@
 
 import { language, say } from "../shared/language.js";
 
-/** @typedef {"saving" | "saved" | "waiting" | "refused" | "partly" | ""} Reached */
+/** @typedef {import("./outbox.js").Change["state"] | "partly" | ""} Reached */
 /** @typedef {import("./drafts.js").Draft} Draft */
 
 /**
@@ -38,6 +38,15 @@ const YES = 3;
 const TYPING_PAUSE_MS = 900;
 
 /**
+ * Whether a whole answer is saved, or will be.
+ *
+ * @param {Reached} reached
+ */
+function isGiven(reached) {
+  return reached !== "" && reached !== "partly" && reached !== "refused";
+}
+
+/**
  * Says what has become of an answer; undefined if that is not the same for all.
  *
  * @param {Reached} reached
@@ -45,7 +54,7 @@ const TYPING_PAUSE_MS = 900;
 function reachedWords(reached) {
   if (reached === "saving") return say("saving");
   if (reached === "saved") return say("answer-saved");
-  if (reached === "waiting") return say("answer-waiting");
+  if (reached === "late" || reached === "waiting") return say("answer-waiting");
   return undefined;
 }
 
@@ -148,14 +157,14 @@ class Answer {
    * @returns {{ answered: number, total: number }}
    */
   get progress() {
-    const answered = ["saving", "saved", "waiting"].includes(this.reached);
+    const answered = isGiven(this.reached);
     return { answered: answered ? 1 : 0, total: 1 };
   }
 
   /** Whether the surgeon must still do something here. */
   get unanswered() {
     if (this.begun !== null) return true;
-    return !this.question.optional && !["saving", "saved", "waiting"].includes(this.reached);
+    return !this.question.optional && !isGiven(this.reached);
   }
 
   /** Whether this question, or a part of it, is marked as still to be answered. */
