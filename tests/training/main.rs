@@ -36,6 +36,7 @@ fn small(policy: &str, updates: u64) -> Recipe {
 
     if let Some(belief) = &mut recipe.belief {
         (belief.scans, belief.window, belief.updates, belief.variety) = (8, 16, updates, 0.0);
+        belief.replays = true;
     }
     recipe
 }
