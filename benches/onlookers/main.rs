@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Registry};
 use parfocal_base::{FocalPower, IN_FOCUS, PolicyName};
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT};
@@ -98,6 +99,7 @@ fn print(name: &str, counts: [Count; DRIVERS.len()]) {
 }
 
 fn main() {
+    compute_on_this_thread();
     let stacks: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     println!("| side told: right | {} |", DRIVERS.join(" | "));
     println!("|---|{}", "---|".repeat(DRIVERS.len()));

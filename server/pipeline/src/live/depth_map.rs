@@ -12,6 +12,7 @@ use tokio::sync::watch;
 
 use crate::control::{ControlledFrame, Eye, LatestSlot, cells};
 use parfocal_autofocus::belief::SURE;
+use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Policy, PolicyError, Registry};
 use parfocal_base::clock::Moment;
 use parfocal_base::{FocalPower, IN_FOCUS, PolicyName};
@@ -140,6 +141,7 @@ struct Worker {
 impl Worker {
     fn run(mut self) {
         parfocal_base::priority::lower_further();
+        compute_on_this_thread();
         while !self.slot.is_closed() {
             let Some(frame) = self.slot.take(PATIENCE) else {
                 self.survey.end();
