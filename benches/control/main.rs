@@ -25,7 +25,7 @@ use parfocal_imaging::{
     WIDER,
 };
 use parfocal_pipeline::control::{
-    Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper,
+    Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, LoopSettings, Rig, Stepper,
 };
 
 fn texture(index: usize) -> usize {
@@ -128,7 +128,7 @@ fn watch_loop(camera: Box<dyn Camera>, lens: Box<dyn Lens>, fps: f64, steps: usi
     let clock = Arc::new(SystemClock);
     let rig = Rig { camera, lens, reconstructor: reconstructor.clone(), registry: Registry::standard(), clock };
     let frame_period = Duration::from_secs_f64(1.0 / fps);
-    let settings = Settings { frame_period, telemetry_capacity: 256, dynamics: None };
+    let settings = LoopSettings { frame_period, telemetry_capacity: 256, dynamics: None };
     let (control, handle, mut telemetry) = ControlLoop::spawn(settings, rig).expect("starts");
     handle.send(Command::Drive {
         drive: Drive::Policy { name: PolicyName::new("mgm-hill-climber"), start: None },

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal_autofocus::exec::{Settings, Times, with_command};
+use parfocal_autofocus::exec::{ProcessSettings, Times, with_command};
 use parfocal_autofocus::{Observation, Policy, Registry};
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::{FocalPower, PolicyName};
@@ -39,8 +39,8 @@ fn main() {
     measure("built in", registry.build(&PolicyName::new("fixed")).expect("ships"));
 }
 
-fn settings() -> Settings {
-    Settings {
+fn settings() -> ProcessSettings {
+    ProcessSettings {
         launcher: env!("CARGO_BIN_EXE_parfocal").into(),
         clock: Arc::new(SystemClock),
         start: Duration::from_mins(1),

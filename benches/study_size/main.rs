@@ -16,7 +16,7 @@ use std::time::Duration;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_records::store::export::verify::Verdict;
 use parfocal_results::analysis::analyse;
-use parfocal_results::study_export::{Progress, export_study};
+use parfocal_results::study_export::{ExportProgress, export_study};
 use parfocal_trial::role::Role;
 
 use measuring::{Measured, measured};
@@ -75,7 +75,7 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
     let begun = SystemClock.now();
     let exported_after = Arc::new(AtomicU64::new(0));
     let heard = Arc::clone(&exported_after);
-    let told = move |progress: Progress| {
+    let told = move |progress: ExportProgress| {
         if progress.steps == 0 {
             heard.store(SystemClock.now().since(begun).as_nanos() as u64, Ordering::Relaxed);
         }

@@ -11,8 +11,8 @@ use parfocal_base::clock::SystemClock;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::AccessLog;
 use parfocal_records::store::export::export;
-use parfocal_results::package::{self, LeftOut, Sessions, Source, Summary};
-use parfocal_results::study_export::{Progress, export_study};
+use parfocal_results::package::{self, LeftOut, PackageSource, Sessions, Summary};
+use parfocal_results::study_export::{ExportProgress, export_study};
 
 /// Arguments of `parfocal export`.
 #[derive(Debug, Args)]
@@ -72,7 +72,7 @@ async fn write_study(access_log: &AccessLog, study: &str, arguments: &Arguments)
     let steps = Arc::new(Steps::new());
     let report = {
         let steps = Arc::clone(&steps);
-        move |progress: Progress| match progress.steps {
+        move |progress: ExportProgress| match progress.steps {
             0 => steps.tell("sessions exported", progress.exported, progress.sessions),
             all => steps.tell("steps of joining", progress.joined, all),
         }
@@ -84,7 +84,7 @@ async fn write_study(access_log: &AccessLog, study: &str, arguments: &Arguments)
 }
 
 /// Writes the package of `sources`, shows the progress, and prints what the package holds.
-pub fn join(sources: &[Source], left_out: &[LeftOut], out: &Path, json: bool) -> Result<(), Failure> {
+pub fn join(sources: &[PackageSource], left_out: &[LeftOut], out: &Path, json: bool) -> Result<(), Failure> {
     let steps = Steps::new();
     let joined = package::write(sources, Sessions::Copied, left_out, out, &mut |done, all| {
         steps.tell("steps of joining", done, all);

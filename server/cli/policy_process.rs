@@ -9,7 +9,7 @@ use std::time::Duration;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
 use super::output::Failure;
-use parfocal_autofocus::exec::{Settings, Times};
+use parfocal_autofocus::exec::{ProcessSettings, Times};
 use parfocal_autofocus::{Registry, exec, scripted};
 use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, SystemClock};
@@ -31,8 +31,8 @@ pub struct Arguments {
 }
 
 /// For a server: the control loop never waits, and a process that hangs is ended soon after the loop gave it up.
-pub fn for_serving(clock: &Arc<dyn Clock>) -> Settings {
-    Settings {
+pub fn for_serving(clock: &Arc<dyn Clock>) -> ProcessSettings {
+    ProcessSettings {
         launcher: SELF.into(),
         clock: Arc::clone(clock),
         start: START,
@@ -47,14 +47,14 @@ pub fn for_serving(clock: &Arc<dyn Clock>) -> Settings {
 
 /// Adds the policy of a file or a command to `registry`, if `name` is one.
 #[must_use]
-pub fn with_outside(registry: Registry, name: &PolicyName, settings: &Settings) -> Registry {
+pub fn with_outside(registry: Registry, name: &PolicyName, settings: &ProcessSettings) -> Registry {
     exec::with_command(scripted::with_file(registry, name), name, settings)
 }
 
 /// For an evaluation, which nobody waits for, and which has `rate` frames a second, or else 25.
-pub fn for_evaluation(rate: Option<f64>) -> Settings {
+pub fn for_evaluation(rate: Option<f64>) -> ProcessSettings {
     let period = rate.and_then(|rate| Duration::try_from_secs_f64(rate.recip()).ok());
-    Settings {
+    ProcessSettings {
         launcher: SELF.into(),
         clock: Arc::new(SystemClock),
         start: START,

@@ -34,13 +34,13 @@ use parfocal_dashboard::http::{self, App, Equipment, OpenTablets, ServerAddress,
 use parfocal_dashboard::openigtlink;
 use parfocal_dashboard::tls::{Certificates, keep_current};
 use parfocal_imaging::{Calibration, Developer, Reconstructor, Size};
-use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Eye, Settings};
+use parfocal_pipeline::control::{self, Command, ControlLoop, ControlStatus, Drive, Eye, LoopSettings};
 use parfocal_pipeline::live;
 use parfocal_recording as recording;
 use parfocal_records::accounts::{Accounts, Cost};
 use parfocal_records::store::{self, Backups, LockedFolder, Store, telemetry};
 use parfocal_results::study_export::StudyExports;
-use parfocal_session::conductor::{Conductor, Parts};
+use parfocal_session::conductor::{Conductor, ConductorParts};
 use parfocal_session::playback::Player;
 use parfocal_session::recorder::{self, Recordings};
 use parfocal_session::reports::Reports;
@@ -120,7 +120,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let frame_period = Duration::from_secs(1) / arguments.fps;
 
     let (control_loop, control, records) =
-        ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
+        ControlLoop::spawn(LoopSettings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
 
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     log_devices(&store, &clock, &control.status);
@@ -128,7 +128,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let onlooking = (Eye::new(Reconstructor::new(&calibration)), registry.clone());
     let (live, imaging) = live::start(control.clone(), &developer, largest_size(mosaics), onlooking, &clock)?;
 
-    let conductor = Conductor::open(Parts {
+    let conductor = Conductor::open(ConductorParts {
         store: store.clone(),
         control: control.clone(),
         library: library.clone(),
@@ -142,7 +142,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let folder = arguments.data_dir.join(recording::FOLDER);
     let reports = Reports::open(&store, Arc::clone(&clock)).await?;
     let player = Player::new(reports.clone(), folder.clone())?;
-    let recordings = Recordings::new(recorder::Parts {
+    let recordings = Recordings::new(recorder::RecorderParts {
         clock: Arc::clone(&clock),
         run: store.run(),
         tap: control.tap.clone(),
@@ -242,7 +242,7 @@ fn link(
     let (live, clock, shutdown) = (app.live.clone(), Arc::clone(&app.clock), app.shutdown.clone());
     let app = Arc::clone(app);
     let blinded = Box::new(move || app.blinded());
-    let source = openigtlink::Source { live, status, developer, blinded, clock, shutdown };
+    let source = openigtlink::LinkSource { live, status, developer, blinded, clock, shutdown };
     let settings = arguments.navigation.settings();
     tokio::spawn(async move {
         if let Err(error) = openigtlink::run(listener, source, settings).await {

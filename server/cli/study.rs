@@ -19,7 +19,7 @@ use super::wait::wait_for;
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::SystemClock;
 use parfocal_records::store::{Reader, StoreError, StoredStudy};
-use parfocal_results::package::{self, Source};
+use parfocal_results::package::{self, PackageSource};
 use parfocal_session::conductor::Studies;
 use parfocal_session::reports::StudyDetail;
 use parfocal_trial::study::signature::{Channel, Signature};
@@ -235,7 +235,7 @@ fn merge(merge: &Merge) -> Result<(), Failure> {
     for site in without_systems_own(&merge.sites) {
         left_out.extend(package::left_out(site)?);
         for export in package::exports_of(site)? {
-            sources.push(Source::open(&export)?);
+            sources.push(PackageSource::open(&export)?);
         }
     }
     left_out.sort();

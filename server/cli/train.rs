@@ -16,7 +16,7 @@ use parfocal_learning::training::recipe::LEG;
 use parfocal_learning::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use parfocal_learning::training::run::comparison::{TrainedRun, markdown};
 use parfocal_learning::training::run::resume::ResumeRequest;
-use parfocal_learning::training::run::{Progress, Run, Sources};
+use parfocal_learning::training::run::{Run, Sources, TrainingProgress};
 
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -119,7 +119,7 @@ fn train(arguments: &Training) -> Result<(), Failure> {
     let bar = bar(total, run.updates());
     let mut validation = run.best();
 
-    let mut tell_progress = |progress: &Progress| {
+    let mut tell_progress = |progress: &TrainingProgress| {
         validation = progress.validation.unwrap_or(validation);
         let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
         let mae = if validation.is_finite() { format!(", validation MAE {validation:.4}") } else { String::new() };

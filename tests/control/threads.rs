@@ -9,7 +9,7 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::step::{Hold, StepRecord};
 use parfocal_imaging::Reconstructor;
 use parfocal_pipeline::control::{
-    Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Rig, Settings,
+    Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, LoopSettings, Rig,
 };
 use rustix::thread::Pid;
 use tokio::sync::mpsc;
@@ -42,7 +42,7 @@ impl Stage {
             clock,
         };
 
-        let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity, dynamics: None };
+        let settings = LoopSettings { frame_period: Duration::from_millis(20), telemetry_capacity, dynamics: None };
         let (control, handle, telemetry) = ControlLoop::spawn(settings, rig).unwrap();
         Self { control, handle, telemetry, camera, lens, script }
     }

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use parfocal_results::package::{Sessions, Source, check, exports_of, left_out, write};
+use parfocal_results::package::{PackageSource, Sessions, check, exports_of, left_out, write};
 use parfocal_results::study_export::export_study;
 use parfocal_session::conductor::StudySite;
 use parfocal_trial::account::AccountRole;
@@ -93,7 +93,8 @@ pub fn packages() -> Vec<Vec<u8>> {
 /// Joins the package in `folder`, as `study merge` does.
 fn joined(folder: &Path) -> Result<(), parfocal_results::package::PackageError> {
     let left_out = left_out(folder)?;
-    let sources = exports_of(folder)?.iter().map(|export| Source::open(export)).collect::<Result<Vec<_>, _>>()?;
+    let sources =
+        exports_of(folder)?.iter().map(|export| PackageSource::open(export)).collect::<Result<Vec<_>, _>>()?;
     let out = tempfile::tempdir().unwrap();
     write(&sources, Sessions::Copied, &left_out, &out.path().join("joined"), &mut |_, _| ())?;
     Ok(())

@@ -12,7 +12,7 @@ use parfocal_devices::lens::emulator::Model;
 use parfocal_devices::lens::{Lens, LensDynamics, Optics, SimulatedLens};
 use parfocal_imaging::{Reconstructor, RgbImage};
 use parfocal_pipeline::control::Eye;
-use parfocal_pipeline::lens_measurement::{Measurement, MeasurementError, Plan, View, measure};
+use parfocal_pipeline::lens_measurement::{CameraView, Measurement, MeasurementError, Plan, measure};
 
 use super::{emulator, open};
 
@@ -63,7 +63,7 @@ fn measured(
     let period = Duration::from_millis(20);
     let camera = Stripes { clock: clock.clone(), optics, pause: pause.clone(), period, due, number: 0, contrast };
     let eye = Eye::new(Reconstructor::default());
-    measure(lens, &mut View::new(Box::new(camera), eye, clock), plan, &*pause)
+    measure(lens, &mut CameraView::new(Box::new(camera), eye, clock), plan, &*pause)
 }
 
 fn simulated(delay: u64, settling: u64, contrast: f64, plan: Plan) -> Result<Measurement, MeasurementError> {

@@ -13,7 +13,7 @@ use parfocal_pipeline::live;
 use parfocal_records::store::Backups;
 use parfocal_results::study_export::StudyExports;
 use parfocal_session::playback::Player;
-use parfocal_session::recorder::{Parts, Recordings};
+use parfocal_session::recorder::{RecorderParts, Recordings};
 use tokio::sync::watch;
 
 use super::fixture::Trial;
@@ -43,7 +43,7 @@ pub fn app(trial: &Trial, folder: &Path, address: ServerAddress, shutdown: watch
             trial.store.clone(),
         ),
         player: Player::new(trial.reports.clone(), recordings.clone()).unwrap(),
-        recordings: Recordings::new(Parts {
+        recordings: Recordings::new(RecorderParts {
             clock: Arc::clone(&clock),
             run: trial.store.run(),
             tap: control.tap.clone(),

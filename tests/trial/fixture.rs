@@ -15,7 +15,7 @@ use parfocal_imaging::ContentArea;
 use parfocal_pipeline::control::{Command, ControlHandle, ControlStatus, LatestSlot, PictureGeometry, Tap};
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
 use parfocal_records::store::{AccessLog, ServerRun, Store};
-use parfocal_session::conductor::{ConductError, Conductor, Library, Parts};
+use parfocal_session::conductor::{ConductError, Conductor, ConductorParts, Library};
 use parfocal_session::reports::Reports;
 use parfocal_trial::account::{Account, AccountName, AccountRole};
 use parfocal_trial::action::Action;
@@ -92,7 +92,7 @@ impl Trial {
         let store = Store::open(folder, &a_run(&clock)).await.unwrap();
         let (control, commands) = listener();
         let library = Library::load(protocols, &known()).unwrap();
-        let conductor = Conductor::open(Parts {
+        let conductor = Conductor::open(ConductorParts {
             store: store.clone(),
             control: control.clone(),
             library: library.clone(),

@@ -13,7 +13,7 @@ use parfocal_trial::event::EventKind;
 use parfocal_trial::remark::Sight;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::PauseCause;
-use parfocal_trial::tablet::{PictureSize, Presence, Report};
+use parfocal_trial::tablet::{PictureSize, Presence, TabletReport};
 
 use crate::exports::{json, rows};
 use crate::fixture::Trial;
@@ -39,7 +39,7 @@ async fn report(trial: &Trial, presence: Presence, size: Option<PictureSize>, se
     for _ in 0..seconds * 4 {
         trial.clock.advance(Duration::from_millis(250));
         let pictures = if size.is_some() { 5 } else { 0 };
-        trial.conductor.follow_tablets(Report { presence, size, pictures }).await;
+        trial.conductor.follow_tablets(TabletReport { presence, size, pictures }).await;
     }
 }
 

@@ -15,7 +15,7 @@ use parfocal_devices::camera::{self, CameraSettings};
 use parfocal_devices::lens::{LensInfo, MeasuredDynamics};
 use parfocal_imaging::Reconstructor;
 use parfocal_pipeline::control::Eye;
-use parfocal_pipeline::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
+use parfocal_pipeline::lens_measurement::{CameraView, Fit, Measurement, Plan, measure, plot};
 
 /// Arguments of `parfocal lens measure`.
 #[derive(Debug, clap::Args)]
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         CameraSettings { fps: arguments.fps.into(), seed: 0, optics: lens.optics(), clock: Arc::clone(&clock) };
     let camera = camera::open(&arguments.camera, settings)?;
     let eye = Eye::new(Reconstructor::default());
-    let mut view = View::new(camera, eye, Arc::clone(&clock));
+    let mut view = CameraView::new(camera, eye, Arc::clone(&clock));
 
     let watch = Duration::from_millis(arguments.watch.into());
     let plan = Plan { repeats: arguments.repeats, watch, ..Plan::default() };

@@ -14,8 +14,8 @@ use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
 use parfocal_imaging::{Calibration, Reconstructor};
-use parfocal_pipeline::control::{self, Command, ControlHandle, ControlLoop, Drive, Rig, Settings};
-use parfocal_recording::{CALIBRATION, Ended, FORMAT, Header, Progress, Recorder, VERSION, Writer};
+use parfocal_pipeline::control::{self, Command, ControlHandle, ControlLoop, Drive, LoopSettings, Rig};
+use parfocal_recording::{CALIBRATION, Ended, FORMAT, Header, Recorder, RecordingProgress, VERSION, Writer};
 
 /// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(20);
@@ -119,7 +119,7 @@ fn start(arguments: &Arguments) -> Result<(ControlLoop, ControlHandle, Recorder)
     let rig = Rig { camera, lens, reconstructor: Reconstructor::new(&calibration), registry, clock };
     let frame_period = Duration::from_secs(1) / arguments.fps;
     let (control_loop, control, _) =
-        ControlLoop::spawn(Settings { frame_period, telemetry_capacity: 1, dynamics: None }, rig)?;
+        ControlLoop::spawn(LoopSettings { frame_period, telemetry_capacity: 1, dynamics: None }, rig)?;
 
     if let Some(name) = policy {
         let drive = Drive::Policy { name, start: None };
@@ -182,7 +182,7 @@ fn watch(
     }
 }
 
-fn tell(arguments: &Arguments, progress: &Progress) -> Result<(), Failure> {
+fn tell(arguments: &Arguments, progress: &RecordingProgress) -> Result<(), Failure> {
     let out = arguments.out.display();
     let lost = match progress.lost {
         0 => String::new(),

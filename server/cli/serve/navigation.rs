@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tokio::net::TcpListener;
 
-use parfocal_dashboard::openigtlink::Settings;
+use parfocal_dashboard::openigtlink::LinkSettings;
 use parfocal_imaging::Size;
 
 /// OpenIGTLink.
@@ -45,8 +45,8 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 
 impl Navigation {
     /// What clients get.
-    pub fn settings(&self) -> Settings {
-        Settings { size: self.openigtlink_size, rate: self.openigtlink_rate }
+    pub fn settings(&self) -> LinkSettings {
+        LinkSettings { size: self.openigtlink_size, rate: self.openigtlink_rate }
     }
 
     /// Takes the port; `None` without OpenIGTLink.

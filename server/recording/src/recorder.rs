@@ -87,7 +87,7 @@ impl Intake {
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Progress {
+pub struct RecordingProgress {
     /// Frames recorded so far.
     pub frames: u64,
     /// Frames lost because this machine or its disk was too slow.
@@ -102,7 +102,7 @@ pub struct Progress {
 pub struct Recorder {
     folder: PathBuf,
     intake: Arc<Intake>,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<RecordingProgress>>,
     stop: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -118,7 +118,7 @@ impl Recorder {
 
         let (intake, frames) = Intake::new(WAITING);
         let (sender, compressed) = sync_channel(COMPRESSED);
-        let progress = Arc::new(Mutex::new(Progress::default()));
+        let progress = Arc::new(Mutex::new(RecordingProgress::default()));
         let stop = Arc::new(AtomicBool::new(false));
 
         let compressor = Compressor {
@@ -151,7 +151,7 @@ impl Recorder {
 
     /// How far it has come.
     #[must_use]
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> RecordingProgress {
         let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone();
         progress.lost = self.intake.lost.load(Ordering::Relaxed);
         progress
@@ -159,7 +159,7 @@ impl Recorder {
 
     /// Stops, stores the frames that were offered before, and returns how the recording ended.
     #[must_use]
-    pub fn stop(mut self) -> Progress {
+    pub fn stop(mut self) -> RecordingProgress {
         self.end();
         self.progress()
     }
@@ -223,7 +223,7 @@ struct Storer {
     writer: Writer,
     compressed: Receiver<Compressed>,
     lost: Arc<AtomicU64>,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<RecordingProgress>>,
 }
 
 impl Storer {

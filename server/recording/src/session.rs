@@ -20,14 +20,14 @@ use parfocal_base::files::is_systems_own;
 /// What a recording is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum RecordingKind {
     /// Mosaics.
     Mosaic,
     /// Pictures of the view.
     View,
 }
 
-impl Kind {
+impl RecordingKind {
     /// Its name, as in protocols.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -68,10 +68,10 @@ impl AnyRecording {
 
     /// Its kind.
     #[must_use]
-    pub const fn kind(&self) -> Kind {
+    pub const fn kind(&self) -> RecordingKind {
         match self {
-            Self::Mosaic(_) => Kind::Mosaic,
-            Self::View(_) => Kind::View,
+            Self::Mosaic(_) => RecordingKind::Mosaic,
+            Self::View(_) => RecordingKind::View,
         }
     }
 
@@ -196,11 +196,11 @@ fn is_named_after(name: &str, session: &str) -> bool {
 
 /// The session that the recording in `folder` says it was made in.
 fn said_session(folder: &Path) -> Option<String> {
-    let read = |kind: Kind| fs::read(folder.join(kind.description())).ok();
+    let read = |kind: RecordingKind| fs::read(folder.join(kind.description())).ok();
     let described = |text: Vec<u8>| serde_json::from_slice::<Value>(&text).ok();
 
-    let mosaic = read(Kind::Mosaic).and_then(described).map(|group| group["attributes"]["session"].clone());
-    let view = || read(Kind::View).and_then(described).map(|header| header["session"].clone());
+    let mosaic = read(RecordingKind::Mosaic).and_then(described).map(|group| group["attributes"]["session"].clone());
+    let view = || read(RecordingKind::View).and_then(described).map(|header| header["session"].clone());
     mosaic.or_else(view)?.as_str().map(str::to_owned)
 }
 

@@ -40,7 +40,7 @@ pub struct PictureSize {
 
 /// What the tablets report together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Report {
+pub struct TabletReport {
     /// Whether one shows the surgeon's page.
     pub presence: Presence,
     /// The smallest of the pictures that they drew since the last report; none if they drew none.

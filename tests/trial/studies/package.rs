@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use parfocal_results::study_export::{Progress, StudyExportState, StudyExports};
+use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports};
 use parfocal_trial::erasure::{Erasable, NewErasure};
 use serde_json::Value;
 
@@ -364,7 +364,7 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
 
     // The export makes no progress between the two calls, because the test has not awaited anything yet.
     let first = exports.start(trial.access_log(), STUDY, false);
-    let begun = StudyExportState::Running { unblinded: false, progress: Progress::default() };
+    let begun = StudyExportState::Running { unblinded: false, progress: ExportProgress::default() };
     assert_eq!(first, begun);
     assert_eq!(exports.start(trial.access_log(), STUDY, true), begun);
 

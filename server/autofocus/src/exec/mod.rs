@@ -8,7 +8,7 @@ mod process;
 mod settings;
 
 pub use process::LAUNCH;
-pub use settings::{Settings, Times};
+pub use settings::{ProcessSettings, Times};
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ const SUMMARY: &str = "a policy in another process";
 /// Adds the policy of a command to `registry`, if `name` begins with [`PREFIX`]. Starts the process. If it cannot be
 /// used, it is listed as unavailable, with the reason.
 #[must_use]
-pub fn with_command(registry: Registry, name: &PolicyName, settings: &Settings) -> Registry {
+pub fn with_command(registry: Registry, name: &PolicyName, settings: &ProcessSettings) -> Registry {
     let Some(text) = name.as_str().strip_prefix(PREFIX) else { return registry };
     if registry.has(name) {
         return registry;
@@ -41,7 +41,7 @@ pub fn with_command(registry: Registry, name: &PolicyName, settings: &Settings) 
 }
 
 /// The pool of a command that answers, and what identifies the command.
-fn prepare(text: &str, settings: &Settings) -> Result<(Pool, Option<String>), String> {
+fn prepare(text: &str, settings: &ProcessSettings) -> Result<(Pool, Option<String>), String> {
     let command = Command::parse(text)?;
     let hash = command.hash();
     let pool = Pool::new(command, settings.clone()).map_err(|error| format!("no thread is left for it: {error}"))?;

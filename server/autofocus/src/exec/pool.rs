@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::command::Command;
 use super::process::Process;
-use super::settings::Settings;
+use super::settings::ProcessSettings;
 use parfocal_base::clock::Moment;
 use parfocal_base::priority;
 
@@ -46,7 +46,7 @@ pub struct Pool(Arc<Shared>);
 pub struct Shared {
     command: Command,
     /// How they run.
-    pub settings: Settings,
+    pub settings: ProcessSettings,
     inner: Arc<Inner>,
 }
 
@@ -83,7 +83,7 @@ impl Pool {
     ///
     /// # Errors
     /// If the system has no thread left.
-    pub fn new(command: Command, settings: Settings) -> io::Result<Self> {
+    pub fn new(command: Command, settings: ProcessSettings) -> io::Result<Self> {
         let shared = Arc::new(Shared { command, settings, inner: Arc::default() });
         let keeper = Shared::clone(&shared);
         // The kernel ends a process with the thread that started it, so this one lasts as long as the pool.

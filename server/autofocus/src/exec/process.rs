@@ -21,7 +21,7 @@ use socket2::{Domain, Socket, Type};
 
 use super::command::Command;
 use super::framing::{ANSWER_BYTES, Answer, BELIEF_AT, Kind, MEMORY_BYTES, Question, Saying};
-use super::settings::Settings;
+use super::settings::ProcessSettings;
 use crate::{Decision, Fault, Observation};
 use parfocal_base::{BlurRate, FocalPower, priority};
 use parfocal_imaging::{PATCH_SIDE, Patch, View, WIDER};
@@ -50,7 +50,7 @@ impl Process {
     ///
     /// # Errors
     /// If it cannot be started, ends, sends something else, or is not ready in time.
-    pub fn start(command: &Command, settings: &Settings) -> Result<Self, String> {
+    pub fn start(command: &Command, settings: &ProcessSettings) -> Result<Self, String> {
         let (socket, theirs) = Socket::pair(Domain::UNIX, Type::SEQPACKET, None).map_err(no_means)?;
         let memory = memory().map_err(no_means)?;
         let their_memory = memory.try_clone().map_err(no_means)?;
@@ -84,7 +84,7 @@ impl Process {
     ///
     /// # Errors
     /// If it does not answer with focal powers.
-    pub fn tried(mut self, settings: &Settings) -> Result<Self, String> {
+    pub fn tried(mut self, settings: &ProcessSettings) -> Result<Self, String> {
         let textured = |index: usize| f32::from((index * 7919 + index * index * 31) as u8);
         let tests: [(&dyn Fn(usize) -> f32, Duration); 2] =
             [(&|_| 128.0, settings.start), (&textured, settings.answer)];

@@ -8,7 +8,7 @@ use parfocal_base::clock::Clock;
 
 /// How policies' processes run.
 #[derive(Clone)]
-pub struct Settings {
+pub struct ProcessSettings {
     /// The program whose hidden command [`LAUNCH`] turns into a process.
     pub launcher: PathBuf,
     /// The clock for limits and backoff.

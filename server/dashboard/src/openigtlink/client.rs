@@ -15,7 +15,7 @@ use tokio::time::timeout;
 
 use super::frame_messages::{self, FrameMessages};
 use super::message::{HEADER_BYTES, Header, Version};
-use super::{Source, condition};
+use super::{LinkSource, condition};
 
 /// A client that takes nothing for so long is disconnected.
 const STUCK: Duration = Duration::from_secs(10);
@@ -50,7 +50,7 @@ pub async fn serve(
     stream: TcpStream,
     peer: SocketAddr,
     messages: watch::Receiver<Option<Arc<FrameMessages>>>,
-    source: &Source,
+    source: &LinkSource,
 ) {
     // A picture must not wait for the acknowledgement of the one before.
     let _ = stream.set_nodelay(true);
@@ -104,7 +104,7 @@ async fn listen(mut from: OwnedReadHalf, shared: &Shared) -> End {
 async fn tell(
     mut to: OwnedWriteHalf,
     mut messages: watch::Receiver<Option<Arc<FrameMessages>>>,
-    source: &Source,
+    source: &LinkSource,
     shared: &Shared,
 ) -> End {
     let mut states = source.status.clone();
@@ -140,7 +140,12 @@ async fn tell(
 }
 
 /// Sends a frame.
-async fn show(to: &mut OwnedWriteHalf, messages: &FrameMessages, source: &Source, shared: &Shared) -> Result<(), End> {
+async fn show(
+    to: &mut OwnedWriteHalf,
+    messages: &FrameMessages,
+    source: &LinkSource,
+    shared: &Shared,
+) -> Result<(), End> {
     // A session may have begun since it was made.
     if messages.tells_focal_power() && (source.blinded)() {
         return Ok(());

@@ -34,7 +34,7 @@ const MOST_CLIENTS: usize = 16;
 const REFUSED: Duration = Duration::from_millis(200);
 
 /// Where pictures and states come from.
-pub struct Source {
+pub struct LinkSource {
     /// The loop's frames.
     pub live: LiveHandle,
     /// The loop's state.
@@ -51,7 +51,7 @@ pub struct Source {
 
 /// What clients get.
 #[derive(Debug, Clone, Copy)]
-pub struct Settings {
+pub struct LinkSettings {
     /// Size of the pictures.
     pub size: Size,
     /// Most pictures a second.
@@ -62,7 +62,7 @@ pub struct Settings {
 ///
 /// # Errors
 /// If the system has no thread left.
-pub async fn run(listener: TcpListener, source: Source, settings: Settings) -> io::Result<()> {
+pub async fn run(listener: TcpListener, source: LinkSource, settings: LinkSettings) -> io::Result<()> {
     let source = Arc::new(source);
     let (messages, _) = watch::channel(None);
     let arrived = Arc::new(Notify::new());
@@ -90,7 +90,7 @@ pub async fn run(listener: TcpListener, source: Source, settings: Settings) -> i
 
 async fn accept(
     listener: &TcpListener,
-    source: &Arc<Source>,
+    source: &Arc<LinkSource>,
     messages: &watch::Sender<Option<Arc<FrameMessages>>>,
     arrived: &Notify,
 ) {
@@ -140,8 +140,8 @@ fn condition(status: &ControlStatus) -> (u16, &'static str, &'static str) {
 
 /// Makes the pictures while there are clients.
 struct FramePublisher {
-    source: Arc<Source>,
-    settings: Settings,
+    source: Arc<LinkSource>,
+    settings: LinkSettings,
     developer: Developer,
     messages: watch::Sender<Option<Arc<FrameMessages>>>,
     arrived: Arc<Notify>,
@@ -157,7 +157,7 @@ impl FramePublisher {
         }
     }
 
-    async fn work(&mut self, source: &Source) {
+    async fn work(&mut self, source: &LinkSource) {
         /// Time after which a client that left is noticed while no frames come.
         const LOOK: Duration = Duration::from_secs(1);
 
@@ -189,7 +189,7 @@ impl FramePublisher {
     fn messages_of(
         &mut self,
         frame: &ControlledFrame,
-        source: &Source,
+        source: &LinkSource,
         rgb: &mut RgbImage,
         gray: &mut GrayImage,
     ) -> FrameMessages {

@@ -11,7 +11,7 @@ use parfocal_base::clock::Moment;
 use parfocal_imaging::RgbImage;
 
 /// Something that can be looked at through a lens.
-pub trait View: Send {
+pub trait PlayedScene: Send {
     /// Why there may be no picture.
     type Error: Display;
 
@@ -33,7 +33,7 @@ pub struct Playback<V> {
     fault: Option<Arc<str>>,
 }
 
-impl<V: View> Playback<V> {
+impl<V: PlayedScene> Playback<V> {
     /// Plays `view` from now on.
     pub fn new(name: String, view: V, settings: CameraSettings) -> Self {
         let start = settings.clock.now();
@@ -41,7 +41,7 @@ impl<V: View> Playback<V> {
     }
 }
 
-impl<V: View> Camera for Playback<V> {
+impl<V: PlayedScene> Camera for Playback<V> {
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
         let number = self.pace.wait(&*self.settings.clock, timeout)?;
         let looked = self.settings.clock.now();

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
-use super::optotune::{OptotuneLens, Settings};
+use super::optotune::{DriverSettings, OptotuneLens};
 use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, MILLIS, Optics};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
@@ -43,7 +43,7 @@ impl EmulatedLens {
             emulator.set_temperature(celsius);
         }
 
-        let lens = OptotuneLens::connect(emulator.path(), Settings::default(), clock)?;
+        let lens = OptotuneLens::connect(emulator.path(), DriverSettings::default(), clock)?;
         emulator.set_fault(fault.unwrap_or_default());
 
         Ok(Self { lens, emulator })

@@ -61,7 +61,7 @@ impl EvaluatedScans {
 
 /// The result of `evaluate`. docs/scripting.md promises the names of its fields.
 #[derive(Debug, Clone, Serialize)]
-pub struct Report {
+pub struct EvaluationReport {
     /// What was evaluated.
     #[serde(flatten)]
     pub subject: EvaluatedScans,
@@ -96,7 +96,7 @@ const ROBOTIC: [PaperRow; 6] = [
     ("cnn-learned", 0.070, 0.099, 79.1),
 ];
 
-impl Report {
+impl EvaluationReport {
     /// The table as Markdown, beside the paper's figures on scans of the same kind; then the tests,
     /// and what was evaluated.
     #[must_use]
@@ -354,7 +354,7 @@ mod tests {
         errors.map(|error| Path { focal_power: vec![0.5], optimum: vec![0.5 + error], ..Path::default() }).to_vec()
     }
 
-    fn report() -> Report {
+    fn report() -> EvaluationReport {
         let outcome = |(name, paths): (&str, Vec<Path>)| Outcome { policy: name.to_owned(), paths, parts: 1 };
         let outcomes = [
             (ORACLE, path([0.0; 4])),
@@ -372,7 +372,7 @@ mod tests {
             weights_folder: Some("runs/x".to_owned()),
             weights: [(PolicyName::new("near"), "0123456789abcdef".repeat(4))].into(),
         };
-        Report { subject, without_detail: 1, comparisons: crate::evaluation::compare(&rows), rows }
+        EvaluationReport { subject, without_detail: 1, comparisons: crate::evaluation::compare(&rows), rows }
     }
 
     #[test]
@@ -401,7 +401,7 @@ mod tests {
             outcome("c", [0.10, 0.14, 0.14, 0.18]),
         ];
         let rows: Vec<Row> = outcomes.iter().map(Outcome::row).collect();
-        let report = Report { comparisons: crate::evaluation::compare(&rows), rows, ..report() };
+        let report = EvaluationReport { comparisons: crate::evaluation::compare(&rows), rows, ..report() };
         let text = report.markdown();
         assert!(text.contains("exact; after the slash, corrected by Holm's method for 3 comparisons:\n"), "{text}");
         assert!(text.contains("| a | 0.125 / 0.375 | 0.125 / 0.375 |\n"), "{text}");

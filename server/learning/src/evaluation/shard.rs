@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::report::{EvaluatedScans, Report};
+use super::report::{EvaluatedScans, EvaluationReport};
 use super::rollout::Path;
 use super::{Outcome, ScanSet, compare};
 use crate::scans::FocalTimeScan;
@@ -190,7 +190,7 @@ impl Shard {
 ///
 /// # Errors
 /// If they belong to several evaluations, some are missing, or there was nothing to focus on.
-pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>), MergeError> {
+pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<Outcome>), MergeError> {
     if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
         return Err(MergeError::NoShard(name.clone()));
     }
@@ -231,7 +231,7 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>),
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
     let comparisons = compare(&rows);
 
-    Ok((Report { subject, without_detail, rows, comparisons }, outcomes))
+    Ok((EvaluationReport { subject, without_detail, rows, comparisons }, outcomes))
 }
 
 /// The paths of the policy at `index` over all scans, in the order of the set.

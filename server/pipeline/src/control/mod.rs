@@ -20,7 +20,7 @@ pub use lock::{FocusLock, LockWatch};
 pub use pilot::HoldReason;
 pub use runner::keep_policies_quiet;
 pub use slot::LatestSlot;
-pub use spawn::{ControlLoop, Rig, Settings};
+pub use spawn::{ControlLoop, LoopSettings, Rig};
 pub use stepper::Stepper;
 pub use tap::Tap;
 pub use window::LatencyFigures;

@@ -19,7 +19,7 @@ const TIMEOUT: Duration = Duration::from_millis(200);
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// A camera that runs on its own thread: its frames and its health.
-pub struct Source {
+pub struct FrameSource {
     /// The slot with the latest frame.
     pub frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
@@ -27,7 +27,7 @@ pub struct Source {
     ended: Receiver<()>,
 }
 
-impl Source {
+impl FrameSource {
     /// Starts a thread that takes frames from `camera`.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ struct Feed {
     frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
     stop: Arc<AtomicBool>,
-    /// Dropped when the thread ends, which wakes [`Source::stop`].
+    /// Dropped when the thread ends, which wakes [`FrameSource::stop`].
     _ending: SyncSender<()>,
 }
 

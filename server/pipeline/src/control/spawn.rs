@@ -12,7 +12,7 @@ use super::eye::Eye;
 use super::lock::{FocusLock, LockWatch};
 use super::pilot::HoldReason;
 use super::runner::guarded;
-use super::source::Source;
+use super::source::FrameSource;
 use super::stepper::Stepper;
 use super::tap::Tap;
 use super::window::LatencyWindow;
@@ -51,7 +51,7 @@ pub struct Rig {
 
 /// How the loop runs.
 #[derive(Debug, Clone, Copy)]
-pub struct Settings {
+pub struct LoopSettings {
     /// Time between two frames. It is also the longest wait for a policy's answer.
     pub frame_period: Duration,
     /// Capacity of the telemetry channel, in records. Further records are dropped.
@@ -74,14 +74,14 @@ impl ControlLoop {
     ///
     /// # Errors
     /// If the system has no thread left.
-    pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
+    pub fn spawn(settings: LoopSettings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
         let Rig { camera, lens, reconstructor, registry, clock } = rig;
         let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
         let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period)
             .moving(dynamics);
 
         let controls = camera.controls();
-        let source = Source::start(camera)?;
+        let source = FrameSource::start(camera)?;
 
         let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));
         let (commands_in, commands) = mpsc::unbounded_channel();
@@ -129,7 +129,7 @@ struct Outlets {
 /// The state of the loop's thread.
 struct Worker {
     stepper: Stepper,
-    source: Source,
+    source: FrameSource,
     clock: Arc<dyn Clock>,
     outlets: Outlets,
     /// Read only for the status.
@@ -152,7 +152,7 @@ struct Worker {
 impl Worker {
     fn new(
         stepper: Stepper,
-        source: Source,
+        source: FrameSource,
         clock: Arc<dyn Clock>,
         outlets: Outlets,
         controls: Option<Controls>,

@@ -9,7 +9,7 @@ mod view;
 pub use fit::{Fit, Sample};
 pub use plot::plot;
 pub use steps::{Measurement, Plan, measure};
-pub use view::View;
+pub use view::CameraView;
 
 use crate::control::HoldReason;
 use parfocal_devices::camera::CameraError;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::curve::Flank;
 use super::fit::{Fit, Sample};
-use super::{MeasurementError, View};
+use super::{CameraView, MeasurementError};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
 use parfocal_devices::lens::Lens;
@@ -57,7 +57,7 @@ pub struct Measurement {
 /// If lens or camera fail, or the picture does not show enough. The error says what to do.
 pub fn measure(
     lens: &mut dyn Lens,
-    view: &mut View,
+    view: &mut CameraView,
     plan: Plan,
     pause: &dyn Fn(Duration),
 ) -> Result<Measurement, MeasurementError> {
@@ -91,7 +91,7 @@ pub fn measure(
 /// The lens and the camera that are measured.
 struct TestBench<'a> {
     lens: &'a mut dyn Lens,
-    view: &'a mut View,
+    view: &'a mut CameraView,
     plan: Plan,
 }
 

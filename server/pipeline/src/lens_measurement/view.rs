@@ -14,13 +14,13 @@ use parfocal_devices::camera::{Camera, CameraError};
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A camera's view, reduced to one number a frame.
-pub struct View {
+pub struct CameraView {
     camera: Box<dyn Camera>,
     eye: Eye,
     clock: Arc<dyn Clock>,
 }
 
-impl View {
+impl CameraView {
     /// The view of `camera` through `eye`, whose patch is at the picture's centre.
     #[must_use]
     pub fn new(camera: Box<dyn Camera>, eye: Eye, clock: Arc<dyn Clock>) -> Self {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::error::PackageError;
-use super::source::{SESSIONS, Source, exports_of, left_out};
+use super::source::{PackageSource, SESSIONS, exports_of, left_out};
 use super::writing::{Sessions, sums, write};
 use parfocal_records::store::Head;
 use parfocal_records::store::export::verify::{Check, Verdict, not_part};
@@ -42,7 +42,7 @@ pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
 
 /// Looks for the row of the chain that `expected` names. Each site has its own chain, and each export contains its
 /// site's chain up to the export.
-fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
+fn head(sources: &[PackageSource], expected: &Head) -> Result<Verdict, String> {
     for source in sources {
         let export = ExportFiles::of(&source.folder);
         let hashes = export.cells("chain.csv", "hash")?;
@@ -60,8 +60,8 @@ fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
 }
 
 /// The exports of a package, verified.
-fn sources(folder: &Path) -> Result<Vec<Source>, PackageError> {
-    exports_of(folder)?.iter().map(|export| Source::open(export)).collect()
+fn sources(folder: &Path) -> Result<Vec<PackageSource>, PackageError> {
+    exports_of(folder)?.iter().map(|export| PackageSource::open(export)).collect()
 }
 
 fn checksums(folder: &Path) -> Result<Verdict, String> {
@@ -73,7 +73,7 @@ fn checksums(folder: &Path) -> Result<Verdict, String> {
 }
 
 /// Joins the exports again, and compares every file.
-fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
+fn tables(folder: &Path, sources: &[PackageSource]) -> Result<Verdict, String> {
     let package = ExportFiles::of(folder).json("datapackage.json")?;
     let described = &package["parfocal"];
     let version = described["version"].as_str().unwrap_or_default();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
 
-use super::source::{LeftOut, Source};
+use super::source::{LeftOut, PackageSource};
 use super::table::JoinedTable;
 use parfocal_records::store::export::{Column, FORMAT, TEXTS_IN_CSV, Type};
 
@@ -21,7 +21,7 @@ const ABOUT: &str = "A study, joined from the exports of its sessions by parfoca
 pub const KIND: &str = "study";
 
 /// `datapackage.json` of a package with `tables`, joined from `sources`.
-pub fn describe(sources: &[Source], tables: &[JoinedTable], left_out: &[LeftOut]) -> Value {
+pub fn describe(sources: &[PackageSource], tables: &[JoinedTable], left_out: &[LeftOut]) -> Value {
     let study = sources.first().map(|source| source.study.as_str()).unwrap_or_default();
     let blinded = sources.first().is_none_or(|source| source.blinded);
     let sites: BTreeSet<&str> = sources.iter().map(|source| source.site.as_str()).collect();

@@ -3,18 +3,18 @@
 use std::collections::HashSet;
 
 use super::error::PackageError;
-use super::source::Source;
+use super::source::PackageSource;
 use super::table::{JoinedTable, Origin};
 
 /// Whether any of `sources` has the table. Blinded exports lack the tables that reveal the policies.
-pub fn is_there(table: &JoinedTable, sources: &[Source]) -> bool {
+pub fn is_there(table: &JoinedTable, sources: &[PackageSource]) -> bool {
     sources.iter().any(|source| source.folder.join(table.table.file()).exists())
 }
 
 /// Calls `take` with the cells of each row of `table`, as they are in the exports' CSV files.
 pub fn rows(
     table: &JoinedTable,
-    sources: &[Source],
+    sources: &[PackageSource],
     mut take: impl FnMut(&[&str]) -> Result<(), PackageError>,
 ) -> Result<(), PackageError> {
     let mut known: HashSet<Vec<String>> = HashSet::new();

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use super::error::PackageError;
 use super::join::rows;
 use super::labels::label;
-use super::source::Source;
+use super::source::PackageSource;
 use super::table::JoinedTable;
 use parfocal_records::store::export::{Column, Type};
 
@@ -78,7 +78,7 @@ pub fn dictionary(instruments: &[&JoinedTable]) -> Result<Vec<u8>, csv::Error> {
 }
 
 /// The file for REDCap's data import, as CSV.
-pub fn import(instruments: &[&JoinedTable], sources: &[Source]) -> Result<Vec<u8>, PackageError> {
+pub fn import(instruments: &[&JoinedTable], sources: &[PackageSource]) -> Result<Vec<u8>, PackageError> {
     let unwritable = || PackageError::unwritable::<csv::Error>("redcap/import.csv");
     let mut csv = csv::Writer::from_writer(Vec::new());
 

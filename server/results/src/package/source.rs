@@ -29,7 +29,7 @@ pub struct LeftOut {
 
 /// A verified export of a session of a study.
 #[derive(Debug, Clone)]
-pub struct Source {
+pub struct PackageSource {
     /// Folder of the export.
     pub folder: PathBuf,
     /// The session.
@@ -46,7 +46,7 @@ pub struct Source {
     head: (u64, String),
 }
 
-impl Source {
+impl PackageSource {
     /// Verifies the export in `folder`.
     ///
     /// # Errors
@@ -152,9 +152,9 @@ pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
 
 /// Checks that `sources` belong together: one study with one definition, all blinded or none, no session twice, and one
 /// chain per site.
-pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
+pub fn agree(sources: &[PackageSource]) -> Result<(), PackageError> {
     let Some(first) = sources.first() else { return Ok(()) };
-    let mut seen: BTreeMap<&str, &Source> = BTreeMap::new();
+    let mut seen: BTreeMap<&str, &PackageSource> = BTreeMap::new();
     for source in sources {
         if source.study != first.study {
             let reason = format!("one is of study '{}', the other of '{}'", first.study, source.study);
@@ -175,7 +175,7 @@ pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
 
     let sites: BTreeSet<&str> = sources.iter().map(|source| source.site.as_str()).collect();
     for site in sites {
-        let of_site: Vec<&Source> = sources.iter().filter(|source| source.site == site).collect();
+        let of_site: Vec<&PackageSource> = sources.iter().filter(|source| source.site == site).collect();
         one_chain(&of_site)?;
     }
     Ok(())
@@ -183,7 +183,7 @@ pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
 
 /// Checks that the heads of all `sources`, which are of one site, are in the longest chain among them. If one is not, a
 /// record was rewritten between two exports, or two databases have the same site name.
-fn one_chain(sources: &[&Source]) -> Result<(), PackageError> {
+fn one_chain(sources: &[&PackageSource]) -> Result<(), PackageError> {
     let Some(longest) = sources.iter().max_by_key(|source| source.head.0) else { return Ok(()) };
     let export = ExportFiles::of(&longest.folder);
     let column =

@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use super::error::PackageError;
 use super::join::rows;
 use super::labels::{cut, label};
-use super::source::Source;
+use super::source::PackageSource;
 use super::table::JoinedTable;
 use parfocal_records::store::export::{Column, Type};
 
@@ -48,7 +48,7 @@ struct Variable {
 }
 
 /// Writes the file `path` with the rows of `table`.
-pub fn write(path: &Path, table: &JoinedTable, sources: &[Source]) -> Result<(), PackageError> {
+pub fn write(path: &Path, table: &JoinedTable, sources: &[PackageSource]) -> Result<(), PackageError> {
     let (variables, cases) = variables(table, sources)?;
     let file = File::create(path).map_err(PackageError::unwritable(path))?;
     let mut out = BufWriter::new(file);
@@ -68,7 +68,7 @@ pub fn write(path: &Path, table: &JoinedTable, sources: &[Source]) -> Result<(),
 }
 
 /// The variables of `table`, as wide as their longest text, and the number of rows.
-fn variables(table: &JoinedTable, sources: &[Source]) -> Result<(Vec<Variable>, usize), PackageError> {
+fn variables(table: &JoinedTable, sources: &[PackageSource]) -> Result<(Vec<Variable>, usize), PackageError> {
     let columns: Vec<Column> = table.columns().copied().collect();
     let mut widths = vec![1; columns.len()];
     let mut cases = 0;

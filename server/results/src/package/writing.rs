@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::error::PackageError;
 use super::parquet::ParquetFile;
-use super::source::{LeftOut, SESSIONS, Source, agree};
+use super::source::{LeftOut, PackageSource, SESSIONS, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, playable, r, redcap, spss};
 use parfocal_base::files::{files_below, is_new_or_empty, is_systems_own, put_folder, sync_folder_of, write_through};
@@ -51,7 +51,7 @@ pub enum Sessions {
 /// # Errors
 /// If there is no source, two of them do not belong together, or a file cannot be read or written.
 pub fn write(
-    sources: &[Source],
+    sources: &[PackageSource],
     sessions: Sessions,
     left_out: &[LeftOut],
     out: &Path,
@@ -93,7 +93,7 @@ fn check_new(out: &Path) -> Result<(), PackageError> {
 }
 
 fn fill(
-    sources: &[Source],
+    sources: &[PackageSource],
     sessions: Sessions,
     left_out: &[LeftOut],
     folder: &Path,
@@ -131,7 +131,7 @@ struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], progress: StepsCallback<'a>) -> Self {
+    fn new(sources: &[PackageSource], sessions: Sessions, tables: &[JoinedTable], progress: StepsCallback<'a>) -> Self {
         let copied = if sessions == Sessions::Copied { sources.len() } else { 0 };
         let joined = tables.iter().map(|table| if table.long { sources.len() } else { 1 });
         let all = copied + joined.sum::<usize>() + 1;
@@ -148,7 +148,12 @@ impl<'a> Steps<'a> {
 }
 
 /// Joins all tables. The long ones take most of the time; each is joined on a thread of its own beside the others.
-fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
+fn join_tables(
+    tables: &[JoinedTable],
+    sources: &[PackageSource],
+    folder: &Path,
+    steps: &Steps,
+) -> Result<(), PackageError> {
     let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
     thread::scope(|scope| {
         let begin = |table| scope.spawn(move || join_long(table, sources, folder, steps));
@@ -167,7 +172,7 @@ fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps:
 }
 
 /// Puts an export into the package `folder`. Returns the export at its new place.
-fn take(source: &Source, sessions: Sessions, folder: &Path) -> Result<Source, PackageError> {
+fn take(source: &PackageSource, sessions: Sessions, folder: &Path) -> Result<PackageSource, PackageError> {
     let place = folder.join(source.place());
     match sessions {
         Sessions::Copied => copy_folder(&source.folder, &place)?,
@@ -198,7 +203,7 @@ fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
 }
 
 /// Writes a table that has a row for each frame, only as Parquet.
-fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
+fn join_long(table: &JoinedTable, sources: &[PackageSource], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
     let mut parquet = ParquetFile::create(&folder.join(format!("{}.parquet", table.table.name)), table)?;
     for source in sources {
         join::rows(table, std::slice::from_ref(source), |cells| parquet.row(cells))?;
@@ -208,7 +213,7 @@ fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Ste
 }
 
 /// Writes any other table as Parquet, as CSV and for SPSS.
-fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+fn join_short(table: &JoinedTable, sources: &[PackageSource], folder: &Path) -> Result<(), PackageError> {
     let name = table.table.name;
     let mut parquet = ParquetFile::create(&folder.join(format!("{name}.parquet")), table)?;
     let path = folder.join(table.table.file());
@@ -229,7 +234,7 @@ fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<
 }
 
 /// Writes the files for R and REDCap.
-fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+fn beside(tables: &[JoinedTable], sources: &[PackageSource], folder: &Path) -> Result<(), PackageError> {
     let short: Vec<JoinedTable> = tables.iter().filter(|table| !table.long).cloned().collect();
     write_file(folder, "load.R", r::script(&short).as_bytes())?;
 
@@ -241,7 +246,7 @@ fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(
 }
 
 /// Writes the recordings of voice comments as players expect them, under the names that the table `voice` has.
-fn recordings(sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+fn recordings(sources: &[PackageSource], folder: &Path) -> Result<(), PackageError> {
     for source in sources {
         let export = ExportFiles::of(&source.folder);
         let column = |name| export.cells("voice.csv", name).map_err(PackageError::unreadable(&source.folder));

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
-use super::making::{ExportedStudy, Progress, export_study};
+use super::making::{ExportProgress, ExportedStudy, export_study};
 use parfocal_base::ids::SessionId;
 use parfocal_records::downloads::{Downloads, Stage};
 use parfocal_records::store::{AccessLog, Reader, StoreError};
@@ -26,7 +26,7 @@ const OUTDATED: &str = "a surgeon has withdrawn or words were erased after this 
 
 /// The latest export of each study. What is ordered is whether it contains the policies.
 #[derive(Clone)]
-pub struct StudyExports(Downloads<bool, Progress, FinishedExport>);
+pub struct StudyExports(Downloads<bool, ExportProgress, FinishedExport>);
 
 /// A finished export. Its folder is removed when the last clone is dropped.
 #[derive(Clone)]
@@ -56,7 +56,7 @@ pub enum StudyExportState {
         /// Whether the export will contain the policies.
         unblinded: bool,
         /// Progress of the export.
-        progress: Progress,
+        progress: ExportProgress,
     },
     /// The export can be downloaded.
     Ready {

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
-use crate::package::{self, LeftOut, Sessions, Source, Summary};
+use crate::package::{self, LeftOut, PackageSource, Sessions, Summary};
 use parfocal_base::files::files_below;
 use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
@@ -30,7 +30,7 @@ const AT_A_TIME: usize = 4;
 /// The progress of an export.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
 #[schema(as = StudyExportProgress)]
-pub struct Progress {
+pub struct ExportProgress {
     /// Number of sessions to export.
     pub sessions: usize,
     /// Number of sessions that are exported and verified.
@@ -42,7 +42,7 @@ pub struct Progress {
 }
 
 /// A callback that is given the progress of an export.
-pub type ProgressCallback = Arc<dyn Fn(Progress) + Send + Sync>;
+pub type ProgressCallback = Arc<dyn Fn(ExportProgress) + Send + Sync>;
 
 /// A package, and the sessions in it.
 pub struct ExportedStudy {
@@ -148,13 +148,13 @@ impl Making {
 
         let all = self.sessions.len();
         let summary = package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
-            (self.progress)(Progress { sessions: all, exported: all, steps, joined });
+            (self.progress)(ExportProgress { sessions: all, exported: all, steps, joined });
         })?;
         Ok(summary)
     }
 
     /// Exports and verifies each session into a folder of its own below `folder`.
-    fn export_sessions(&self, runtime: &Handle, folder: &Path) -> Result<Vec<Source>, StudyExportError> {
+    fn export_sessions(&self, runtime: &Handle, folder: &Path) -> Result<Vec<PackageSource>, StudyExportError> {
         let processors = thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let work = Work {
             making: self,
@@ -179,7 +179,7 @@ impl Making {
     }
 
     fn tell(&self, exported: usize) {
-        (self.progress)(Progress { sessions: self.sessions.len(), exported, steps: 0, joined: 0 });
+        (self.progress)(ExportProgress { sessions: self.sessions.len(), exported, steps: 0, joined: 0 });
     }
 }
 
@@ -193,7 +193,7 @@ struct Work<'a> {
     /// Whether an export failed, so that the other threads can stop.
     stopped: AtomicBool,
     /// The finished exports, each with the session's index in the study.
-    exported: Mutex<Vec<(usize, Source)>>,
+    exported: Mutex<Vec<(usize, PackageSource)>>,
     /// Held while an export is prepared. An export ends with its own record in the chain, so two exports must not be
     /// recorded at the same moment.
     turn: tokio::sync::Mutex<()>,
@@ -213,7 +213,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    fn export(&self, session: SessionId) -> Result<Source, StudyExportError> {
+    fn export(&self, session: SessionId) -> Result<PackageSource, StudyExportError> {
         check_room(self.folder, 1)?;
         let folder = self.folder.join(session.to_string());
         self.runtime.block_on(async {
@@ -222,7 +222,7 @@ impl Work<'_> {
             drop(turn);
             export.into_folder(&folder).await
         })?;
-        Ok(Source::open(&folder)?)
+        Ok(PackageSource::open(&folder)?)
     }
 }
 

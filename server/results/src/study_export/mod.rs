@@ -7,4 +7,4 @@ mod making;
 
 pub use self::background::{FinishedExport, StudyExportState, StudyExports};
 pub use self::error::StudyExportError;
-pub use self::making::{Progress, check, export_study};
+pub use self::making::{ExportProgress, check, export_study};

@@ -29,7 +29,7 @@ use parfocal_trial::role::Role;
 use parfocal_trial::session::{
     Plan, SessionState, decide, decide_by_hand, decide_choice, decide_small_picture, decide_tablet, decide_time,
 };
-use parfocal_trial::tablet::{PictureSize, Presence, Report};
+use parfocal_trial::tablet::{PictureSize, Presence, TabletReport};
 use parfocal_trial::unblinding::Circumstances;
 use parfocal_trial::view::CommentLine;
 
@@ -353,7 +353,7 @@ impl Course {
     }
 
     /// Follows what the surgeon's tablets report. Returns whether there is something to record.
-    pub fn follow_tablets(&mut self, report: &Report, at: Moment, wall: Timestamp) -> bool {
+    pub fn follow_tablets(&mut self, report: &TabletReport, at: Moment, wall: Timestamp) -> bool {
         let before = self.events.len();
         let system = |cause| Stop { by: Role::System.into(), cause, at, wall };
 
@@ -372,7 +372,7 @@ impl Course {
     }
 
     /// Notes the pictures of `report` that were seen during an inspection.
-    fn see(&mut self, report: &Report, at: Moment, wall: Timestamp) {
+    fn see(&mut self, report: &TabletReport, at: Moment, wall: Timestamp) {
         let Some(segment) = self.state.segment().filter(|_| self.state.running()) else {
             self.seen_pictures = None;
             self.small_since = None;

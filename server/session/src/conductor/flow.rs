@@ -22,7 +22,7 @@ use parfocal_trial::phase::Phase;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::decide_restart;
 use parfocal_trial::study::signature::Signature;
-use parfocal_trial::tablet::{Presence, Report};
+use parfocal_trial::tablet::{Presence, TabletReport};
 
 /// How long the screens wait until a stop is on disk. After that they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
@@ -227,7 +227,7 @@ impl Shared {
     }
 
     /// Follows what the surgeon's tablets report. May pause the session, which does not wait for the disk.
-    pub(super) async fn follow_tablets(self: &Arc<Self>, report: &Report) {
+    pub(super) async fn follow_tablets(self: &Arc<Self>, report: &TabletReport) {
         // On a slow link not every report has a picture; the last one is still on screen.
         if report.size.is_some() || report.presence != Presence::Present {
             self.store.note_surgeon_picture(report.size.map(|size| size.width));

@@ -48,11 +48,11 @@ use parfocal_trial::protocol::Record;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal_trial::role::Role;
 use parfocal_trial::study::signature::Signature;
-use parfocal_trial::tablet::Report;
+use parfocal_trial::tablet::TabletReport;
 use parfocal_trial::view::{OperatorView, SurgeonView};
 
 /// The parts that a conductor is made of.
-pub struct Parts {
+pub struct ConductorParts {
     /// The database.
     pub store: Store,
     /// The control loop.
@@ -155,8 +155,8 @@ impl Conductor {
     ///
     /// # Errors
     /// If the disk or database failed.
-    pub async fn open(parts: Parts) -> Result<Self, ConductError> {
-        let Parts { store, control, library, registry, clock, random, mut practice_random } = parts;
+    pub async fn open(parts: ConductorParts) -> Result<Self, ConductError> {
+        let ConductorParts { store, control, library, registry, clock, random, mut practice_random } = parts;
         practice_random.set_stream(u64::try_from(store.run()).unwrap_or_default());
         let run_clock = RunClock::of(&store).await?;
 
@@ -339,7 +339,7 @@ impl Conductor {
 
     /// Follows what the surgeon's tablets report: one that goes away or comes back, and what is seen on them, are
     /// recorded, and may pause the session. To be called a few times a second.
-    pub async fn follow_tablets(&self, report: Report) {
+    pub async fn follow_tablets(&self, report: TabletReport) {
         self.shared.follow_tablets(&report).await;
     }
 

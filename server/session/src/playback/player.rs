@@ -15,7 +15,7 @@ use super::spectrum::PlaceSpectrum;
 use crate::reports::{Played, Reports};
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::{Circle, Size};
-use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, Kind, RecordingError, belonging, of_session};
+use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, RecordingError, RecordingKind, belonging, of_session};
 use parfocal_trial::protocol::Record;
 use parfocal_trial::role::Role;
 
@@ -34,7 +34,7 @@ pub struct RecordingCourse {
     /// Name of the recording.
     pub name: String,
     /// Whether it consists of mosaics or of the view's pictures.
-    pub kind: Kind,
+    pub kind: RecordingKind,
     /// Time of the first frame, in seconds of the session's timeline; negative before the session's start.
     pub from: f64,
     /// Time of each frame, in whole milliseconds since the first. A frame's index in this list, from 0, identifies it.

@@ -7,7 +7,7 @@ mod starting;
 mod status;
 mod view;
 
-pub use parts::Parts;
+pub use parts::RecorderParts;
 pub use starting::StartError;
 pub use status::RecordingStatus;
 
@@ -36,7 +36,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Recordings(Arc<Shared>);
 
 struct Shared {
-    parts: Parts,
+    parts: RecorderParts,
     state: Mutex<State>,
     /// Held while a recording is being started or stopped.
     pen: Pen<()>,
@@ -72,7 +72,7 @@ struct Active {
 impl Recordings {
     /// A recorder that records nothing yet. It follows protocols only while [`Recordings::run`] is awaited.
     #[must_use]
-    pub fn new(parts: Parts) -> Self {
+    pub fn new(parts: RecorderParts) -> Self {
         Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
     }
 

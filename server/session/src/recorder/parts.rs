@@ -13,7 +13,7 @@ use parfocal_pipeline::control::{ControlStatus, Tap};
 use parfocal_pipeline::live::LiveHandle;
 
 /// The parts of the server that the recorder works with.
-pub struct Parts {
+pub struct RecorderParts {
     /// Monotonic and wall clock.
     pub clock: Arc<dyn Clock>,
     /// Number of this run of the server.

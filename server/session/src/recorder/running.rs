@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::view::ViewRecorder;
-use parfocal_recording::{Progress, Recorder};
+use parfocal_recording::{Recorder, RecordingProgress};
 use parfocal_trial::protocol::Record;
 
 /// A recording under way, by what it records.
@@ -16,7 +16,7 @@ pub enum Running {
 
 impl Running {
     /// Frames and bytes recorded so far, and how the recording ended if it has.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> RecordingProgress {
         match self {
             Self::Mosaic(recorder) => recorder.progress(),
             Self::View(recorder) => recorder.progress(),
@@ -40,7 +40,7 @@ impl Running {
     }
 
     /// Stops the recording and returns its final progress.
-    pub fn stop(self) -> Progress {
+    pub fn stop(self) -> RecordingProgress {
         match self {
             Self::Mosaic(recorder) => recorder.stop(),
             Self::View(recorder) => recorder.stop(),

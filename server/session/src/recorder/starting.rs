@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::parts::Parts;
+use super::parts::RecorderParts;
 use super::running::Running;
 use super::view::ViewRecorder;
 use parfocal_base::clock::Moment;
@@ -49,7 +49,7 @@ impl From<RecordingError> for StartError {
 /// # Errors
 /// If the camera has no mosaics, the disk has no room, or the recording cannot be written.
 pub fn start(
-    parts: &Parts,
+    parts: &RecorderParts,
     what: Record,
     session: Option<SessionId>,
     began: Moment,
@@ -69,7 +69,7 @@ pub fn start(
 }
 
 /// A folder that no recording has yet, named after the session or, without one, after the time.
-fn new_folder(parts: &Parts, session: Option<SessionId>) -> PathBuf {
+fn new_folder(parts: &RecorderParts, session: Option<SessionId>) -> PathBuf {
     let name = session
         .map_or_else(|| parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(), |session| session.to_string());
     let numbered = |number: u32| if number == 1 { name.clone() } else { format!("{name}-{number}") };
@@ -78,12 +78,12 @@ fn new_folder(parts: &Parts, session: Option<SessionId>) -> PathBuf {
 }
 
 fn record_mosaics(
-    parts: &Parts,
+    parts: &RecorderParts,
     folder: &Path,
     session: Option<String>,
     began: Moment,
 ) -> Result<Recorder, StartError> {
-    let Parts { clock, status, calibration, controls, size, .. } = parts;
+    let RecorderParts { clock, status, calibration, controls, size, .. } = parts;
     let size = size.ok_or(StartError::NoMosaics)?;
     let status = status.borrow().clone();
 
@@ -111,7 +111,7 @@ fn record_mosaics(
 }
 
 fn record_view(
-    parts: &Parts,
+    parts: &RecorderParts,
     folder: &Path,
     session: Option<String>,
     began: Moment,

@@ -11,12 +11,12 @@ use tokio::sync::Notify;
 use parfocal_base::clock::Moment;
 use parfocal_base::priority;
 use parfocal_pipeline::live::Follower;
-use parfocal_recording::{Ended, Progress, RecordingError, Room, ViewWriter, room};
+use parfocal_recording::{Ended, RecordingError, RecordingProgress, Room, ViewWriter, room};
 
 /// A recording of the view under way. Dropping it stops it.
 pub struct ViewRecorder {
     folder: PathBuf,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<RecordingProgress>>,
     stop: Arc<Notify>,
     thread: Option<JoinHandle<()>>,
 }
@@ -28,7 +28,7 @@ impl ViewRecorder {
     /// If the system cannot create a thread.
     pub fn start(writer: ViewWriter, follower: Follower, start: Moment) -> Result<Self, RecordingError> {
         let folder = writer.folder().to_owned();
-        let progress = Arc::new(Mutex::new(Progress::default()));
+        let progress = Arc::new(Mutex::new(RecordingProgress::default()));
         let stop = Arc::new(Notify::new());
 
         let runtime = Handle::current();
@@ -48,12 +48,12 @@ impl ViewRecorder {
     }
 
     /// Frames and bytes recorded so far, and how the recording ended if it has.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> RecordingProgress {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Stops the recording and returns its final progress.
-    pub fn stop(mut self) -> Progress {
+    pub fn stop(mut self) -> RecordingProgress {
         self.end();
         self.progress()
     }
@@ -78,7 +78,7 @@ struct Worker {
     writer: ViewWriter,
     follower: Follower,
     start: Moment,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<RecordingProgress>>,
     stop: Arc<Notify>,
 }
 

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 use crate::doctor::Tablet;
 use parfocal_base::clock::Moment;
-use parfocal_trial::tablet::{PictureSize, Presence, Report};
+use parfocal_trial::tablet::{PictureSize, Presence, TabletReport};
 
 /// A tablet that has not been heard for this long is away. Browsers answer a ping every second.
 const AWAY: Duration = Duration::from_secs(3);
@@ -91,10 +91,10 @@ impl OpenTablets {
     }
 
     /// What the tablets report at `now`, since the last report.
-    pub(super) fn report(&self, now: Moment) -> Report {
+    pub(super) fn report(&self, now: Moment) -> TabletReport {
         let mut pages = self.pages();
         let drawn = pages.drawn.take();
-        Report {
+        TabletReport {
             presence: pages.presence(now),
             size: drawn.map(|(size, _)| size),
             pictures: drawn.map_or(0, |(_, pictures)| pictures),

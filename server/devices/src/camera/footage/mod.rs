@@ -20,7 +20,7 @@ use std::time::Duration;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::playback::{Playback, View, base_name};
+use super::playback::{Playback, PlayedScene, base_name};
 use super::{Camera, CameraSettings};
 use crate::simulation::path::{Habit, Path};
 use defocus::Defocus;
@@ -63,7 +63,7 @@ pub fn open(path: &std::path::Path, settings: CameraSettings) -> Result<impl Cam
     Ok(Playback::new(name, Footage { reel, walk, blur, defocus: Defocus::default() }, settings))
 }
 
-impl View for Footage {
+impl PlayedScene for Footage {
     type Error = FootageError;
 
     fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), FootageError> {

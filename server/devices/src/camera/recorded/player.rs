@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::{Pose, ScanError, ScanFolder};
-use crate::camera::playback::{Playback, View, base_name};
+use crate::camera::playback::{Playback, PlayedScene, base_name};
 use crate::camera::{Camera, CameraSettings};
 use parfocal_base::FocalPower;
 use parfocal_imaging::{GrayImage, RgbImage};
@@ -23,7 +23,7 @@ pub fn open(path: &Path, settings: CameraSettings) -> Result<impl Camera + use<>
     Ok(Playback::new(name, scan, settings))
 }
 
-impl View for ScanFolder {
+impl PlayedScene for ScanFolder {
     type Error = ScanError;
 
     fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), ScanError> {

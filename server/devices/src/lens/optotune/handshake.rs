@@ -12,7 +12,7 @@ use crate::lens::LensError;
 
 /// How to use the lens.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct DriverSettings {
     /// Least dioptres to use; `None` for the device's own limit.
     pub min_dioptre: Option<f64>,
     /// Most dioptres to use; `None` for the device's own limit.
@@ -25,14 +25,14 @@ pub struct Settings {
     pub keep: bool,
 }
 
-impl Default for Settings {
+impl Default for DriverSettings {
     /// The whole range of dioptres; temperatures from a room's to that of a lens warmed by its own coil.
     fn default() -> Self {
         Self { min_dioptre: None, max_dioptre: None, temperatures: (20.0, 40.0), keep: false }
     }
 }
 
-impl Settings {
+impl DriverSettings {
     /// Checks that each range has its lower end below its upper end.
     pub(super) fn check(&self) -> Result<(), LensError> {
         let (low, high) = self.temperatures;
@@ -52,7 +52,7 @@ impl Settings {
 }
 
 /// Prepares the device behind `link` for commands.
-pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
+pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Result<Device, Trouble> {
     greet(link, path)?;
     if !settings.keep && !link.is_known() {
         let_go_first(link)?;
@@ -128,7 +128,7 @@ fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
 
 /// Sets the temperature limits, without which the driver refuses focal power mode, and then that mode. Returns the
 /// range of focal power from the last reply.
-fn control_focal_power(link: &mut Link, settings: &Settings) -> Result<Limits, Trouble> {
+fn control_focal_power(link: &mut Link, settings: &DriverSettings) -> Result<Limits, Trouble> {
     let (low, high) = settings.temperatures;
     let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };
     let Reply::TemperatureLimits(_) = link.ask(request).map_err(explain_incompatible)? else { return Err(confused()) };

@@ -1,7 +1,7 @@
 //! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
 //!
 //! The caller's side only touches memory; a separate thread talks to the port. When the lens is dropped, that thread
-//! puts the driver into current mode at 0 mA, unless [`Settings::keep`] is set. The lens then relaxes to its resting
+//! puts the driver into current mode at 0 mA, unless [`DriverSettings::keep`] is set. The lens then relaxes to its resting
 //! focal power and does not warm up. [`let_go_of_all`] does the same before a process ends in another way. Only
 //! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
 
@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-pub use handshake::Settings;
+pub use handshake::DriverSettings;
 use port::Address;
 use shared::{Device, Shared};
 
@@ -89,7 +89,7 @@ impl OptotuneLens {
     /// # Errors
     /// If the lens cannot be used right now. The error says why and what to do. The lens recovers from later failures
     /// by itself.
-    pub fn connect(path: &Path, settings: Settings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+    pub fn connect(path: &Path, settings: DriverSettings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let (lens, first) = Self::start(Address::Port(path.to_owned()), settings, clock)?;
         first.map(|_| lens)
     }
@@ -98,7 +98,7 @@ impl OptotuneLens {
     /// attempt.
     fn start(
         address: Address,
-        settings: Settings,
+        settings: DriverSettings,
         clock: Arc<dyn Clock>,
     ) -> Result<(Self, Result<Device, LensError>), LensError> {
         let response = Arc::new(Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE));
@@ -133,8 +133,8 @@ impl OptotuneLens {
         opening: Opening,
         clock: Arc<dyn Clock>,
     ) -> Result<Self, LensError> {
-        let (low, high) = Settings::default().temperatures;
-        let settings = Settings {
+        let (low, high) = DriverSettings::default().temperatures;
+        let settings = DriverSettings {
             min_dioptre: options.take_within("min", DIOPTRES, " dpt")?,
             max_dioptre: options.take_within("max", DIOPTRES, " dpt")?,
             temperatures: (

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::codec::{Reply, Request};
-use super::handshake::{self, Settings};
+use super::handshake::{self, DriverSettings};
 use super::link::{Link, SentCommand};
 use super::port::{Address, Port};
 use super::shared::{Device, Shared};
@@ -33,7 +33,7 @@ const GAP: Duration = Duration::from_millis(5);
 const RESENDS: u32 = 2;
 
 /// Serves the device at `address` until it must stop. Then removes the lens's current.
-pub fn run(shared: &Shared, address: &Address, settings: &Settings) {
+pub fn run(shared: &Shared, address: &Address, settings: &DriverSettings) {
     let mut backoff = BACKOFF_FIRST;
     // Once a port is found it stays the same, so that no other driver takes this one's place.
     let mut found = None;
@@ -72,7 +72,7 @@ fn located(address: &Address, found: &mut Option<PathBuf>) -> Result<PathBuf, Le
 fn attend<'a>(
     shared: &'a Shared,
     path: &Path,
-    settings: &Settings,
+    settings: &DriverSettings,
     link: &mut Option<Link<'a>>,
     backoff: &mut Duration,
 ) -> Trouble {
@@ -91,7 +91,7 @@ fn attend<'a>(
 }
 
 /// Sets zero current at the end, unless the lens must stay where it is. `link` is the connection, if it is still open.
-fn let_go(shared: &Shared, path: Option<&Path>, settings: &Settings, link: Option<Link>) {
+fn let_go(shared: &Shared, path: Option<&Path>, settings: &DriverSettings, link: Option<Link>) {
     // Never send anything to a device that is not a lens driver.
     if settings.keep || !shared.state().greeted {
         return;
@@ -118,7 +118,7 @@ fn close(mut link: Link) -> Result<(), String> {
 fn connect<'a, 'b>(
     shared: &'a Shared,
     path: &Path,
-    settings: &'b Settings,
+    settings: &'b DriverSettings,
     link: &'b mut Link<'a>,
 ) -> Result<Session<'a, 'b>, Trouble> {
     let mut device = handshake::perform(link, settings, path)?;
@@ -143,7 +143,7 @@ fn connect<'a, 'b>(
 /// A working connection.
 struct Session<'a, 'b> {
     shared: &'a Shared,
-    settings: &'b Settings,
+    settings: &'b DriverSettings,
     link: &'b mut Link<'a>,
     device: Device,
     next_reading: Moment,
@@ -244,7 +244,7 @@ impl Session<'_, '_> {
 }
 
 /// Describes the state of a connected device in one sentence.
-fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
+fn words(device: &Device, settings: &DriverSettings, line_errors: u64) -> Arc<str> {
     let Device { status, temperature, range, .. } = device;
     let line = match line_errors {
         0 => String::new(),

@@ -45,7 +45,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Progress of a training, reported after each leg.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Progress {
+pub struct TrainingProgress {
     /// Updates done so far.
     pub updates: u64,
     /// Mean loss over the leg.
@@ -191,7 +191,7 @@ impl Run {
         &mut self,
         clock: &dyn Clock,
         stop: &dyn Fn() -> bool,
-        tell: &mut dyn FnMut(&Progress),
+        tell: &mut dyn FnMut(&TrainingProgress),
     ) -> Result<bool, TrainError> {
         let folder = self.folder.path().to_owned();
         let file = |source| TrainError::writing(&folder, source);
@@ -214,7 +214,7 @@ impl Run {
                 self.save()?;
             }
 
-            tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
+            tell(&TrainingProgress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
 
         // A complete training was saved after its last leg.

@@ -4,7 +4,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
 use super::form::{Entry, Head, link, sealed};
-use super::kinds::{Kind, kind};
+use super::kinds::{RecordKind, kind};
 use super::records::{Record, one};
 use crate::store::StoreError;
 use crate::store::insert::Insert;
@@ -42,7 +42,7 @@ pub async fn append(
 /// Appends the row of `record`, which has this key.
 pub async fn append_record(
     connection: &mut SqliteConnection,
-    kind: &Kind,
+    kind: &RecordKind,
     key: &str,
     record: &Record,
     wall: &str,

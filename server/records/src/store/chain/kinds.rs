@@ -11,7 +11,7 @@ use crate::store::export::table::{Column, Proof, Row, Table, Type, means};
 
 /// A kind of record.
 #[derive(Debug)]
-pub struct Kind {
+pub struct RecordKind {
     /// Its name, as in the chain.
     pub name: &'static str,
     /// Name of its table in exports.
@@ -56,7 +56,7 @@ impl Kept {
         Self { of_session: false, ..self }
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> RecordKind {
         let columns = || {
             let of_table = self.table.columns.iter().map(|column| (column.name, column.proof, column.kind));
             of_table.chain(self.more.iter().map(|&(name, proof)| (name, proof, Type::String)))
@@ -76,7 +76,7 @@ impl Kept {
 
         let key: Vec<String> = self.table.key.iter().map(|column| format!("CAST({column} AS TEXT)")).collect();
         let one: Vec<String> = self.table.key.iter().map(|column| format!("{column} = ?")).collect();
-        Kind {
+        RecordKind {
             name: self.name,
             table: self.table.name,
             key: self.table.key,
@@ -190,13 +190,13 @@ const ALL: [Kept; 17] = [
 ];
 
 /// Every kind except telemetry.
-pub fn kinds() -> &'static [Kind] {
-    static KINDS: LazyLock<Vec<Kind>> = LazyLock::new(|| ALL.iter().map(Kept::kind).collect());
+pub fn kinds() -> &'static [RecordKind] {
+    static KINDS: LazyLock<Vec<RecordKind>> = LazyLock::new(|| ALL.iter().map(Kept::kind).collect());
     &KINDS
 }
 
 /// The kind called `name`.
-pub fn kind(name: &str) -> Option<&'static Kind> {
+pub fn kind(name: &str) -> Option<&'static RecordKind> {
     kinds().iter().find(|kind| kind.name == name)
 }
 

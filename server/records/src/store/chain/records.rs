@@ -7,7 +7,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow, SqliteValueRef};
 use sqlx::{AssertSqlSafe, Row, TypeInfo, ValueRef};
 
 use super::form::content;
-use super::kinds::{Kind, kinds};
+use super::kinds::{RecordKind, kinds};
 use crate::store::StoreError;
 
 /// A record, with each column as the CSV files have it.
@@ -25,13 +25,13 @@ pub struct Record {
 
 impl Record {
     /// Its hash. `kind` is its kind, and `sealed` the hash of its sealed columns.
-    pub fn content(&self, kind: &Kind, sealed: &str) -> String {
+    pub fn content(&self, kind: &RecordKind, sealed: &str) -> String {
         content(kind.name, kind.open.iter().copied().zip(self.open.iter().map(String::as_str)), sealed)
     }
 }
 
 /// The record of `kind` with this key.
-pub async fn one(connection: &mut SqliteConnection, kind: &Kind, key: &str) -> Result<Record, StoreError> {
+pub async fn one(connection: &mut SqliteConnection, kind: &RecordKind, key: &str) -> Result<Record, StoreError> {
     let mut query = sqlx::query(AssertSqlSafe(format!("{} WHERE {}", kind.select, kind.one)));
     for part in key.split('/') {
         query = query.bind(part);
@@ -55,7 +55,7 @@ pub async fn all(connection: &mut SqliteConnection) -> Result<BTreeMap<(&'static
     Ok(found)
 }
 
-fn record(kind: &Kind, row: &SqliteRow) -> Result<(String, Record), StoreError> {
+fn record(kind: &RecordKind, row: &SqliteRow) -> Result<(String, Record), StoreError> {
     let columns =
         |names: &[&str]| names.iter().map(|name| cell(row.try_get_raw(*name)?)).collect::<Result<Vec<_>, StoreError>>();
 

@@ -11,7 +11,7 @@ use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, ChainCheck, FoundEntry, FoundRow};
 use crate::store::chain::{
-    Block, Entry, Fields, Head, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
+    Block, Entry, Fields, Head, RecordKind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
 };
 use crate::store::export::description::{ALL, ChainRow};
 use crate::store::export::table::Row;
@@ -152,7 +152,7 @@ fn records(export: &ExportFiles) -> Result<BTreeMap<(&'static str, String), Reco
 
     let mut found = BTreeMap::new();
     // Some kinds have no table in exports: of participants, an export has only the session's code.
-    let is_exported = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table);
+    let is_exported = |kind: &&RecordKind| ALL.iter().any(|table| table.name == kind.table);
     for kind in kinds().iter().filter(is_exported) {
         for mut row in rows(export, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
