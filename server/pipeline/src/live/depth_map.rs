@@ -142,6 +142,7 @@ impl Worker {
     fn run(mut self) {
         parfocal_base::priority::lower_further();
         compute_on_this_thread();
+        let mut told = false;
         while !self.slot.is_closed() {
             let Some(frame) = self.slot.take(PATIENCE) else {
                 self.survey.end();
@@ -154,7 +155,11 @@ impl Worker {
             match map {
                 Ok(Ok(map)) => drop(self.maps.send_replace(map.map(Arc::new))),
                 Ok(Err(error)) => {
-                    tracing::warn!(%error, "no depth map can be made");
+                    // Not once a frame.
+                    if !told {
+                        tracing::warn!(%error, "no depth map can be made");
+                    }
+                    told = true;
                     self.maps.send_replace(None);
                 }
                 Err(_) => {
