@@ -60,7 +60,7 @@ fn train(mut run: Run, legs: u64) -> bool {
 #[test]
 fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut recipe = small("parfocal", 300);
+    let mut recipe = small("parfocal", 100);
     if let Some(belief) = &mut recipe.belief {
         belief.scans = 32;
     }
@@ -100,31 +100,38 @@ fn what_begins_with_weights_begins_with_what_they_know() {
     );
 }
 
+fn resumed_is_never_stopped(recipe: &str) {
+    let recipe = small(recipe, 2 * LEG);
+    let policy = &recipe.policy;
+    let whole = tempfile::tempdir().unwrap();
+    let parts = tempfile::tempdir().unwrap();
+
+    assert!(train(begin(&recipe, whole.path()), u64::MAX));
+    assert!(!train(begin(&recipe, parts.path()), 1));
+    assert_eq!(resume(policy, parts.path()).other_version(), None);
+
+    let file = parts.path().join("checkpoint.safetensors");
+    let mut checkpoint = Checkpoint::read(&file).unwrap();
+    checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
+    checkpoint.write(&file).unwrap();
+    assert_eq!(resume(policy, parts.path()).other_version(), Some("0.0.9"));
+
+    assert!(train(resume(policy, parts.path()), u64::MAX));
+
+    for file in ["curves.csv", &format!("{policy}.safetensors")] {
+        let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
+        assert!(read(&whole) == read(&parts), "{policy}: {file} differs");
+    }
+}
+
 #[test]
 fn training_resumed_is_training_never_stopped() {
-    for recipe in ["mgm-learned", "mgm-learned-paper", "cnn-learned", "parfocal"] {
-        let recipe = small(recipe, 2 * LEG);
-        let policy = &recipe.policy;
-        let whole = tempfile::tempdir().unwrap();
-        let parts = tempfile::tempdir().unwrap();
-
-        assert!(train(begin(&recipe, whole.path()), u64::MAX));
-        assert!(!train(begin(&recipe, parts.path()), 1));
-        assert_eq!(resume(policy, parts.path()).other_version(), None);
-
-        let file = parts.path().join("checkpoint.safetensors");
-        let mut checkpoint = Checkpoint::read(&file).unwrap();
-        checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
-        checkpoint.write(&file).unwrap();
-        assert_eq!(resume(policy, parts.path()).other_version(), Some("0.0.9"));
-
-        assert!(train(resume(policy, parts.path()), u64::MAX));
-
-        for file in ["curves.csv", &format!("{policy}.safetensors")] {
-            let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
-            assert!(read(&whole) == read(&parts), "{policy}: {file} differs");
+    // Side by side: a training computes on one core.
+    std::thread::scope(|scope| {
+        for recipe in ["mgm-learned", "mgm-learned-paper", "cnn-learned", "parfocal"] {
+            scope.spawn(|| resumed_is_never_stopped(recipe));
         }
-    }
+    });
 }
 
 fn parfocal(arguments: &[&str]) -> Output {

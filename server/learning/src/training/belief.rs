@@ -10,7 +10,7 @@ use super::environment::{Environment, lead_astray};
 use super::optimiser::{Optimiser, half_cosine};
 use super::recipe::belief::BeliefRecipe;
 use super::run::checkpoint::{Checkpoint, CheckpointError};
-use super::trainer::Trainer;
+use super::trainer::{Trainer, drawn_with};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use parfocal_autofocus::belief::{Trace, spread_over_bins};
@@ -79,11 +79,10 @@ impl BeliefTrainer {
     /// A training from random weights on `scenery`, with its network on `device`.
     #[must_use]
     pub fn new(recipe: BeliefRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
-        tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
 
         let store = nn::VarStore::new(device);
-        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
+        let network = drawn_with(seed, || BeliefNetwork::new(&store.root(), BELIEF_INPUT));
         let optimiser = Optimiser::new(recipe.optimiser, &store);
 
         let actors = Vec::new();

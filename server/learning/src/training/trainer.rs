@@ -1,9 +1,20 @@
 //! The interface of everything that learns: the steps that a training repeats for every kind of policy.
 
+use std::sync::{Mutex, PoisonError};
+
 use tch::nn;
 
 use super::run::checkpoint::{Checkpoint, CheckpointError};
 use parfocal_autofocus::weights::{self, WeightsError};
+
+/// Draws random weights by `draw`, the same for the same `seed`. libtorch draws all of a process's weights from one
+/// generator, so two trainings take turns.
+pub(in crate::training) fn drawn_with<Networks>(seed: u64, draw: impl FnOnce() -> Networks) -> Networks {
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
+    draw()
+}
 
 /// Trains one policy. Its results depend only on its recipe, its seed, its scenery and the seeds of its legs.
 pub trait Trainer: Send {

@@ -18,7 +18,7 @@ use super::environment::{Environment, lead_astray};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::recipe::dqn::{DqnRecipe, Target};
 use super::run::checkpoint::{Checkpoint, CheckpointError};
-use super::trainer::Trainer;
+use super::trainer::{Trainer, drawn_with};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
@@ -57,10 +57,8 @@ impl DqnTrainer {
     /// A training from random weights on `scenery`, with its networks on `device`.
     #[must_use]
     pub fn new(input: Input, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
-        tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        let online = Values::new(input, device);
-        let mut target = Values::new(input, device);
+        let (online, mut target) = drawn_with(seed, || (Values::new(input, device), Values::new(input, device)));
         target.store.freeze();
 
         let optimiser = Optimiser::new(recipe.optimiser, &online.store);

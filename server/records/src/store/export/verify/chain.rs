@@ -11,7 +11,7 @@ use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, ChainCheck, FoundEntry, FoundRow};
 use crate::store::chain::{
-    Block, Entry, Fields, Head, RecordKind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
+    Block, Entry, Fields, Head, OPEN, Record, RecordKind, SEALED, UNBLINDED, begin_open, begin_sealed, kinds, netstring,
 };
 use crate::store::export::description::{ALL, ChainRow};
 use crate::store::export::table::Row;
