@@ -1,11 +1,43 @@
-//! Files that are whole or absent, even when the disk is full or the power fails; and files that other
-//! accounts cannot read.
+//! Files that are whole or absent, even when the disk is full or the power fails; files that other accounts cannot
+//! read; and files that one process has at a time.
 
 use std::ffi::OsStr;
-use std::fs::{self, File, OpenOptions, Permissions};
+use std::fs::{self, File, OpenOptions, Permissions, TryLockError};
 use std::io::{self, BufWriter, Write};
+use std::ops::Deref;
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+
+/// A file that no other process has locked, until it is dropped.
+#[derive(Debug)]
+pub struct LockedFile(File);
+
+impl LockedFile {
+    /// Locks `file`.
+    ///
+    /// # Errors
+    /// If another process holds the lock, or the file system has no locks.
+    pub fn of(file: File) -> Result<Self, TryLockError> {
+        file.try_lock()?;
+        Ok(Self(file))
+    }
+}
+
+impl Deref for LockedFile {
+    type Target = File;
+
+    fn deref(&self) -> &File {
+        &self.0
+    }
+}
+
+impl Drop for LockedFile {
+    fn drop(&mut self) {
+        // To close the file is not enough: a child process has a copy of it from its fork until its program begins, and
+        // the lock would last until then.
+        let _ = self.0.unlock();
+    }
+}
 
 /// Writes a file with these bytes to `path`, as [`replace_with`] does. If `path` is a symbolic link, its target is
 /// replaced. A device or a pipe is written to, never replaced.
@@ -250,6 +282,21 @@ pub fn is_partial(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_locked_file_is_free_as_soon_as_it_is_dropped_even_while_a_child_has_a_copy_of_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let open = || OpenOptions::new().write(true).create(true).truncate(false).open(&path).unwrap();
+        let locked = LockedFile::of(open()).unwrap();
+        assert!(matches!(LockedFile::of(open()), Err(TryLockError::WouldBlock)));
+
+        // As between a fork and the start of the child's program.
+        let copy = locked.try_clone().unwrap();
+        drop(locked);
+        LockedFile::of(open()).unwrap();
+        drop(copy);
+    }
 
     #[test]
     fn a_folder_takes_a_place_where_only_a_systems_own_files_are() {

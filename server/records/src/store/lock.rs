@@ -1,8 +1,10 @@
 //! The lock on a data folder: one server, or one command that changes it, at a time.
 
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Error, Read, Write};
+use std::fs::{self, OpenOptions, TryLockError};
+use std::io::{Error, Write};
 use std::path::Path;
+
+use parfocal_base::files::LockedFile;
 
 use super::StoreError;
 
@@ -11,7 +13,9 @@ pub(super) const LOCK: &str = "parfocal.lock";
 
 /// The lock of this process on a data folder, until it is dropped.
 #[derive(Debug)]
-pub(super) struct FolderLock(File);
+pub(super) struct FolderLock {
+    _file: LockedFile,
+}
 
 impl FolderLock {
     /// Locks `folder`.
@@ -21,29 +25,20 @@ impl FolderLock {
     pub(super) fn of(folder: &Path) -> Result<Self, StoreError> {
         let failed = |error: Error| StoreError::folder(folder, &error);
         let path = folder.join(LOCK);
-        let mut file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
 
-        match file.try_lock() {
-            Ok(()) => {}
+        let file = match LockedFile::of(file) {
+            Ok(file) => file,
             Err(TryLockError::WouldBlock) => {
-                let mut holder = String::new();
-                let _ = file.read_to_string(&mut holder);
+                let holder = fs::read_to_string(&path).unwrap_or_default();
                 return Err(StoreError::InUse { folder: folder.to_owned(), process: holder.trim().to_owned() });
             }
             Err(TryLockError::Error(error)) => return Err(failed(error)),
-        }
+        };
 
         // The process id is only for the message above. The kernel holds the lock.
-        file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
-        Ok(Self(file))
-    }
-}
-
-impl Drop for FolderLock {
-    fn drop(&mut self) {
-        // To close the file is not enough: a child process has a copy of it from its fork until its program begins, and
-        // the lock would last until then.
-        let _ = self.0.unlock();
+        file.set_len(0).and_then(|()| writeln!(&*file, "{}", std::process::id())).map_err(failed)?;
+        Ok(Self { _file: file })
     }
 }

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::{HEADER, Header, Image, POSES, Pose, ScanError, ScanFolder};
 use parfocal_base::FocalPower;
-use parfocal_base::files::{is_systems_own, replace, write_through};
+use parfocal_base::files::{LockedFile, is_systems_own, replace, write_through};
 use parfocal_imaging::{GrayImage, PatchArea};
 
 /// A scan that is being recorded, by one process at a time.
@@ -21,7 +21,7 @@ use parfocal_imaging::{GrayImage, PatchArea};
 pub struct ScanRecording {
     folder: ScanFolder,
     /// The file of lines, locked as long as this value lives.
-    journal: File,
+    journal: LockedFile,
 }
 
 /// A pose as it was taken.
@@ -63,9 +63,7 @@ impl ScanRecording {
         let journal = path.join(POSES);
         let journal =
             File::options().create(true).append(true).open(&journal).map_err(|e| unwritable(&journal, 0, e))?;
-        if journal.try_lock().is_err() {
-            return Err(ScanError::Busy(path.to_owned()));
-        }
+        let journal = LockedFile::of(journal).map_err(|_| ScanError::Busy(path.to_owned()))?;
 
         let folder = ScanFolder::open(path)?;
         same(folder.header(), header)
@@ -135,7 +133,7 @@ impl ScanRecording {
 
     /// Writes the line of `pose`. If that fails, the file stays as it was.
     fn note(&self, pose: &Pose) -> io::Result<()> {
-        let mut journal = &self.journal;
+        let mut journal: &File = &self.journal;
         let before = journal.metadata()?.len();
         let line = serde_json::to_string(pose)? + "\n";
 

@@ -1,13 +1,13 @@
 //! The folder of a training. It belongs to one training and one process at a time, and is never left with an incomplete
 //! file under its final name.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::training::error::TrainError;
-use parfocal_base::files;
+use parfocal_base::files::{self, LockedFile};
 
 const LOCK: &str = ".lock";
 
@@ -16,7 +16,7 @@ const LOCK: &str = ".lock";
 pub(super) struct RunFolder {
     path: PathBuf,
     /// Holds the lock until it is dropped.
-    _lock: File,
+    _lock: LockedFile,
 }
 
 impl RunFolder {
@@ -96,16 +96,15 @@ impl RunFolder {
     }
 }
 
-fn lock(folder: &Path) -> Result<File, TrainError> {
+fn lock(folder: &Path) -> Result<LockedFile, TrainError> {
     let path = folder.join(LOCK);
     let failed = |source: io::Error| TrainError::writing(&path, source);
     let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
 
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(TrainError::Busy(folder.to_owned())),
-        Err(TryLockError::Error(error)) => Err(failed(error)),
-    }
+    LockedFile::of(file).map_err(|error| match error {
+        TryLockError::WouldBlock => TrainError::Busy(folder.to_owned()),
+        TryLockError::Error(error) => failed(error),
+    })
 }
 
 #[cfg(test)]
