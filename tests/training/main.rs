@@ -36,7 +36,6 @@ fn small(policy: &str, updates: u64) -> Recipe {
 
     if let Some(belief) = &mut recipe.belief {
         (belief.scans, belief.window, belief.updates, belief.variety) = (8, 16, updates, 0.0);
-        belief.replays = true;
     }
     recipe
 }
@@ -60,7 +59,7 @@ fn train(mut run: Run, legs: u64) -> bool {
 #[test]
 fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut recipe = small("parfocal", 100);
+    let mut recipe = small("parfocal", 200);
     if let Some(belief) = &mut recipe.belief {
         belief.scans = 32;
     }

@@ -29,8 +29,6 @@ pub struct BeliefTrainer {
     optimiser: Optimiser,
     actors: Vec<Actor>,
     memory: Tensor,
-    /// Batches of the earlier updates of this leg, if the recipe replays them.
-    past: Vec<Batch>,
     rng: ChaCha8Rng,
     updates: u64,
 }
@@ -51,28 +49,10 @@ const KNOWN: f64 = 0.4;
 /// Error of that blur rate: standard deviation of its logarithm around the true one's.
 const MEASURED: f64 = 0.15;
 
-/// Frames and the beliefs to learn: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`, and the memory before the
-/// first frame, `[1, N, MEMORY]`.
+/// Frames and the beliefs to learn: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
 struct Batch {
     inputs: Tensor,
     beliefs: Tensor,
-    before: Tensor,
-}
-
-impl Batch {
-    fn shallow_clone(&self) -> Self {
-        let Self { inputs, beliefs, before } = self;
-        Self { inputs: inputs.shallow_clone(), beliefs: beliefs.shallow_clone(), before: before.shallow_clone() }
-    }
-
-    /// The windows of both.
-    fn with(&self, other: &Self) -> Self {
-        Self {
-            inputs: Tensor::cat(&[&self.inputs, &other.inputs], 0),
-            beliefs: Tensor::cat(&[&self.beliefs, &other.beliefs], 0),
-            before: Tensor::cat(&[&self.before, &other.before], 1),
-        }
-    }
 }
 
 impl BeliefTrainer {
@@ -87,8 +67,7 @@ impl BeliefTrainer {
 
         let actors = Vec::new();
         let memory = network.blank(recipe.scans, device);
-        let past = Vec::new();
-        let mut trainer = Self { recipe, scenery, store, network, optimiser, actors, memory, past, rng, updates: 0 };
+        let mut trainer = Self { recipe, scenery, store, network, optimiser, actors, memory, rng, updates: 0 };
         trainer.begin_leg(seed);
         trainer
     }
@@ -97,7 +76,6 @@ impl BeliefTrainer {
         let count = self.actors.len();
         let window = self.recipe.window;
         let device = self.store.device();
-        let before = self.memory.shallow_clone();
         let mut inputs = vec![0.0f32; count * window * BELIEF_INPUT];
         let mut beliefs = vec![0.0f32; count * window * BINS];
         let mut now = vec![0.0f32; count * BELIEF_INPUT];
@@ -139,21 +117,7 @@ impl BeliefTrainer {
         Batch {
             inputs: Tensor::from_slice(&inputs).view([count, window, BELIEF_INPUT as i64]).to_device(device),
             beliefs: Tensor::from_slice(&beliefs).view([count, window, BINS as i64]).to_device(device),
-            before,
         }
-    }
-
-    /// `new` and a batch before it, if the recipe replays them. Most of an update's time goes into making a batch, so
-    /// learning from one twice is cheap.
-    fn with_replayed(&mut self, new: Batch) -> Batch {
-        if !self.recipe.replays {
-            return new;
-        }
-
-        let drawn = (!self.past.is_empty()).then(|| self.rng.random_range(0..self.past.len()));
-        let both = drawn.map(|index| new.with(&self.past[index]));
-        self.past.push(new.shallow_clone());
-        both.unwrap_or(new)
     }
 
     fn replace_finished(&mut self) {
@@ -178,7 +142,6 @@ impl Trainer for BeliefTrainer {
 
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
-        self.past.clear();
 
         let mut draw = |index| {
             let mut actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
@@ -196,10 +159,10 @@ impl Trainer for BeliefTrainer {
     }
 
     fn update(&mut self) -> f64 {
-        let new = self.collect();
-        let batch = self.with_replayed(new);
+        let before = self.memory.shallow_clone();
+        let batch = self.collect();
 
-        let (logits, _) = self.network.forward(&batch.inputs, &batch.before);
+        let (logits, _) = self.network.forward(&batch.inputs, &before);
         let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
         let loss = loss.mean(Kind::Float);
 

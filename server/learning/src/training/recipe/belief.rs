@@ -14,9 +14,6 @@ pub struct BeliefRecipe {
     pub window: usize,
     /// Windows after which a scan is replaced by a new one.
     pub windows_a_scan: usize,
-    /// Whether each update also learns once more from an earlier one's windows.
-    #[serde(default)]
-    pub replays: bool,
     /// Updates of the whole training.
     pub updates: u64,
     /// The optimiser and its learning rate.
