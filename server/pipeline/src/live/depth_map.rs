@@ -225,19 +225,20 @@ impl Survey {
 
     /// Puts trackers at `patches`. Those of nearly the same places stay, and follow the content area's small motions.
     fn place(&mut self, patches: &[PatchArea]) -> Result<(), PolicyError> {
-        let is_near = |(onlooker, patch): (&Onlooker, &PatchArea)| {
-            2 * onlooker.patch.x.abs_diff(patch.x) <= PATCH_SIDE && 2 * onlooker.patch.y.abs_diff(patch.y) <= PATCH_SIDE
-        };
-        if self.onlookers.len() == patches.len() && self.onlookers.iter().zip(patches).all(is_near) {
-            for (onlooker, patch) in self.onlookers.iter_mut().zip(patches) {
-                onlooker.patch = *patch;
-            }
-            return Ok(());
-        }
-
         let name = PolicyName::new(BELIEVER);
-        let onlooker = |&patch: &PatchArea| Ok(Onlooker { patch, tracker: self.registry.build(&name)? });
-        self.onlookers = patches.iter().map(onlooker).collect::<Result<_, _>>()?;
+        let mut before = std::mem::take(&mut self.onlookers);
+        let mut onlooker = |&patch: &PatchArea| {
+            let is_near = |onlooker: &Onlooker| {
+                let Onlooker { patch: latest, .. } = onlooker;
+                2 * latest.x.abs_diff(patch.x) <= PATCH_SIDE && 2 * latest.y.abs_diff(patch.y) <= PATCH_SIDE
+            };
+            let tracker = match before.iter().position(is_near) {
+                Some(index) => before.swap_remove(index).tracker,
+                None => self.registry.build(&name)?,
+            };
+            Ok(Onlooker { patch, tracker })
+        };
+        self.onlookers = patches.iter().map(&mut onlooker).collect::<Result<_, _>>()?;
         Ok(())
     }
 }
@@ -384,6 +385,24 @@ mod tests {
         unknown.record.measured = None;
         assert_eq!(survey.see(&unknown).unwrap(), None);
         assert_eq!(told(&mut survey, 112, 1), 0);
+    }
+
+    #[test]
+    fn what_is_known_is_kept_while_the_circle_moves_a_little_and_loses_places() {
+        let halves = [texture(3, SIDE), texture(8, SIDE)];
+        let mut survey = survey();
+        let mut map = |number: u64, circle: ContentArea| {
+            let mut frame = frame(number, 0.5 + 0.3 * (number as f64 / 10.0).sin(), &halves);
+            frame.content_area = Some(circle);
+            survey.see(&frame).unwrap().unwrap().places
+        };
+        let known = |places: &[PlaceDepth]| places.iter().filter(|place| place.side != Side::Unknown).count();
+
+        let circle = ContentArea { x: 128.0, y: 64.0, radius: 90.0, confidence: 1.0 };
+        let before = (0..40).map(|number| map(number, circle)).last().unwrap();
+        let after = map(40, ContentArea { x: 134.0, radius: 72.0, ..circle });
+        assert!(after.len() < before.len() && known(&after) > 3, "{before:?} {after:?}");
+        assert_eq!(known(&map(41, ContentArea { x: 60.0, radius: 50.0, ..circle })), 0);
     }
 
     #[test]
