@@ -1957,11 +1957,6 @@ export interface components {
             low: number;
         };
         /**
-         * @description What a recording is made of.
-         * @enum {string}
-         */
-        Kind: "mosaic" | "view";
-        /**
          * @description A language that surgeons can read.
          * @enum {string}
          */
@@ -2478,12 +2473,17 @@ export interface components {
              */
             from: number;
             /** @description Whether it consists of mosaics or of the view's pictures. */
-            kind: components["schemas"]["Kind"];
+            kind: components["schemas"]["RecordingKind"];
             /** @description Name of the recording. */
             name: string;
             /** @description Time of each frame, in whole milliseconds since the first. A frame's index in this list, from 0, identifies it. */
             times_ms: number[];
         };
+        /**
+         * @description What a recording is made of.
+         * @enum {string}
+         */
+        RecordingKind: "mosaic" | "view";
         /** @description Whether to start or to stop recording. */
         RecordingOrder: {
             /** @description True to start recording mosaics, false to stop. */

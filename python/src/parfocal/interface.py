@@ -552,9 +552,6 @@ class Interval(TypedDict):
     low: float
     """Lower end."""
 
-Kind = Literal["mosaic", "view"]
-"""What a recording is made of."""
-
 Language = Literal["en", "de", "fr", "es"]
 """A language that surgeons can read."""
 
@@ -1121,8 +1118,11 @@ class ReasonWanted(TypedDict):
 Record = Literal["none", "view", "mosaic"]
 """What is recorded during a session, from its start to its end."""
 
-RecordingCourse = TypedDict("RecordingCourse", {"from": "float", "kind": "Kind", "name": "str", "times_ms": "builtins.list[int]"})
+RecordingCourse = TypedDict("RecordingCourse", {"from": "float", "kind": "RecordingKind", "name": "str", "times_ms": "builtins.list[int]"})
 """A recording, with the times at which its frames were exposed."""
+
+RecordingKind = Literal["mosaic", "view"]
+"""What a recording is made of."""
 
 class RecordingOrder(TypedDict):
     """Whether to start or to stop recording."""
