@@ -20,7 +20,7 @@ package:
 container: package
 	@deploy/container/build
 
-.PHONY: run test package container check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
+.PHONY: run test package container check lint web web-types unit system others interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -31,10 +31,13 @@ test:
 	@.ci/setup test
 	@$(MAKE) --no-print-directory check
 
-# The checks alone, on a machine that is already set up. Those of the finished program mostly wait for it, so two of
-# them run at a time.
-check: lint web unit
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target interface python readme packaged
+# The checks alone, on a machine that is already set up. Two run at a time where one waits now and then: for a program,
+# a browser or a disk.
+TWO_AT_A_TIME := --no-print-directory --jobs 2 --output-sync=target
+check:
+	@$(MAKE) $(TWO_AT_A_TIME) lint web
+	@$(MAKE) --no-print-directory unit
+	@$(MAKE) $(TWO_AT_A_TIME) interface python readme packaged
 
 # Tests and program are one build, so all is compiled once. `cargo test` alone makes a development build, which is
 # faster after a change. `CARGO_FLAGS` says how a check run builds (.ci/run).
@@ -55,12 +58,22 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
-# Two for each processor: most tests wait now and then for a disk, a browser or a lens.
-TEST_THREADS := $(shell echo $$((2 * $$(nproc))))
+TEST := cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast
+# All but those of the whole system, whose programs and browsers keep every processor busy for as long as all others take
+# together.
+OTHERS := $(filter-out system,$(patsubst tests/%/main.rs,%,$(wildcard tests/*/main.rs)))
 
-# One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
+# One failing test does not keep the others from running.
 unit:
-	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
+	$(TEST) --no-run $(FEATURES)
+	@$(MAKE) $(TWO_AT_A_TIME) --keep-going system others
+
+# Two for each processor: most tests wait now and then. The bad day takes a kill for each of its troubles.
+system:
+	RUST_TEST_THREADS=$$((2 * $$(nproc))) PARFOCAL_KILLS=8 $(TEST) $(FEATURES) --test system
+
+others:
+	RUST_TEST_THREADS=$$(nproc) $(TEST) $(FEATURES) --lib --bins $(addprefix --test ,$(OTHERS))
 
 # What HTTP answers, against its own description, as each role.
 interface:
