@@ -20,7 +20,7 @@ package:
 container: package
 	@deploy/container/build
 
-.PHONY: run test package container check lint web web-types unit system others interface python python-interface readme packaged bench screenshots fuzz endurance
+.PHONY: run test package container check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -58,22 +58,12 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
-TEST := cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast
-# All but those of the whole system, whose programs and browsers keep every processor busy for as long as all others take
-# together.
-OTHERS := $(filter-out system,$(patsubst tests/%/main.rs,%,$(wildcard tests/*/main.rs)))
+# Two for each processor: most tests wait now and then for a disk, a browser or a lens.
+TEST_THREADS := $(shell echo $$((2 * $$(nproc))))
 
-# One failing test does not keep the others from running.
+# One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
 unit:
-	$(TEST) --no-run $(FEATURES)
-	@$(MAKE) $(TWO_AT_A_TIME) --keep-going system others
-
-# Two for each processor: most tests wait now and then. The bad day takes a kill for each of its troubles.
-system:
-	RUST_TEST_THREADS=$$((2 * $$(nproc))) PARFOCAL_KILLS=8 $(TEST) $(FEATURES) --test system
-
-others:
-	RUST_TEST_THREADS=$$(nproc) $(TEST) $(FEATURES) --lib --bins $(addprefix --test ,$(OTHERS))
+	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
