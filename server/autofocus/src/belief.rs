@@ -262,6 +262,38 @@ pub fn probability_near(belief: &[f32], place: f64) -> f64 {
     belief.iter().enumerate().filter(|(bin, _)| is_near(*bin)).map(|(_, share)| f64::from(*share)).sum()
 }
 
+/// How much of a belief lies below the depth of focus around a place, within it, and above it.
+#[derive(Debug, Clone, Copy)]
+pub struct Sides {
+    /// At a lower focal power.
+    pub below: f64,
+    /// Within [`IN_FOCUS`].
+    pub here: f64,
+    /// At a higher focal power.
+    pub above: f64,
+}
+
+impl Sides {
+    /// The sides of `belief` around the focal power `place`. Value `i` of `n` stands for the focal power `i / (n - 1)`.
+    #[must_use]
+    pub fn of(belief: &[f32], place: f64) -> Self {
+        let last = belief.len().saturating_sub(1).max(1) as f64;
+        let mut sides = Self { below: 0.0, here: 0.0, above: 0.0 };
+        for (bin, share) in belief.iter().enumerate() {
+            let distance = bin as f64 / last - place;
+            let side = if distance.abs() < IN_FOCUS {
+                &mut sides.here
+            } else if distance < 0.0 {
+                &mut sides.below
+            } else {
+                &mut sides.above
+            };
+            *side += f64::from(*share);
+        }
+        sides
+    }
+}
+
 /// A place at which to test the belief, [`TEST`] away from `focal_power`. It is on the side where the optimum is
 /// likelier under `belief`, or on the other side if the range ends there.
 fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
@@ -285,22 +317,7 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
 fn target(focal_power: f64, belief: &[f32]) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
     if step.abs() < LOOK {
-        let mut below = 0.0;
-        let mut here = 0.0;
-        let mut above = 0.0;
-        for (bin, share) in belief.iter().enumerate() {
-            let distance = bin as f64 / (BINS - 1) as f64 - focal_power;
-            let side = if distance.abs() < IN_FOCUS {
-                &mut here
-            } else if distance < 0.0 {
-                &mut below
-            } else {
-                &mut above
-            };
-
-            *side += f64::from(*share);
-        }
-
+        let Sides { below, here, above } = Sides::of(belief, focal_power);
         if here < ASSURANCE {
             let look = if above > below { LOOK } else { -LOOK };
             return (focal_power + look).clamp(0.0, 1.0);

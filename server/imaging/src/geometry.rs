@@ -77,6 +77,12 @@ impl PatchArea {
 
         Ok(Self { x, y, width: PATCH_SIDE, height: PATCH_SIDE })
     }
+
+    /// Whether `other` is at most half a patch away along each axis: what both show can still be compared.
+    #[must_use]
+    pub const fn is_near(self, other: Self) -> bool {
+        2 * self.x.abs_diff(other.x) <= PATCH_SIDE && 2 * self.y.abs_diff(other.y) <= PATCH_SIDE
+    }
 }
 
 /// The place in the bright circle `content` of the point `(x, y)`, in pixels of a `width` x `height` picture; `None` if

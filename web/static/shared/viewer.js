@@ -10,8 +10,6 @@ import { drawContentArea, drawPatch, drawRing, Peaking } from "./overlay.js";
 import { Pointing } from "./pointing.js";
 import { followZooming } from "./zooming.js";
 
-/** @typedef {"patch" | "content-area" | "peaking"} Overlay */
-
 /** A picture older than this is no longer live. */
 const STALE_MS = 500;
 const LOOK_MS = 250;
@@ -151,7 +149,7 @@ export class Viewer {
   /**
    * Switches an overlay on or off.
    *
-   * @param {Overlay | string} name
+   * @param {string} name `patch`, `content-area`, `peaking`, or one that the page has added
    * @param {boolean} on
    */
   overlay(name, on) {

@@ -495,7 +495,7 @@ viewer.live.listen({
 });
 
 followOverlayBoxes((name, on) => {
-  viewer.overlay(/** @type {import("../shared/viewer.js").Overlay} */ (name), on);
+  viewer.overlay(name, on);
 });
 
 document.addEventListener("pointerdown", (event) => {

@@ -121,12 +121,9 @@ impl Stepper {
     }
 
     /// A chosen place is relative to the content area. Where that was found anew far from where it was, the patch shows
-    /// another place. Half of a patch away, two frames still share enough to be compared.
+    /// another place.
     fn notice_jump(&mut self, patch: PatchArea) {
-        let is_far = |latest: PatchArea| {
-            2 * patch.x.abs_diff(latest.x) > patch.width || 2 * patch.y.abs_diff(latest.y) > patch.height
-        };
-        if self.tracker.is_none() && self.latest_patch.is_some_and(is_far) {
+        if self.tracker.is_none() && self.latest_patch.is_some_and(|latest| !latest.is_near(patch)) {
             self.forget();
         }
         self.latest_patch = Some(patch);

@@ -1,25 +1,22 @@
-//! The depth map: which places of the picture are in focus, and on which side of the lens the others are. At each place a tracker looks on, of the
-//! kind that drives the lens by a belief, while something else moves the lens. The map is made only while somebody
-//! looks at it, by a thread that takes the latest frame whenever it is done with one.
+//! The depth map: which places of the picture are in focus, and on which side of the lens the others are. At each place
+//! a tracker looks on, of the kind that drives the lens by a belief, while something else moves the lens. The map is
+//! made only while somebody looks at it, by a thread that takes the latest frame whenever it is done with one.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use serde::Serialize;
 use tokio::sync::watch;
 
-use crate::control::{ControlledFrame, Eye, LatestSlot, cells};
-use parfocal_autofocus::belief::SURE;
+use super::frame_thread::{FrameSlot, FrameThread};
+use crate::control::{ControlledFrame, Eye, cells};
+use parfocal_autofocus::belief::{SURE, Sides};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Policy, PolicyError, Registry};
 use parfocal_base::clock::Moment;
-use parfocal_base::{FocalPower, IN_FOCUS, PolicyName};
+use parfocal_base::{FocalPower, PolicyName};
 use parfocal_imaging::{ContentArea, PATCH_SIDE, PatchArea};
-
-/// Longest wait for a frame before checking whether more will come.
-const PATIENCE: Duration = Duration::from_millis(500);
 
 /// The policy whose belief is asked at each place.
 const BELIEVER: &str = "parfocal";
@@ -27,7 +24,7 @@ const BELIEVER: &str = "parfocal";
 /// Places are as far apart as if this many shared the whole picture.
 const PLACES: f64 = 24.0;
 
-/// After a longer gap between two frames they are not compared.
+/// After a longer gap between two frames they are not compared, and the trackers are not kept.
 const GAP: Duration = Duration::from_secs(1);
 
 /// Where the optima of the places of one frame are.
@@ -48,7 +45,7 @@ pub struct PlaceDepth {
     /// Mosaic cells from the top edge of the picture to the place.
     pub y: usize,
     /// Where its optimum is, seen from the lens. By how much is not told: such a number, given as sure, is right for
-    /// other optics only two times in three (`docs/notebook.md`).
+    /// other optics only seven times in ten (`docs/notebook.md`).
     pub side: Side,
 }
 
@@ -71,21 +68,8 @@ impl Side {
     /// lens at `focal_power`.
     #[must_use]
     pub fn of(belief: &[f32], focal_power: FocalPower) -> Self {
-        let last = belief.len().saturating_sub(1).max(1) as f64;
-        let [mut lower, mut here, mut higher] = [0.0; 3];
-        for (bin, share) in belief.iter().enumerate() {
-            let distance = bin as f64 / last - focal_power.get();
-            let part = if distance.abs() < IN_FOCUS {
-                &mut here
-            } else if distance > 0.0 {
-                &mut higher
-            } else {
-                &mut lower
-            };
-            *part += f64::from(*share);
-        }
-
-        let sides = [(here, Self::InFocus), (higher, Self::Higher), (lower, Self::Lower)];
+        let Sides { below, here, above } = Sides::of(belief, focal_power.get());
+        let sides = [(here, Self::InFocus), (above, Self::Higher), (below, Self::Lower)];
         sides.into_iter().find(|(share, _)| *share >= SURE).map_or(Self::Unknown, |(_, side)| side)
     }
 }
@@ -95,9 +79,8 @@ pub type DepthMaps = watch::Receiver<Option<Arc<DepthMap>>>;
 
 /// The thread that makes depth maps; ends when dropped.
 pub(super) struct Surveyor {
-    slot: Arc<LatestSlot<ControlledFrame>>,
     maps: watch::Sender<Option<Arc<DepthMap>>>,
-    thread: Option<JoinHandle<()>>,
+    thread: FrameThread,
 }
 
 impl Surveyor {
@@ -110,41 +93,32 @@ impl Surveyor {
         registry: Registry,
         maps: watch::Sender<Option<Arc<DepthMap>>>,
     ) -> std::io::Result<Self> {
-        let slot = Arc::<LatestSlot<ControlledFrame>>::default();
-        let worker = Worker { slot: Arc::clone(&slot), maps: maps.clone(), survey: Survey::new(eye, registry) };
-        let thread = std::thread::Builder::new().name("depth-map".into()).spawn(move || worker.run())?;
-        Ok(Self { slot, maps, thread: Some(thread) })
+        let worker = Worker { maps: maps.clone(), survey: Survey::new(eye, registry) };
+        let thread = FrameThread::start("depth-map".into(), |slot| worker.run(&slot))?;
+        Ok(Self { maps, thread })
     }
 
     /// Hands `frame` over if somebody looks at the map; never waits. During a session's settings nothing is mapped: the
     /// map would tell how the lens moves.
     pub(super) fn offer(&self, frame: &ControlledFrame) {
         if self.maps.receiver_count() > 0 && frame.record.segment.is_none() {
-            self.slot.put(frame.clone());
+            self.thread.offer(frame);
         }
     }
 }
 
-impl Drop for Surveyor {
-    fn drop(&mut self) {
-        self.slot.close();
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
-}
-
 struct Worker {
-    slot: Arc<LatestSlot<ControlledFrame>>,
     maps: watch::Sender<Option<Arc<DepthMap>>>,
     survey: Survey,
 }
 
 impl Worker {
-    fn run(mut self) {
+    fn run(mut self, slot: &FrameSlot) {
         parfocal_base::priority::lower_further();
         compute_on_this_thread();
         let mut told = false;
-        while !self.slot.is_closed() {
-            let Some(frame) = self.slot.take(PATIENCE) else {
+        while !slot.is_closed() {
+            let Some(frame) = slot.take(GAP) else {
                 self.survey.end();
                 self.maps.send_replace(None);
                 continue;
@@ -228,11 +202,7 @@ impl Survey {
         let name = PolicyName::new(BELIEVER);
         let mut before = std::mem::take(&mut self.onlookers);
         let mut onlooker = |&patch: &PatchArea| {
-            let is_near = |onlooker: &Onlooker| {
-                let Onlooker { patch: latest, .. } = onlooker;
-                2 * latest.x.abs_diff(patch.x) <= PATCH_SIDE && 2 * latest.y.abs_diff(patch.y) <= PATCH_SIDE
-            };
-            let tracker = match before.iter().position(is_near) {
+            let tracker = match before.iter().position(|onlooker| onlooker.patch.is_near(patch)) {
                 Some(index) => before.swap_remove(index).tracker,
                 None => self.registry.build(&name)?,
             };
@@ -281,6 +251,7 @@ fn places((width, height): (usize, usize), content: Option<&ContentArea>) -> Vec
 mod tests {
     use super::*;
     use crate::control::Aim;
+    use parfocal_base::IN_FOCUS;
     use parfocal_base::step::StepRecord;
     use parfocal_devices::camera::{Frame, FrameImage};
     use parfocal_devices::simulation::blur::gaussian_blur;

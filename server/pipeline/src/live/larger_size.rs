@@ -3,12 +3,12 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::frame_encoder::FrameEncoder;
+use super::frame_thread::{FrameSlot, FrameThread};
 use super::publisher::Publisher;
-use crate::control::{ControlledFrame, LatestSlot};
+use crate::control::ControlledFrame;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::{Developer, Size};
 
@@ -22,9 +22,8 @@ const FULL_INTERVAL: Duration = Duration::from_millis(38);
 
 /// The thread of one larger size; ends when dropped.
 pub(super) struct LargerSize {
-    slot: Arc<LatestSlot<ControlledFrame>>,
     publisher: Publisher,
-    thread: Option<JoinHandle<()>>,
+    thread: FrameThread,
 }
 
 impl LargerSize {
@@ -38,32 +37,21 @@ impl LargerSize {
         publisher: Publisher,
         clock: Arc<dyn Clock>,
     ) -> std::io::Result<Self> {
-        let slot = Arc::<LatestSlot<ControlledFrame>>::default();
         let frame_encoder = FrameEncoder::new(developer, size).map_err(std::io::Error::other)?;
-        let worker = Worker { slot: Arc::clone(&slot), publisher: publisher.clone(), clock, frame_encoder, last: None };
-
-        let name = format!("imaging-{}", size.name());
-        let thread = std::thread::Builder::new().name(name).spawn(move || worker.run())?;
-        Ok(Self { slot, publisher, thread: Some(thread) })
+        let worker = Worker { publisher: publisher.clone(), clock, frame_encoder, last: None };
+        let thread = FrameThread::start(format!("imaging-{}", size.name()), |slot| worker.run(&slot))?;
+        Ok(Self { publisher, thread })
     }
 
     /// Hands `frame` over if this size has viewers; never waits.
     pub(super) fn offer(&self, frame: &ControlledFrame) {
         if self.publisher.is_watched() {
-            self.slot.put(frame.clone());
+            self.thread.offer(frame);
         }
     }
 }
 
-impl Drop for LargerSize {
-    fn drop(&mut self) {
-        self.slot.close();
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
-}
-
 struct Worker {
-    slot: Arc<LatestSlot<ControlledFrame>>,
     publisher: Publisher,
     clock: Arc<dyn Clock>,
     frame_encoder: FrameEncoder,
@@ -72,10 +60,10 @@ struct Worker {
 }
 
 impl Worker {
-    fn run(mut self) {
+    fn run(mut self, slot: &FrameSlot) {
         parfocal_base::priority::lower_further();
-        while !self.slot.is_closed() {
-            let Some(frame) = self.slot.take(PATIENCE) else { continue };
+        while !slot.is_closed() {
+            let Some(frame) = slot.take(PATIENCE) else { continue };
             // Its last viewer may have left meanwhile.
             if !self.publisher.is_watched() || !self.is_due(&frame) {
                 continue;

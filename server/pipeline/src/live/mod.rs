@@ -6,6 +6,7 @@ mod counts;
 mod depth_map;
 mod follow;
 mod frame_encoder;
+mod frame_thread;
 mod larger_size;
 mod lead;
 mod picture;

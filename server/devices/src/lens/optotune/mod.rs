@@ -1,8 +1,8 @@
 //! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
 //!
 //! The caller's side only touches memory; a separate thread talks to the port. When the lens is dropped, that thread
-//! puts the driver into current mode at 0 mA, unless [`DriverSettings::keep`] is set. The lens then relaxes to its resting
-//! focal power and does not warm up. [`let_go_of_all`] does the same before a process ends in another way. Only
+//! puts the driver into current mode at 0 mA, unless [`DriverSettings::keep`] is set. The lens then relaxes to its
+//! resting focal power and does not warm up. [`let_go_of_all`] does the same before a process ends in another way. Only
 //! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
 
 pub mod codec;

@@ -1,5 +1,5 @@
-//! The kinds of records that the chain has rows for: where each is kept, and which of its columns are hashed. Most kinds
-//! have a table in exports, whose description says so of each column.
+//! The kinds of records that the chain has rows for: where each is kept, and which of its columns are hashed. Most
+//! kinds have a table in exports, whose description says so of each column.
 
 use std::sync::LazyLock;
 
