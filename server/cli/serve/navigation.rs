@@ -7,8 +7,8 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tokio::net::TcpListener;
 
-use parfocal_dashboard::openigtlink::LinkSettings;
 use parfocal_imaging::Size;
+use parfocal_pipeline::openigtlink::LinkSettings;
 
 /// OpenIGTLink.
 #[derive(Debug, Args)]

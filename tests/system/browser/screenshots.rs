@@ -50,7 +50,15 @@ pub async fn resize(browser: &Browser, width: u32, height: u32) {
 pub async fn set_screen(browser: &Browser, width: u32, height: u32, density: u32) {
     let size = json!({ "width": width, "height": height, "deviceScaleFactor": density, "mobile": false });
     browser.tools("Emulation.setDeviceMetricsOverride", size).await;
-    // Two frames: in the first the page gets its new layout, in the second the observers of its size have drawn.
-    let drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
+    // On a busy machine the page hears of its new size some frames later. Then two frames: in the first it gets its new
+    // layout, in the second the observers of its size have drawn.
+    let drawn = format!(
+        "new Promise((done) => {{
+            const sized = () => innerWidth === {width} && innerHeight === {height};
+            const drawn = () => requestAnimationFrame(() => requestAnimationFrame(done));
+            const wait = () => (sized() ? drawn() : requestAnimationFrame(wait));
+            wait();
+        }})"
+    );
     browser.tools("Runtime.evaluate", json!({ "expression": drawn, "awaitPromise": true })).await;
 }

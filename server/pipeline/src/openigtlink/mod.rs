@@ -20,13 +20,13 @@ use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
 use self::frame_messages::FrameMessages;
+use crate::control::{ControlStatus, ControlledFrame};
+use crate::live::LiveHandle;
 use parfocal_base::clock::Clock;
 use parfocal_base::priority;
 use parfocal_base::step::Hold;
 use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{Developer, GrayImage, RgbImage, Size};
-use parfocal_pipeline::control::{ControlStatus, ControlledFrame};
-use parfocal_pipeline::live::LiveHandle;
 
 /// Clients at a time.
 const MOST_CLIENTS: usize = 16;
