@@ -9,7 +9,7 @@ use super::planes::PlaneStack;
 use super::recorded::{Kept, RecordedScan};
 use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
-use super::stack::source::{ScaledStack, StackSource, UnfitStack};
+use super::stack::source::{StackSource, UnfitStack};
 use parfocal_devices::camera::recorded::{HEADER, ScanError, ScanFolder};
 use parfocal_imaging::PixelFormat;
 
@@ -18,6 +18,8 @@ const KEPT_OF: usize = 5;
 /// In training, the number of planes that make the range varies by these factors (least, most), because lenses differ
 /// in how far they reach.
 const REACH: (f64, f64) = (0.75, 1.3);
+/// Each stack is also trained on smaller by this factor, as through an optic that spreads its blur over fewer pixels.
+const SMALLER: f64 = 0.71;
 
 /// Scenes of a bench.
 #[derive(Debug, Clone)]
@@ -104,19 +106,20 @@ fn recording(
     doubts.extend(doubtful);
 
     let mut scenes: Vec<StackScene> = Vec::new();
-    for ScaledStack { planes, pictures, .. } in scaled {
-        // A stack that is small enough is the same at both scales.
-        if scenes.iter().any(|scene| scene.planes.size() == pictures.size()) {
-            continue;
-        }
-
-        let (first, last) = pictures.range();
+    for stack in scaled {
+        let (planes, (first, last)) = (stack.planes, stack.pictures.range());
         if planes < 3 || planes as f64 > last - first + 1.0 {
             return Err(UnfitStack::TooSmall { folder: source.folder, planes }.into());
         }
 
-        pictures.digest(hash);
-        scenes.push(scene(planes, Arc::unwrap_or_clone(pictures)));
+        let smaller = stack.smaller(SMALLER);
+        for pictures in [Some(Arc::unwrap_or_clone(stack.pictures)), smaller].into_iter().flatten() {
+            // A stack that is small enough is the same at both scales.
+            if scenes.iter().all(|scene| scene.planes.size() != pictures.size()) {
+                pictures.digest(hash);
+                scenes.push(scene(planes, pictures));
+            }
+        }
     }
     Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())
 }

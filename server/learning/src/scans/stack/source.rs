@@ -8,13 +8,15 @@ use super::optics::StackOptics;
 use super::{FocalStack, Plane, StackError};
 use crate::scans::planes::{PlaneStack, PlanesError};
 use parfocal_base::BlurRate;
-use parfocal_imaging::{GrayImage, PixelFormat, in_blocks};
+use parfocal_imaging::{GrayImage, PixelFormat, in_blocks, reduced};
 
 /// The two scales: names, and the width in pixels to which a stack's pictures are reduced as nearly as possible. It is
 /// unknown how soft a lens's best picture is on the sensor, so each stack is used at both.
 const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
 /// Least number of planes in a range, if the number is not given.
 const LEAST_PLANES: usize = 6;
+/// Least side in pixels of pictures made smaller: room for a patch and what surrounds it.
+const LEAST_SIDE: usize = 200;
 
 /// Why a focal stack cannot be scanned.
 #[derive(Debug, thiserror::Error)]
@@ -67,6 +69,21 @@ pub struct ScaledStack {
 }
 
 impl ScaledStack {
+    /// The same pictures, smaller by `factor`; `None` if there would be no room for a patch to move.
+    #[must_use]
+    pub fn smaller(&self, factor: f64) -> Option<PlaneStack> {
+        let (width, height) = self.stack.size();
+        let [width, height] = [width, height].map(|side| (side as f64 * factor).round() as usize);
+        if width.min(height) < LEAST_SIDE {
+            return None;
+        }
+
+        let small = |plane: &Plane| reduced(&plane.picture, width, height);
+        let numbered: Vec<_> =
+            self.stack.planes().iter().enumerate().map(|(at, plane)| (at as f32, small(plane))).collect();
+        PlaneStack::new(&numbered).ok()
+    }
+
     /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
     #[must_use]
     pub fn blur_rate(&self) -> Option<BlurRate> {

@@ -23,6 +23,7 @@ pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
         return Err(format!("'validate_every' must be a multiple of {LEG}, and is {}", recipe.validate_every));
     }
 
+    within("footage_share", recipe.footage_share, 0.0..=1.0)?;
     within("reliefs", recipe.reliefs, 0..=10_000)?;
     within("relief_share", recipe.relief_share, 0.0..=1.0)?;
     within("bench_share", recipe.bench_share, 0.0..=1.0)?;

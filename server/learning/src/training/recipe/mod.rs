@@ -24,8 +24,11 @@ pub const LEG: u64 = 100;
 pub struct Recipe {
     /// Name of the policy that is trained.
     pub policy: String,
-    /// Pictures drawn to train on, if no footage is given. Validation draws as many others, at most 60.
+    /// Pictures drawn to train on, unless footage takes the place of all. Validation draws as many others, at most 60.
     pub pictures: u64,
+    /// Share of the scans over flat scenes that are over footage, if some is given; the others are over drawn pictures.
+    #[serde(default = "all", skip_serializing_if = "is_all")]
+    pub footage_share: f64,
     /// Scenes with relief drawn to train on besides. Validation draws as many others, at most 60. 0: none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub reliefs: u64,
@@ -57,6 +60,15 @@ const fn is_zero(count: &u64) -> bool {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
 fn is_nothing(share: &f64) -> bool {
     *share <= 0.0
+}
+
+const fn all() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+fn is_all(share: &f64) -> bool {
+    *share >= 1.0
 }
 
 const fn half() -> f64 {

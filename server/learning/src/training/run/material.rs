@@ -1,4 +1,4 @@
-//! What a training trains on: drawn pictures or footage, and a bench's own recordings. The checkpoint holds their paths
+//! What a training trains on: drawn pictures, footage, and a bench's own recordings. The checkpoint holds their paths
 //! and checksums, so that a resumed training uses the same.
 
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ const LEAST_CHECKED: usize = 60;
 /// Paths of what a training trains on. Both lists may be empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sources {
-    /// Videos, images or folders of images, instead of drawn pictures.
+    /// Videos, images or folders of images, instead of drawn pictures or, by the recipe's share, beside them.
     pub footage: Vec<PathBuf>,
     /// Folders of a bench's recorded scans and focal stacks, used besides the pictures.
     pub scans: Vec<String>,
@@ -38,14 +38,18 @@ pub struct Sources {
 
 /// The pictures and recordings of a training, opened.
 pub(super) struct Material {
-    pub clips: Vec<Arc<Clip>>,
-    /// The footage's paths and the hash of its pictures; `None` for drawn pictures.
-    footage: Option<Origin>,
+    /// Drawn pictures; none if all flat scans are over footage.
+    drawn: Vec<Arc<Clip>>,
+    /// `None` without footage.
+    footage: Option<Footage>,
     /// The bench's recordings, with their paths and hash; `None` without recordings.
     bench: Option<(BenchScenes, Origin)>,
     /// The format of raw mosaics that was given.
     raw: Option<PixelFormat>,
 }
+
+/// Clips, with their paths and hash.
+type Footage = (Vec<Arc<Clip>>, Origin);
 
 /// The absolute paths of pictures, and a hash of their content.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,34 +71,35 @@ const SCANS: Kind = Kind { name: "scans", option: "--scans" };
 const RAW: &str = "raw";
 
 impl Material {
-    /// Opens the footage and recordings of `sources`. Without footage, draws `pictures` pictures instead.
-    pub fn open(sources: &Sources, pictures: u64) -> Result<Self, TrainError> {
-        let (clips, footage) = clips(&sources.footage, pictures)?;
+    /// Opens the footage and recordings of `sources`, and draws the pictures that `recipe` needs beside them.
+    pub fn open(sources: &Sources, recipe: &Recipe) -> Result<Self, TrainError> {
+        let footage = footage(&sources.footage)?;
         let bench = bench(&sources.scans, sources.raw)?;
-        Ok(Self { clips, footage, bench, raw: sources.raw })
+        Ok(Self { drawn: drawn(recipe, footage.is_some())?, footage, bench, raw: sources.raw })
     }
 
     /// Opens what the training of `checkpoint` was begun on. `asked` holds its new paths, if any were given.
-    pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, pictures: u64) -> Result<Self, TrainError> {
+    pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, recipe: &Recipe) -> Result<Self, TrainError> {
         let paths = |footage: &[PathBuf]| footage.iter().map(|path| path.to_string_lossy().into_owned()).collect();
-        let footage = KnownSources::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
+        let known = KnownSources::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
         let scans = KnownSources::of(checkpoint, SCANS, asked.scans.clone())?;
 
-        let from = footage.paths().iter().map(PathBuf::from).collect::<Vec<_>>();
-        let (clips, origin) = clips(&from, pictures).map_err(|error| footage.unusable(error))?;
-        footage.check(origin.as_ref())?;
+        let from = known.paths().iter().map(PathBuf::from).collect::<Vec<_>>();
+        let footage = footage(&from).map_err(|error| known.unusable(error))?;
+        known.check(footage.as_ref().map(|(_, origin)| origin))?;
 
         let noted = checkpoint.notes.get(RAW).and_then(|name| name.parse().ok());
         let raw = asked.raw.or(noted);
         let bench = bench(scans.paths(), raw).map_err(|error| scans.unusable(error))?;
         scans.check(bench.as_ref().map(|(_, origin)| origin))?;
-        Ok(Self { clips, footage: origin, bench, raw })
+        Ok(Self { drawn: drawn(recipe, footage.is_some())?, footage, bench, raw })
     }
 
     /// Adds the paths and hashes to the checkpoint's notes.
     pub fn note(&self, checkpoint: &mut Checkpoint<'_>) {
+        let footage = self.footage.as_ref().map(|(_, origin)| origin);
         let bench = self.bench.as_ref().map(|(_, origin)| origin);
-        for (kind, origin) in [(FOOTAGE, self.footage.as_ref()), (SCANS, bench)] {
+        for (kind, origin) in [(FOOTAGE, footage), (SCANS, bench)] {
             if let Some(origin) = origin {
                 checkpoint.notes.insert(kind.name.to_owned(), origin.paths.join("\n"));
                 checkpoint.notes.insert(kind.checksum(), origin.sha256.clone());
@@ -110,8 +115,16 @@ impl Material {
         let relief =
             relief::scenes(Split::Training, recipe.reliefs).map_err(|error| TrainError::Recipe(error.to_string()))?;
         let relief = relief.into_iter().map(Scene::Stack).collect();
+        let films = self.footage.as_ref().map_or_else(Vec::new, |(clips, _)| clips.clone());
+        let flat = match &self.drawn[..] {
+            [] => Scenery::from(films),
+            drawn => {
+                let films = films.into_iter().map(Scene::Flat).collect();
+                Scenery::from(drawn.to_vec()).with(films, recipe.footage_share)
+            }
+        };
         let bench = self.bench.as_ref().map_or_else(Vec::new, |(scenes, _)| scenes.training.clone());
-        Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share).with(bench, recipe.bench_share))
+        Ok(flat.with(relief, recipe.relief_share).with(bench, recipe.bench_share))
     }
 
     /// The bench's recordings to validate on; empty without recordings.
@@ -121,10 +134,14 @@ impl Material {
 
     /// Describes the material in words, for a model card.
     pub fn words(&self) -> String {
-        let pictures = match self.footage {
-            None => format!("{} drawn pictures and brain phantoms", self.clips.len()),
-            Some(_) => format!("{} clips of footage", self.clips.len()),
-        };
+        let mut pictures = Vec::new();
+        if !self.drawn.is_empty() {
+            pictures.push(format!("{} drawn pictures and brain phantoms", self.drawn.len()));
+        }
+        if let Some((clips, _)) = &self.footage {
+            pictures.push(format!("{} clips of footage", clips.len()));
+        }
+        let pictures = pictures.join(" and ");
         match &self.bench {
             None => pictures,
             Some((scenes, origin)) => format!(
@@ -214,11 +231,19 @@ impl KnownSources {
     }
 }
 
-/// Reads the footage at `paths`, with its origin. Without paths, draws `pictures` pictures instead.
-fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Origin>), TrainError> {
+/// Draws the pictures of `recipe`, unless footage takes the place of all of them.
+fn drawn(recipe: &Recipe, has_footage: bool) -> Result<Vec<Arc<Clip>>, TrainError> {
+    if has_footage && recipe.footage_share >= 1.0 {
+        return Ok(Vec::new());
+    }
+    let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
+    varied(Split::Training, recipe.pictures).map_err(unfit)
+}
+
+/// Reads the footage at `paths`, with its origin; `None` without paths.
+fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, TrainError> {
     if paths.is_empty() {
-        let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
-        return Ok((varied(Split::Training, pictures).map_err(unfit)?, None));
+        return Ok(None);
     }
 
     let mut clips = Vec::new();
@@ -234,7 +259,7 @@ fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Ori
     check_detail(&clips)?;
 
     let paths = paths.iter().map(|path| absolute(&path.to_string_lossy())).collect();
-    Ok((clips, Some(Origin { paths, sha256: hex::encode(hash.finalize()) })))
+    Ok(Some((clips, Origin { paths, sha256: hex::encode(hash.finalize()) })))
 }
 
 /// Reads the recordings in `folders`, with their origin; `None` without folders.
@@ -275,4 +300,39 @@ fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
         tell(format_args!("note: {warning}; training learns nothing from those"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, Luma};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::training::recipe::shipped;
+
+    #[test]
+    fn footage_takes_its_share_of_the_flat_scans() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("checks.png");
+        let checks = |x: u32, y: u32| Luma([if (x / 3 + y / 2).is_multiple_of(2) { 200 } else { 60 }]);
+        GrayImage::from_fn(128, 128, checks).save(&file).unwrap();
+        let sources = Sources { footage: vec![file], ..Sources::default() };
+
+        let mut recipe = Recipe::parse(shipped("mgm-learned").unwrap()).unwrap();
+        (recipe.pictures, recipe.footage_share) = (3, 0.25);
+        let material = Material::open(&sources, &recipe).unwrap();
+        assert_eq!(material.words(), "3 drawn pictures and brain phantoms and 1 clips of footage");
+
+        let scenery = material.scenery(&recipe).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let is_footage = |scene: Scene| matches!(scene, Scene::Flat(clip) if clip.at(0).width == 128);
+        let scans = (0..10_000).filter(|_| is_footage(scenery.draw(&mut rng))).count();
+        // Binomial: 2500 with a standard deviation of 43.
+        assert!((2280..2720).contains(&scans), "{scans}");
+
+        recipe.footage_share = 1.0;
+        let material = Material::open(&sources, &recipe).unwrap();
+        assert_eq!(material.words(), "1 clips of footage");
+    }
 }

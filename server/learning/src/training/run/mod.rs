@@ -92,7 +92,7 @@ impl Run {
         let weights = from.map(|file| beginning(design, file)).transpose()?;
         let folder = RunFolder::begin(folder)?;
 
-        let material = Material::open(sources, recipe.pictures)?;
+        let material = Material::open(sources, &recipe)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
 
         if let (Some(bytes), Some(file)) = (weights, from) {
@@ -118,7 +118,7 @@ impl Run {
         request.check(folder.path(), &recipe, seed)?;
 
         let design = recipe.design()?;
-        let material = Material::again(&checkpoint, &request.sources, recipe.pictures)?;
+        let material = Material::again(&checkpoint, &request.sources, &recipe)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
 
         let version = checkpoint.notes.get("version").map_or("another version", String::as_str);

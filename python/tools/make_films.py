@@ -1,0 +1,162 @@
+"""Makes films of still surfaces, to train on with `parfocal train --footage`: docs/notebook.md.
+
+python3 tools/make_films.py --out DIR PHOTOGRAPH_OR_FOCAL_STACK...
+
+Each film shows one surface, in focus everywhere, under a camera in a hand: it pans, turns, comes nearer, and the surface
+is strained as tissue is. Light, softness, noise, glints and compression differ from film to film. Blur is left to the
+training. A focal stack (a folder of pictures) first becomes one picture, each place from the plane where it is sharpest.
+Needs ffmpeg and numpy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.floating]
+
+WIDTH, HEIGHT, FRAMES, RATE = 640, 480, 160, 25
+#: Surfaces are reduced to this width.
+WIDEST = 1000
+SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+
+
+def read(file: Path) -> Picture:
+    """Return a picture as gray levels, at most WIDEST pixels wide."""
+    scale = f"scale='min({WIDEST},iw)':-2:flags=area,format=gray"
+    command = ["ffmpeg", "-v", "error", "-i", str(file), "-frames:v", "1", "-vf", scale]
+    command += ["-f", "image2pipe", "-c:v", "pgm", "-"]
+    pgm = subprocess.run(command, check=True, capture_output=True).stdout
+    width, height = (int(number) for number in pgm.split(maxsplit=3)[1:3])
+    return np.frombuffer(pgm[-width * height :], np.uint8).reshape(height, width).astype(np.float32)
+
+
+def blurred(picture: Picture, sigma: float) -> Picture:
+    """Return a picture under a Gaussian, mirrored at its edges."""
+    margin = int(4 * sigma) + 1
+    wide = np.pad(picture, margin, mode="symmetric")
+    down, along = np.fft.fftfreq(wide.shape[0])[:, None], np.fft.rfftfreq(wide.shape[1])[None, :]
+    transfer = np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + along**2))
+    soft = np.fft.irfft2(np.fft.rfft2(wide) * transfer, wide.shape)
+    return soft[margin:-margin, margin:-margin].astype(np.float32)
+
+
+def all_in_focus(folder: Path) -> Picture:
+    """Return one picture of a focal stack: each place from the plane where it is sharpest."""
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
+    if not files:
+        raise SystemExit(f"{folder} holds no pictures")
+    best = np.zeros(0, np.float32)
+    sharpest = np.zeros(0, np.float32)
+    for file in files:
+        plane = read(file)
+        smooth = np.pad(blurred(plane, 1.0), 1, mode="edge")
+        middle = smooth[1:-1, 1:-1]
+        laplacian = smooth[:-2, 1:-1] + smooth[2:, 1:-1] + smooth[1:-1, :-2] + smooth[1:-1, 2:] - 4 * middle
+        energy = blurred(laplacian**2, 6.0)
+        if not best.size:
+            best, sharpest = plane, energy
+            continue
+        sharper = energy > sharpest
+        best, sharpest = np.where(sharper, plane, best), np.maximum(energy, sharpest)
+    return best
+
+
+def looked_at(picture: Picture, x: NDArray[np.float64], y: NDArray[np.float64]) -> Picture:
+    """Return the levels at places between pixels, by linear interpolation; beyond its edges a picture is mirrored."""
+    height, width = picture.shape
+
+    def mirrored(place: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+        turned: NDArray[np.float64] = np.mod(place, 2 * (size - 1))
+        return turned + np.minimum(0, 2 * (size - 1 - turned))
+
+    x, y = mirrored(x, width), mirrored(y, height)
+    left, top = np.minimum(x.astype(np.intp), width - 2), np.minimum(y.astype(np.intp), height - 2)
+    across, down = x - left, y - top
+    above = picture[top, left] * (1 - across) + picture[top, left + 1] * across
+    below = picture[top + 1, left] * (1 - across) + picture[top + 1, left + 1] * across
+    levels: Picture = above * (1 - down) + below * down
+    return levels
+
+
+def film(surface: Picture, file: Path, seed: int) -> None:
+    """Write a film of a surface; its camera and light are drawn from the seed."""
+    random = np.random.default_rng(seed)
+    height, width = surface.shape
+    zoom = np.exp(random.uniform(np.log(0.6), np.log(1.8))) * max(1.0, 300 / min(height, width))
+    speed = random.choice([0.3, 1.0, 2.5, 5.0])
+    strain = random.choice([0.0, 0.0, 0.02, 0.05])
+    phase, pace = random.uniform(0, 6.28, 4), random.uniform(0.02, 0.15, 4)
+    wave = random.uniform(0.004, 0.02, 4)
+    gamma, gain, fall = random.uniform(0.7, 1.4), random.uniform(0.6, 1.2), random.uniform(0.0, 0.5)
+    softness, noise = random.choice([0.0, 0.0, 0.6, 1.0]), random.choice([0.0, 1.0, 2.5])
+    glints = random.uniform([0, 0, 1], [WIDTH, HEIGHT, 4], (random.choice([0, 0, 10, 25]), 3))
+    quality = int(random.integers(18, 32))
+
+    light = (255 * gain * (np.clip(surface, 0, 255) / 255) ** gamma).astype(np.float32)
+    light = np.clip(blurred(light, softness / zoom) if softness else light, 0, 255)
+    x, y = np.meshgrid(np.arange(WIDTH) - WIDTH / 2, np.arange(HEIGHT) - HEIGHT / 2)
+    shade = 1 - fall * (x**2 + y**2) / (WIDTH**2 / 4 + HEIGHT**2 / 4)
+    place, velocity = np.array([width, height]) * random.uniform(0.3, 0.7, 2), np.zeros(2)
+    angle, turning, depth, nearing = random.uniform(0, 6.28), 0.0, 0.0, 0.0
+
+    raw = ["-f", "rawvideo", "-pix_fmt", "gray", "-s", f"{WIDTH}x{HEIGHT}", "-r", str(RATE), "-i", "-"]
+    # One thread, so that the same seed gives the same film on every machine.
+    video = ["-c:v", "libx264", "-preset", "veryfast", "-threads", "1"]
+    video += ["-crf", str(quality), "-pix_fmt", "yuv420p"]
+    command = ["ffmpeg", "-y", "-v", "error", *raw, *video, str(file)]
+    encoder = subprocess.Popen(command, stdin=subprocess.PIPE)
+    assert encoder.stdin is not None
+    for frame in range(FRAMES):
+        velocity = 0.94 * velocity + 0.06 * random.normal(0, 3 * speed, 2)
+        if random.random() < 0.01:
+            velocity = velocity + random.normal(0, 4 * speed, 2)
+        turning = 0.95 * turning + 0.05 * random.normal(0, 0.012)
+        nearing = 0.95 * nearing + 0.05 * random.normal(0, 0.01)
+        place, angle = place + 0.7 * velocity, angle + turning
+        depth = float(np.clip(depth + nearing, -0.25, 0.25))
+
+        swing = 0.3 * strain / wave
+        along = x + swing[0] * np.sin(y * wave[0] + pace[0] * frame + phase[0])
+        along = along + swing[1] * np.sin(x * wave[1] + pace[1] * frame + phase[1])
+        down = y + swing[2] * np.sin(x * wave[2] + pace[2] * frame + phase[2])
+        down = down + swing[3] * np.sin(y * wave[3] + pace[3] * frame + phase[3])
+        scale = np.exp(depth) / zoom
+        cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
+        across = place[0] + cosine * along - sine * down
+        below = place[1] + sine * along + cosine * down
+        picture = looked_at(light, across, below) * shade
+        for left, top, radius in glints:
+            picture[(x + WIDTH / 2 - left) ** 2 + (y + HEIGHT / 2 - top) ** 2 < radius**2] = 255
+        if noise:
+            picture = picture + random.normal(0, noise, picture.shape)
+        encoder.stdin.write(np.clip(np.rint(picture), 0, 255).astype(np.uint8).tobytes())
+    encoder.stdin.close()
+    if encoder.wait() != 0:
+        raise SystemExit(f"ffmpeg could not write {file}")
+
+
+def main() -> None:
+    """Make the films that the command line names."""
+    parser = argparse.ArgumentParser(description="Make films of still surfaces, to train on.")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the films")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the first film; the others follow")
+    parser.add_argument("--each", type=int, default=2, help="films of each surface")
+    parser.add_argument("surface", type=Path, nargs="+", help="photograph, or folder of a focal stack")
+    given = parser.parse_args()
+
+    given.out.mkdir(parents=True, exist_ok=True)
+    seed = given.seed
+    for path in given.surface:
+        surface = all_in_focus(path) if path.is_dir() else read(path)
+        for number in range(given.each):
+            film(surface, given.out / f"{path.stem}-{number}.mp4", seed)
+            seed += 1
+
+
+if __name__ == "__main__":
+    main()
