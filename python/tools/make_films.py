@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Picture = NDArray[np.floating]
 
-WIDTH, HEIGHT, FRAMES, RATE = 640, 480, 160, 25
+WIDTH, HEIGHT, RATE = 640, 480, 25
 #: Surfaces are reduced to this width.
 WIDEST = 1000
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
@@ -83,7 +83,7 @@ def looked_at(picture: Picture, x: NDArray[np.float64], y: NDArray[np.float64]) 
     return levels
 
 
-def film(surface: Picture, file: Path, seed: int) -> None:
+def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
     """Write a film of a surface; its camera and light are drawn from the seed."""
     random = np.random.default_rng(seed)
     height, width = surface.shape
@@ -111,7 +111,7 @@ def film(surface: Picture, file: Path, seed: int) -> None:
     command = ["ffmpeg", "-y", "-v", "error", *raw, *video, str(file)]
     encoder = subprocess.Popen(command, stdin=subprocess.PIPE)
     assert encoder.stdin is not None
-    for frame in range(FRAMES):
+    for frame in range(frames):
         velocity = 0.94 * velocity + 0.06 * random.normal(0, 3 * speed, 2)
         if random.random() < 0.01:
             velocity = velocity + random.normal(0, 4 * speed, 2)
@@ -145,6 +145,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Make films of still surfaces, to train on.")
     parser.add_argument("--out", type=Path, required=True, help="folder of the films")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first film; the others follow")
+    parser.add_argument("--frames", type=int, default=160, help="frames of each film")
     parser.add_argument("--each", type=int, default=2, help="films of each surface")
     parser.add_argument("surface", type=Path, nargs="+", help="photograph, or folder of a focal stack")
     given = parser.parse_args()
@@ -154,7 +155,7 @@ def main() -> None:
     for path in given.surface:
         surface = all_in_focus(path) if path.is_dir() else read(path)
         for number in range(given.each):
-            film(surface, given.out / f"{path.stem}-{number}.mp4", seed)
+            film(surface, given.out / f"{path.stem}-{number}.mp4", given.frames, seed)
             seed += 1
 
 
