@@ -63,8 +63,8 @@ pub struct Arguments {
     /// one of their length.
     #[arg(long, value_name = "FORMAT")]
     raw: Option<PixelFormat>,
-    /// A video (its first 1500 frames), an image or a folder of images instead of drawn pictures.
-    #[arg(long, value_name = "PATH")]
+    /// Videos (their first 1500 frames), images or folders of images instead of drawn pictures.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     footage: Vec<PathBuf>,
     /// What the scenes are for: each purpose has drawn scenes of its own, and of five recordings or more every fifth is
     /// not for training. Footage is the same for all.

@@ -62,8 +62,8 @@ pub struct Arguments {
     /// `parfocal scan info` measures them; with --stacks also `measured`, each stack by its own pictures.
     #[arg(long, value_name = "PIXELS|measured")]
     blur: Option<Blur>,
-    /// A video (its first 1500 frames), an image or a folder of images to use instead of the reference pictures.
-    #[arg(long, value_name = "PATH")]
+    /// Videos (their first 1500 frames), images or folders of images to use instead of the reference pictures.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     footage: Vec<PathBuf>,
     /// Names of policies, separated by commas; `all` for all that can run; `file:PATH` for a
     /// TorchScript file and `exec:COMMAND` for a policy in another process, each of which ends with the argument and

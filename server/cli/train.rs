@@ -58,9 +58,9 @@ struct Training {
     /// Number of updates instead of the recipe's; not needed with `--resume`.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_UPDATES))]
     updates: Option<u64>,
-    /// A video (its first 1500 frames), an image or a folder of images to train on instead of drawn
-    /// pictures; not needed with `--resume`.
-    #[arg(long, value_name = "PATH")]
+    /// Videos (their first 1500 frames), images or folders of images to train on instead of drawn pictures or, by the
+    /// recipe's `footage_share`, beside them; not needed with `--resume`.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     footage: Vec<PathBuf>,
     /// Recorded scans and focal stacks of your own bench to train on beside the pictures, half of the
     /// time: folders of `parfocal scan`, or of pictures of a still scene in order of focus. `DIR:K` makes

@@ -116,7 +116,7 @@ def main():
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
     values = cnn(patches, wave(8, 0.7, 1.0))
     # Fewer inputs than the shipped network has: it is the same for any number.
-    inputs, units, bins = 177, 192, 41
+    inputs, units, bins = 177, 320, 41
     belief = Belief(inputs, units, bins)
     fill(belief)
     logits = belief(wave(2 * 5 * inputs, 0.29, 1.0).view(2, 5, inputs))

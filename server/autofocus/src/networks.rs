@@ -17,7 +17,7 @@ pub const ENCODING: usize = 8;
 /// Focal powers, equally spaced from 0 to 1, over which the belief tracker's posterior is given.
 pub const BINS: usize = 41;
 /// Units of the belief tracker's GRU.
-pub const MEMORY: usize = 192;
+pub const MEMORY: usize = 320;
 /// Inputs from the patch and the lens: features, their change since the last frame, and the change of blur over the
 /// texture that both frames show; then the focal power spread over [`BINS`], and three numbers on how it moved.
 pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
