@@ -159,6 +159,9 @@ mod tests {
         for shipped in SHIPPED {
             assert!(registry.build(&PolicyName::new(shipped.name)).is_ok(), "{}", shipped.name);
         }
+        // What the last training of parfocal begins with.
+        let drawn = std::fs::read("../../policies/parfocal-drawn.safetensors").unwrap();
+        assert!(build(Design::Belief, &drawn).is_ok());
     }
 
     #[test]
