@@ -107,6 +107,11 @@ fn recording(
 
     let mut scenes: Vec<StackScene> = Vec::new();
     for stack in scaled {
+        // A stack that is small enough is the same at both scales.
+        if scenes.iter().any(|scene| scene.planes.size() == stack.pictures.size()) {
+            continue;
+        }
+
         let (planes, (first, last)) = (stack.planes, stack.pictures.range());
         if planes < 3 || planes as f64 > last - first + 1.0 {
             return Err(UnfitStack::TooSmall { folder: source.folder, planes }.into());
@@ -114,11 +119,8 @@ fn recording(
 
         let smaller = stack.smaller(SMALLER);
         for pictures in [Some(Arc::unwrap_or_clone(stack.pictures)), smaller].into_iter().flatten() {
-            // A stack that is small enough is the same at both scales.
-            if scenes.iter().all(|scene| scene.planes.size() != pictures.size()) {
-                pictures.digest(hash);
-                scenes.push(scene(planes, pictures));
-            }
+            pictures.digest(hash);
+            scenes.push(scene(planes, pictures));
         }
     }
     Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())

@@ -78,10 +78,8 @@ impl ScaledStack {
             return None;
         }
 
-        let small = |plane: &Plane| reduced(&plane.picture, width, height);
-        let numbered: Vec<_> =
-            self.stack.planes().iter().enumerate().map(|(at, plane)| (at as f32, small(plane))).collect();
-        PlaneStack::new(&numbered).ok()
+        let pictures = self.stack.planes().iter().map(|plane| reduced(&plane.picture, width, height));
+        PlaneStack::new(&numbered(pictures)).ok()
     }
 
     /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
@@ -134,8 +132,7 @@ impl StackSource {
 
         let scaled = |(scale, wide): (&'static str, usize)| {
             let side = ((width as f64 / wide as f64).round() as usize).max(1);
-            let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
-            let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
+            let numbered = numbered(stack.planes().iter().map(|plane| in_blocks(&plane.picture, side)));
 
             let unfit = |source| UnfitStack::Planes { folder: self.folder.clone(), source };
             let pictures = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
@@ -148,6 +145,11 @@ impl StackSource {
         let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
         Ok((scaled, doubts.into_iter().map(named).collect()))
     }
+}
+
+/// Each picture with its number, from 0, as its position.
+fn numbered(pictures: impl Iterator<Item = GrayImage>) -> Vec<(f32, GrayImage)> {
+    pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect()
 }
 
 #[cfg(test)]
