@@ -65,3 +65,20 @@ def test_a_seed_gives_the_same_film_again_and_another_one_does_not(tmp_path: Pat
     assert first == (tmp_path / "two/surface-0.mp4").read_bytes()
     assert first != (tmp_path / "three/surface-0.mp4").read_bytes()
     assert first != (tmp_path / "one/surface-1.mp4").read_bytes()
+
+
+def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+    """A wrong name gets a sentence, not a traceback."""
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "note.png").write_text("no picture")
+    for wrong, said in [
+        ("gone.jpg", "cannot read "),
+        ("note.png", "cannot read "),
+        ("empty", "holds no pictures"),
+    ]:
+        command = [sys.executable, "-s", str(TOOL), "--out", str(tmp_path / "films"), str(tmp_path / wrong)]
+        run = subprocess.run(command, capture_output=True, text=True)
+        assert run.returncode == 1
+        assert wrong in run.stderr
+        assert said in run.stderr
+        assert "Traceback" not in run.stderr

@@ -11,6 +11,7 @@ Needs ffmpeg and numpy.
 from __future__ import annotations
 
 import argparse
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -30,7 +31,11 @@ def read(file: Path) -> Picture:
     scale = f"scale='min({WIDEST},iw)':-2:flags=area,format=gray"
     command = ["ffmpeg", "-v", "error", "-i", str(file), "-frames:v", "1", "-vf", scale]
     command += ["-f", "image2pipe", "-c:v", "pgm", "-"]
-    pgm = subprocess.run(command, check=True, capture_output=True).stdout
+    run = subprocess.run(command, capture_output=True)
+    pgm = run.stdout
+    if run.returncode != 0 or not pgm:
+        complaint = run.stderr.decode(errors="replace").strip().splitlines() or ["it holds no picture"]
+        raise SystemExit(f"cannot read {file}: {complaint[-1]}")
     width, height = (int(number) for number in pgm.split(maxsplit=3)[1:3])
     return np.frombuffer(pgm[-width * height :], np.uint8).reshape(height, width).astype(np.float32)
 
@@ -61,6 +66,8 @@ def all_in_focus(folder: Path) -> Picture:
         if not best.size:
             best, sharpest = plane, energy
             continue
+        if plane.shape != best.shape:
+            raise SystemExit(f"{file} differs in size from the other pictures of its stack")
         sharper = energy > sharpest
         best, sharpest = np.where(sharper, plane, best), np.maximum(energy, sharpest)
     return best
@@ -149,6 +156,8 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=2, help="films of each surface")
     parser.add_argument("surface", type=Path, nargs="+", help="photograph, or folder of a focal stack")
     given = parser.parse_args()
+    if not shutil.which("ffmpeg"):
+        raise SystemExit("films are made by ffmpeg, which is not installed: install Debian's package ffmpeg")
 
     given.out.mkdir(parents=True, exist_ok=True)
     seed = given.seed
