@@ -46,8 +46,9 @@ pub struct Arguments {
 struct Training {
     /// Recipe: `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`. Each of the first three also has a recipe
     /// that follows the paper, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined`, `parfocal-relief`,
-    /// `parfocal-glass` (on focal stacks of several optics, with `--scans`) and `parfocal-adapted` (to a bench, with
-    /// `--scans`) are later stages: give them the weights of the stage before with `--from`.
+    /// `cnn-learned-glass` and `parfocal-glass` (on focal stacks of several optics, with `--scans`) and
+    /// `parfocal-adapted` (to a bench, with `--scans`) are later stages: give them the weights of the stage before with
+    /// `--from`.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]

@@ -159,9 +159,11 @@ mod tests {
         for shipped in SHIPPED {
             assert!(registry.build(&PolicyName::new(shipped.name)).is_ok(), "{}", shipped.name);
         }
-        // What the last training of parfocal begins with.
-        let drawn = std::fs::read("../../policies/parfocal-drawn.safetensors").unwrap();
-        assert!(build(Design::Belief, &drawn).is_ok());
+        // What the last trainings begin with.
+        for (name, design) in [("cnn-learned", Design::Values(Input::Patch)), ("parfocal", Design::Belief)] {
+            let drawn = std::fs::read(format!("../../policies/{name}-drawn.safetensors")).unwrap();
+            assert!(build(design, &drawn).is_ok(), "{name}");
+        }
     }
 
     #[test]

@@ -86,11 +86,12 @@ const fn whole_benchmark() -> usize {
 
 /// The recipes that ship. Ours have the policy's name; those that train its weights further end in `-refined`,
 /// `-relief`, `-glass` or `-adapted`. The paper's end in `-paper`.
-const SHIPPED: [(&str, &str); 12] = [
+const SHIPPED: [(&str, &str); 13] = [
     ("mgm-learned", include_str!("../../../../../policies/mgm-learned.toml")),
     ("mlr-learned", include_str!("../../../../../policies/mlr-learned.toml")),
     ("cnn-learned", include_str!("../../../../../policies/cnn-learned.toml")),
     ("cnn-learned-refined", include_str!("../../../../../policies/cnn-learned-refined.toml")),
+    ("cnn-learned-glass", include_str!("../../../../../policies/cnn-learned-glass.toml")),
     ("mgm-learned-paper", include_str!("../../../../../policies/mgm-learned-paper.toml")),
     ("mlr-learned-paper", include_str!("../../../../../policies/mlr-learned-paper.toml")),
     ("cnn-learned-paper", include_str!("../../../../../policies/cnn-learned-paper.toml")),
