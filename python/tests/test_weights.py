@@ -75,3 +75,11 @@ def test_what_cannot_be_averaged_is_named(tmp_path: Path, files: list[str], comp
     assert done.returncode != 0
     assert complaint in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    """The folder is missing."""
+    one = write(tmp_path / "one", bias=[1.0])
+    done = run(tmp_path / "missing/out", f"{one}=1")
+    assert done.returncode == 1
+    assert done.stderr == f"cannot write {tmp_path / 'missing/out'}: No such file or directory\n"

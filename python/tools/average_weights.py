@@ -66,7 +66,10 @@ def write(file: Path, weights: Weights, made: str) -> None:
         data += raw
     head = json.dumps(entries).encode()
     head += b" " * (-len(head) % 8)
-    file.write_bytes(len(head).to_bytes(8, "little") + head + data)
+    try:
+        file.write_bytes(len(head).to_bytes(8, "little") + head + data)
+    except OSError as error:
+        raise SystemExit(f"cannot write {file}: {error.strerror}") from error
 
 
 def share_of(argument: str) -> tuple[Path, float]:
