@@ -127,6 +127,13 @@ async fn tab_to(page: &Browser, css: &str) {
     panic!("the Tab key does not lead to {css}");
 }
 
+/// The frames in `Recording mosaics, as the protocol asks: 12 s, 120 frames, 190 MB.`
+async fn recorded_frames(operator: &Browser) -> usize {
+    let words = operator.text("#recording-now").await;
+    let frames = words.split(", ").find_map(|part| part.strip_suffix(" frames"));
+    frames.map_or(0, |frames| frames.parse().unwrap())
+}
+
 /// A recorded session in which the surgeon points at a place, unblinded on the researcher's page.
 async fn recorded(theatre: &Theatre) {
     theatre.begin("S-46", "filmed").await;
@@ -140,6 +147,9 @@ async fn recorded(theatre: &Theatre) {
         placed > 0
     })
     .await;
+    // The disk may be slow, and frames of before the place are of no use here.
+    let before = recorded_frames(&theatre.operator).await;
+    until("frames after it", || async { recorded_frames(&theatre.operator).await >= before + 50 }).await;
     theatre.say("Sharp there", 1).await;
     theatre.abort("the test is over").await;
     theatre.operator.sees("#recording-notice", "frames are saved in").await;
