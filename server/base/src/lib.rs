@@ -22,6 +22,11 @@ pub mod priority;
 pub mod statistics;
 pub mod step;
 
+/// Boxes the future of an async function. Its body is then compiled in its own crate, once. Without this, the body and
+/// those of all functions that it awaits are compiled in each crate that awaits it, at that crate's level of
+/// optimisation. For functions between crates that await much; the box costs nothing that a disk or a network would not
+/// cost more. `#[boxed(?Send)]` is for a future that stays on its thread.
+pub use async_recursion::async_recursion as boxed;
 pub use blur_rate::BlurRate;
 pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
 pub use patch_place::PatchPlace;

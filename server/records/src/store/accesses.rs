@@ -12,6 +12,7 @@ use super::schema::DATABASE;
 use super::values::nanoseconds;
 use super::writer::Writer;
 use super::{Reader, Store, StoreError};
+use parfocal_base::boxed;
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::account::{AccountName, Actor};
@@ -157,6 +158,7 @@ impl AccessLog {
         self.writer.close(&self.reader).await;
     }
 
+    #[boxed]
     async fn record_on(
         &self,
         connection: &mut SqliteConnection,

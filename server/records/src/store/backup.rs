@@ -16,6 +16,7 @@ use super::lock::FolderLock;
 use super::schema::DATABASE;
 use super::verify::checks;
 use super::{Access, AccessLog, Head, Reader, StoreError};
+use parfocal_base::boxed;
 use parfocal_base::clock::Clock;
 use parfocal_base::files::{make_private, sync_folder_of};
 
@@ -124,6 +125,7 @@ pub struct Restored {
 ///
 /// # Errors
 /// If `out` exists or cannot be written, the database cannot be read, or the copy does not verify.
+#[boxed]
 pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<Backup, BackupError> {
     if out.exists() {
         return Err(BackupError::Exists(out.to_owned()));
@@ -178,6 +180,8 @@ impl VerifiedCopy {
 ///
 /// # Errors
 /// If the file cannot be written, the database cannot be read, or the copy does not verify.
+#[boxed]
+#[must_use]
 pub async fn verified_copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
     copy_into(access_log, temporary_in(folder)?, "the backup").await
 }
@@ -227,6 +231,7 @@ fn put_in_place(
 ///
 /// # Errors
 /// If a server uses the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
+#[boxed]
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
     DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
     let _lock = FolderLock::of(folder)?;

@@ -7,6 +7,7 @@ use super::actors::name_actor;
 use super::insert::Insert;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::account::Actor;
 use parfocal_trial::consent::{Consent, Medium};
@@ -44,6 +45,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_consent(
     connection: &mut SqliteConnection,
     run: i64,

@@ -9,6 +9,7 @@ use super::actors::name_actor;
 use super::insert::Insert;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_trial::account::AccountName;
 use parfocal_trial::correction::{Field, Subject};
@@ -96,6 +97,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_correction(
     connection: &mut SqliteConnection,
     run: i64,

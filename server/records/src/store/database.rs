@@ -15,6 +15,7 @@ use sqlx::sqlite::{
 };
 use tokio::sync::Mutex;
 
+use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
 use parfocal_base::files::make_private;
 use parfocal_base::{BlurRate, PolicyName};
@@ -315,6 +316,7 @@ async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Re
     Ok(())
 }
 
+#[boxed]
 async fn insert_device_event(
     connection: &mut SqliteConnection,
     run: i64,
@@ -337,6 +339,7 @@ async fn insert_device_event(
     Ok(transaction.commit().await?)
 }
 
+#[boxed]
 async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall: &str) -> Result<(), StoreError> {
     let mut transaction = begin(connection).await?;
     let done = sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")

@@ -12,6 +12,7 @@ use super::insert::Insert;
 use super::scrub::scrub;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::account::AccountName;
 use parfocal_trial::erasure::Erasable;
@@ -90,6 +91,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_erasures(
     connection: &mut SqliteConnection,
     run: i64,

@@ -11,6 +11,7 @@ use super::chain;
 use super::insert::Insert;
 use super::values::{begin, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
+use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::{CommentContent, Holding, Origin, Sight, WaitClock};
@@ -66,6 +67,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_comment(
     connection: &mut SqliteConnection,
     run: i64,
@@ -114,6 +116,7 @@ async fn insert_comment(
     Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
 }
 
+#[boxed]
 async fn insert_answer(
     connection: &mut SqliteConnection,
     run: i64,

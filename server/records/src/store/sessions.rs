@@ -13,6 +13,7 @@ use super::studies::{Enrolment, enrol};
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use parfocal_base::PolicyName;
+use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_trial::account::AccountName;
 use parfocal_trial::allocation::{Algorithm, Seed};
@@ -140,6 +141,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_session(
     connection: &mut SqliteConnection,
     run: i64,
@@ -184,6 +186,7 @@ async fn insert_session(
     Ok(transaction.commit().await?)
 }
 
+#[boxed]
 async fn insert_events(
     connection: &mut SqliteConnection,
     run: i64,
@@ -202,6 +205,8 @@ impl Reader {
     ///
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
+    #[boxed]
+    #[must_use]
     pub async fn session(&self, session: SessionId) -> Result<Option<StoredSession>, StoreError> {
         let row = sqlx::query("SELECT * FROM sessions WHERE session = ?")
             .bind(session.to_string())

@@ -13,6 +13,7 @@ use super::insert::Insert;
 use super::remarks::is_erased;
 use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
+use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_trial::voice::{Ending, LARGEST_RECORDING, MediaType};
 
@@ -138,6 +139,7 @@ impl Store {
     }
 }
 
+#[boxed]
 async fn insert_piece(connection: &mut SqliteConnection, run: i64, new: &VoicePiece) -> Result<PieceKept, StoreError> {
     let comment = new.comment.to_string();
     let sha256 = hex::encode(Sha256::digest(&new.audio));

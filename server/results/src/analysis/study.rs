@@ -14,12 +14,15 @@ use super::report::{
 use super::statistics::summary;
 use super::words::counted;
 use super::{database, exports};
+use parfocal_base::boxed;
 use parfocal_records::store::{Reader, StoreError};
 
 /// Analyses study `name` in the database of `reader`.
 ///
 /// # Errors
 /// If there is no such study, it is not unblinded, or the database failed.
+#[boxed]
+#[must_use]
 pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisError> {
     let records = database::read(reader, name).await?;
     // Permutations need much processor time, so keep them off the asynchronous threads.

@@ -10,6 +10,7 @@ use super::error::AnalysisError;
 use super::figures::figure;
 use super::report::{Analysis, ProtocolAnalysis};
 use super::tables::rows;
+use parfocal_base::boxed;
 use parfocal_records::store::export::{Folder, TEXTS_IN_CSV, ZipStream};
 
 /// What the folder contains, for its description.
@@ -41,6 +42,7 @@ impl Analysis {
         format!("parfocal-{study}-analysis")
     }
 
+    #[boxed]
     async fn write(&self, mut folder: Folder) -> Result<Vec<String>, AnalysisError> {
         folder.table(&rows(self, ProtocolAnalysis::session_rows)).await?;
         folder.table(&rows(self, ProtocolAnalysis::policy_rows)).await?;

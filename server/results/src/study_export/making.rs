@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use super::error::StudyExportError;
 use crate::package::{self, LeftOut, PackageSource, Sessions, Summary};
+use parfocal_base::boxed;
 use parfocal_base::files::files_below;
 use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
@@ -58,6 +59,7 @@ pub struct ExportedStudy {
 /// # Errors
 /// If there is no such study, it has no session to export, the policies are requested before it is unblinded, an export
 /// cannot be verified, or `out` cannot be written.
+#[boxed]
 pub async fn export_study(
     access_log: &AccessLog,
     study: &str,
@@ -95,6 +97,7 @@ pub async fn check(reader: &Reader, study: &str, unblinded: bool) -> Result<(), 
 }
 
 /// The sessions of `study` to export, and those that are left out because they are withdrawn.
+#[boxed]
 async fn sessions_of(
     reader: &Reader,
     study: &str,

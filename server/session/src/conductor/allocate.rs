@@ -7,6 +7,7 @@ use uuid::Uuid;
 use super::course::Course;
 use super::{ConductError, Pen, Shared, StudySite};
 use parfocal_base::PolicyName;
+use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_records::store::{Enrolment, NewSession, Stamp};
 use parfocal_trial::account::Actor;
@@ -31,6 +32,7 @@ struct DrawnOrder {
 }
 
 impl Shared {
+    #[boxed]
     pub(super) async fn create(
         &self,
         by: Actor,

@@ -3,6 +3,7 @@
 use jiff::tz::TimeZone;
 
 use super::{ConductError, Conductor, Shared};
+use parfocal_base::boxed;
 use parfocal_trial::account::Actor;
 use parfocal_trial::consent::{self, NewConsent};
 
@@ -19,6 +20,7 @@ impl Conductor {
 }
 
 impl Shared {
+    #[boxed]
     async fn record_consent(&self, by: Actor, new: NewConsent) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;

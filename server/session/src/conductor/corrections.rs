@@ -2,6 +2,7 @@
 
 use super::course::Course;
 use super::{ConductError, Conductor, Shared};
+use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_records::store::{Answer, Correction, LatestCorrections, standings};
 use parfocal_trial::account::Actor;
@@ -37,6 +38,7 @@ impl Conductor {
 }
 
 impl Shared {
+    #[boxed]
     async fn correct(&self, by: Actor, session: SessionId, new: NewCorrection) -> Result<(), ConductError> {
         let _pen = self.pen.lock().await;
         let course = self.load(session).await?;

@@ -11,6 +11,7 @@ use super::ConductError;
 use parfocal_base::FocalPower;
 use parfocal_base::PatchPlace;
 use parfocal_base::PolicyName;
+use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_pipeline::control::{Command, Drive};
@@ -193,6 +194,7 @@ impl Course {
     }
 
     /// Loads session `session` from the database, or `None`; `clock` is this run's, and knows the earlier runs.
+    #[boxed]
     pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Option<Self>, ConductError> {
         let Some(stored) = reader.session(session).await? else { return Ok(None) };
         let protocol =

@@ -2,6 +2,7 @@
 
 use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::{Answer, Comment, Erased, Erasure, Reader, StoreError, StoredCorrection};
 use parfocal_trial::account::Actor;
@@ -42,6 +43,7 @@ impl Conductor {
 }
 
 impl Shared {
+    #[boxed]
     async fn erase_all_words(&self, by: Actor, session: SessionId, reason: &str) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         let reason = self.check_erasing(&mut pen, &by, session, reason).await?;
@@ -79,6 +81,7 @@ impl Shared {
         Ok(reason)
     }
 
+    #[boxed]
     async fn erase(&self, by: Actor, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         let reason = self.check_erasing(&mut pen, &by, session, &new.reason).await?;

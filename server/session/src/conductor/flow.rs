@@ -12,6 +12,7 @@ use super::circumstances::Subject;
 use super::course::Course;
 use super::{ConductError, Live, Pen, Shared, views};
 use parfocal_base::FocalPower;
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::{Aim, Command, Drive};
 use parfocal_trial::account::Actor;
@@ -73,6 +74,7 @@ impl Shared {
     }
 
     /// Carries out an action that takes effect only when it is on disk.
+    #[boxed]
     async fn move_on(
         &self,
         by: &Actor,
@@ -125,6 +127,7 @@ impl Shared {
     }
 
     /// Acts on a session that is not the one in memory.
+    #[boxed]
     async fn act_on_earlier(
         &self,
         by: &Actor,
@@ -268,6 +271,7 @@ impl Shared {
     ///
     /// # Errors
     /// If the disk or database failed.
+    #[boxed]
     pub(super) async fn record_stops(&self, _pen: &mut Pen) -> Result<(), ConductError> {
         loop {
             let (session, events, stops) = {

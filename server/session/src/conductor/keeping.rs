@@ -7,6 +7,7 @@ use tokio::time::sleep;
 
 use super::Conductor;
 use super::course::Course;
+use parfocal_base::boxed;
 
 /// Interval between two updates of the remaining time. A killed server loses at most this much of a segment's clock.
 const BEAT: Duration = Duration::from_secs(1);
@@ -14,6 +15,8 @@ const BEAT: Duration = Duration::from_secs(1);
 impl Conductor {
     /// Keeps time limits, prompts and the remaining time, records what waits for the disk, and erases voice when its
     /// retention period is over. Never returns; drop it to stop.
+    #[boxed]
+    #[must_use]
     pub async fn run(self) {
         let keeping_time = async {
             loop {

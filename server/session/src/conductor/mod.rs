@@ -23,6 +23,7 @@ mod study_changes;
 mod views;
 mod voice;
 
+use std::pin::Pin;
 use std::sync::Arc;
 
 use rand_chacha::ChaCha12Rng;
@@ -359,6 +360,8 @@ impl Conductor {
         F: Future<Output = Result<T, ConductError>> + Send + 'static,
     {
         let stopped = |_| Err(ConductError::Storage("the server was stopped meanwhile; try again".to_owned()));
-        tokio::spawn(work(Arc::clone(&self.shared))).await.unwrap_or_else(stopped)
+        // Boxed, so that a task is compiled for each type of result instead of for each kind of work.
+        let work: Pin<Box<dyn Future<Output = _> + Send>> = Box::pin(work(Arc::clone(&self.shared)));
+        tokio::spawn(work).await.unwrap_or_else(stopped)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::course::Course;
 use super::{ConductError, Shared};
+use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_records::store::{Answer, Comment, KeepOutcome, Stamp};
 use parfocal_trial::acceptance;
@@ -10,6 +11,7 @@ use parfocal_trial::refusal::Refusal;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
 
 impl Shared {
+    #[boxed]
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
         acceptance::check_comment(&new.said)?;
 
@@ -53,6 +55,7 @@ impl Shared {
         unless_taken(kept)
     }
 
+    #[boxed]
     pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         // Events that led to the question are written before its answer.
@@ -93,6 +96,7 @@ impl Shared {
         unless_taken(self.store.keep_answer(&self.stamped(new, grace)).await?)
     }
 
+    #[boxed]
     pub(super) async fn holding(&self, holding: Holding) -> Result<(), ConductError> {
         let _pen = self.pen.lock().await;
         let under_way = self.live().course_of(holding.session).is_some();

@@ -8,6 +8,7 @@ use jiff::Timestamp;
 use rand_chacha::ChaCha12Rng;
 
 use super::{ConductError, Library};
+use parfocal_base::boxed;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::{
@@ -64,6 +65,8 @@ impl Studies {
     ///
     /// # Errors
     /// If the definition is malformed, a study of that name exists, or it has no such site.
+    #[boxed]
+    #[must_use]
     pub async fn plan(
         &self,
         way: Channel,
@@ -96,6 +99,7 @@ impl Studies {
     ///
     /// # Errors
     /// If there is no such study, the rules refuse the change, or the disk failed.
+    #[boxed]
     pub async fn change(
         &self,
         way: Channel,

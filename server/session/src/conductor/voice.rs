@@ -8,6 +8,7 @@ use tokio::time::sleep;
 
 use super::remarks::taken;
 use super::{ConductError, Conductor, Shared};
+use parfocal_base::boxed;
 use parfocal_records::store::{Erasure, KeptVoice, PieceKept, VoicePiece};
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::protocol::Protocol;
@@ -54,6 +55,7 @@ impl Conductor {
 }
 
 impl Shared {
+    #[boxed]
     async fn voice_piece(&self, new: NewPiece) -> Result<(), ConductError> {
         let media_type = voice::check_piece(&new)?;
         let NewPiece { comment, session, piece, media_type: _, through_ms, ended, audio } = new;
@@ -71,6 +73,7 @@ impl Shared {
         }
     }
 
+    #[boxed]
     async fn erase_expired_voice(&self) -> Result<usize, ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;

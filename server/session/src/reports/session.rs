@@ -8,6 +8,7 @@ use super::Reports;
 use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 use crate::conductor::{ConductError, Course};
 use parfocal_base::PolicyName;
+use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_records::store::{DeviceEvent, Erased, LatestCorrections, SessionLine, standings};
 use parfocal_trial::correction::{Field, Subject};
@@ -127,6 +128,8 @@ impl Reports {
     ///
     /// # Errors
     /// If there is no such session, or the database failed.
+    #[boxed]
+    #[must_use]
     pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
         let course = self.load(session).await?;
         let withdrawal = self.withdrawal(&course).await?;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::conductor::{ConductError, ProtocolSummary, Studies};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::StoredStudy;
 use parfocal_trial::allocation::Order;
@@ -188,6 +189,8 @@ impl StudyDetail {
     ///
     /// # Errors
     /// If there is no such study, or the database failed.
+    #[boxed]
+    #[must_use]
     pub async fn read(studies: &Studies, name: &str) -> Result<Self, ConductError> {
         let study = studies.stored(name).await?;
         let mut detail = Self::of(&study);

@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 
 use super::Reports;
 use crate::conductor::{ConductError, Course};
+use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_records::store::{
@@ -207,6 +208,8 @@ impl Reports {
     ///
     /// # Errors
     /// If there is no such session, its participant withdrew, or the database failed.
+    #[boxed]
+    #[must_use]
     pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
@@ -312,6 +315,8 @@ impl Reports {
     ///
     /// # Errors
     /// If `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
+    #[boxed]
+    #[must_use]
     pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
         let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;

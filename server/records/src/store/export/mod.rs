@@ -34,6 +34,7 @@ pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
 pub use self::verify::ExportFiles;
 use super::{Access, AccessLog, Head, Reader, StoreError, StoredSession};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 
 /// How often an export is recorded at most, if something else is recorded at the same moment each time.
@@ -73,6 +74,8 @@ impl Export {
     ///
     /// # Errors
     /// If there is no such session, its participant withdrew, or the policies are asked for before unblinding.
+    #[boxed]
+    #[must_use]
     pub async fn prepare(access_log: &AccessLog, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
         may_export(access_log.reader(), session, unblinded).await?;
@@ -145,6 +148,7 @@ impl Export {
         outcome.map(|_| ())
     }
 
+    #[boxed(?Send)]
     async fn write(&self, mut folder: Folder) -> Result<Vec<String>, ExportError> {
         self.blinded.write(&self.snapshot, &self.recordings, &mut folder).await?;
         if let Some(telling) = &self.telling {

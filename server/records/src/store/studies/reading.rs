@@ -7,6 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use super::{Enrolment, StoredStudy};
 use crate::store::values::parsed;
 use crate::store::{Reader, StoreError};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::account::AccountName;
 use parfocal_trial::allocation::Seed;
@@ -30,6 +31,8 @@ impl Reader {
     ///
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
+    #[boxed]
+    #[must_use]
     pub async fn study(&self, name: &str) -> Result<Option<StoredStudy>, StoreError> {
         let row = sqlx::query("SELECT definition, sites FROM studies WHERE study = ?").bind(name);
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };

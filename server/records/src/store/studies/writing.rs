@@ -8,10 +8,12 @@ use crate::store::insert::Insert;
 use crate::store::session_events::insert_event;
 use crate::store::values::{begin, nanoseconds};
 use crate::store::{StoreError, chain};
+use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::study::definition::StudyName;
 
 /// Writes a new study with its first event, or nothing.
+#[boxed]
 pub(super) async fn insert_study(
     connection: &mut SqliteConnection,
     run: Option<i64>,
@@ -47,6 +49,7 @@ pub(super) async fn insert_study(
 }
 
 /// Writes all of `change` of `study`, or nothing.
+#[boxed]
 pub(super) async fn change_study(
     connection: &mut SqliteConnection,
     run: Option<i64>,
