@@ -6,7 +6,6 @@ mod report;
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use super::named::without_systems_own;
@@ -18,7 +17,7 @@ use parfocal_devices::camera::calibration;
 use parfocal_devices::camera::footage::{is_raw, read_picture};
 use parfocal_imaging::{
     Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, PixelFormat, RgbImage, Size,
-    content_area, decode_raw,
+    content_area, decode_raw, png,
 };
 use report::{Kind, Report};
 
@@ -152,7 +151,7 @@ impl<'a> Inspector<'a> {
         if let Some(out) = self.out {
             // A mosaic's picture is for whatever comes next, so nothing is drawn in; what is drawn in lies beside it.
             if matches!(report.kind, Kind::Mosaic) {
-                save(path, &out.join(self.name(path, self.size.name())), &overlay::plain(&seen.rgb))?;
+                save(path, &out.join(self.name(path, self.size.name())), &seen.rgb)?;
             }
             save(path, &out.join(self.name(path, "overlay")), &overlay::draw(seen.rgb, &report))?;
         }
@@ -218,13 +217,12 @@ impl<'a> Inspector<'a> {
 }
 
 /// Writes `picture`, which was made from `path`, to `target`, as PNG.
-fn save(path: &Path, target: &Path, picture: &image::RgbImage) -> Result<(), Failure> {
+fn save(path: &Path, target: &Path, picture: &RgbImage) -> Result<(), Failure> {
     let failed =
         |error: &dyn std::fmt::Display| format!("{}: cannot write {}: {error}", path.display(), target.display());
 
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|error| failed(&error))?;
-    Ok(replace(target, bytes.get_ref()).map_err(|error| failed(&error))?)
+    let bytes = png(picture).map_err(|error| failed(&error))?;
+    Ok(replace(target, &bytes).map_err(|error| failed(&error))?)
 }
 
 /// The patch of `gray` at `area`, which lies inside it.

@@ -31,7 +31,7 @@ const GLYPHS: [(char, u16); 16] = [
 
 /// Draws the content of `report` into the picture. The picture may be larger than the report's lengths by a whole
 /// factor.
-pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
+pub(super) fn draw(rgb: RgbImage, report: &Report) -> RgbImage {
     let times = (rgb.width / report.width.max(1)).max(1);
     let mut canvas = Canvas { scale: (rgb.width / 400).max(1), picture: rgb };
 
@@ -47,18 +47,7 @@ pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
     canvas.text(&format!("MGM {:.2}", report.mgm), 0);
     canvas.text(&format!("MLR {:.4}", report.mlr), 1);
 
-    encodable(canvas.picture)
-}
-
-/// The picture with nothing drawn in.
-pub(super) fn plain(rgb: &RgbImage) -> image::RgbImage {
-    encodable(rgb.clone())
-}
-
-/// The picture as the encoder takes it.
-fn encodable(rgb: RgbImage) -> image::RgbImage {
-    let RgbImage { width, height, data } = rgb;
-    image::RgbImage::from_raw(width as u32, height as u32, data).unwrap_or_default()
+    canvas.picture
 }
 
 /// A gray picture as RGB.

@@ -1,16 +1,14 @@
 //! `parfocal recording video`: a recording as a video for people, or its frames as pictures.
 
 use std::fs;
-use std::io::{Cursor, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-
-use image::{ImageBuffer, ImageFormat, Luma, Rgb};
 
 use crate::cli::output::{Failure, print};
 use parfocal_base::files::{create_with, replace};
 use parfocal_devices::camera::calibration;
-use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
+use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, png, tiff};
 use parfocal_recording::Recording;
 
 /// File endings of videos, and ffmpeg's names of their formats.
@@ -232,25 +230,17 @@ fn save_pictures(
     let mut picture = RgbImage::default();
     for &frame in frames {
         let mosaic = recording.frame(frame)?;
-        let mut bytes = Cursor::new(Vec::new());
         let (ending, written) = match arguments.pictures.unwrap_or(Pictures::Png) {
             Pictures::Png => {
                 developer.develop(&mosaic, &mut picture);
-                let (width, height) = (picture.width as u32, picture.height as u32);
-                let image = ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, picture.data.as_slice());
-                ("png", image.map(|image| image.write_to(&mut bytes, ImageFormat::Png)))
+                ("png", png(&picture))
             }
-            Pictures::Tiff => {
-                let (width, height) = (mosaic.width() as u32, mosaic.height() as u32);
-                let image = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, mosaic.samples());
-                ("tiff", image.map(|image| image.write_to(&mut bytes, ImageFormat::Tiff)))
-            }
+            Pictures::Tiff => ("tiff", tiff(&mosaic)),
         };
 
         let path = out.join(format!("frame{frame:06}.{ending}"));
         let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
-        written.ok_or_else(|| failed(&"its size is wrong"))?.map_err(|error| failed(&error))?;
-        replace(&path, bytes.get_ref()).map_err(|error| failed(&error))?;
+        replace(&path, &written.map_err(|error| failed(&error))?).map_err(|error| failed(&error))?;
     }
     Ok(())
 }
