@@ -17,7 +17,7 @@ use parfocal_devices::camera::calibration;
 use parfocal_devices::camera::footage::{is_raw, read_picture};
 use parfocal_imaging::{
     Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, PixelFormat, RgbImage, Size,
-    content_area, decode_raw, png,
+    content_area, decode_raw, encode_png,
 };
 use report::{Kind, Report};
 
@@ -221,7 +221,7 @@ fn save(path: &Path, target: &Path, picture: &RgbImage) -> Result<(), Failure> {
     let failed =
         |error: &dyn std::fmt::Display| format!("{}: cannot write {}: {error}", path.display(), target.display());
 
-    let bytes = png(picture).map_err(|error| failed(&error))?;
+    let bytes = encode_png(picture).map_err(|error| failed(&error))?;
     Ok(replace(target, &bytes).map_err(|error| failed(&error))?)
 }
 

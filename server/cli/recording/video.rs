@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use crate::cli::output::{Failure, print};
 use parfocal_base::files::{create_with, replace};
 use parfocal_devices::camera::calibration;
-use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, png, tiff};
+use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, encode_png, encode_tiff};
 use parfocal_recording::Recording;
 
 /// File endings of videos, and ffmpeg's names of their formats.
@@ -233,9 +233,9 @@ fn save_pictures(
         let (ending, written) = match arguments.pictures.unwrap_or(Pictures::Png) {
             Pictures::Png => {
                 developer.develop(&mosaic, &mut picture);
-                ("png", png(&picture))
+                ("png", encode_png(&picture))
             }
-            Pictures::Tiff => ("tiff", tiff(&mosaic)),
+            Pictures::Tiff => ("tiff", encode_tiff(&mosaic)),
         };
 
         let path = out.join(format!("frame{frame:06}.{ending}"));

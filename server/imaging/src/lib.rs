@@ -31,7 +31,7 @@ pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
 pub use decode::{decode, decode_raw, is_mosaic, raw_format};
 pub use develop::{Developed, Developer};
-pub use encode::{png, tiff};
+pub use encode::{encode_png, encode_tiff};
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
 pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall, place_of};
 pub use jpeg::{JpegEncoder, JpegError};

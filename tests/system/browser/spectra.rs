@@ -149,7 +149,7 @@ async fn recorded(theatre: &Theatre) {
     .await;
     // The disk may be slow, and frames of before the place are of no use here.
     let before = recorded_frames(&theatre.operator).await;
-    until("frames after it", || async { recorded_frames(&theatre.operator).await >= before + 50 }).await;
+    until("frames after it", || async { recorded_frames(&theatre.operator).await >= before + 10 }).await;
     theatre.say("Sharp there", 1).await;
     theatre.abort("the test is over").await;
     theatre.operator.sees("#recording-notice", "frames are saved in").await;
