@@ -1,5 +1,5 @@
-//! The policy `parfocal`. It tracks a belief about the optimum, corrects it by the sharpness seen lately, and goes to
-//! where the picture is most likely in focus. If that is in doubt, it moves to find out more.
+//! The policy `parfocal`. It tracks a belief about the optimum and goes to where the picture is most likely in focus. If
+//! that is in doubt, it moves to find out more.
 
 use std::sync::{Arc, LazyLock};
 
@@ -7,7 +7,6 @@ use tch::{Device, Kind, Tensor, nn};
 
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
-use super::sharpness_memory::SharpnessMemory;
 use super::spectrum::{FEATURES, PatchTransform, SHARPNESS, features, spectrum};
 use super::tiles::ViewTrace;
 use super::weights::{self, WeightsError};
@@ -16,13 +15,16 @@ use parfocal_base::{BlurRate, FocalPower, IN_FOCUS};
 use parfocal_imaging::{Patch, View, WIDER};
 
 /// Largest change of focal power per frame. The lens could jump, but the surgeon should not see it.
-pub const MAX_MOVE: f64 = 0.1;
+pub const MAX_MOVE: f64 = 0.2;
 /// Smallest change of focal power. Smaller ones would only make the picture restless.
 pub const LEAST_MOVE: f64 = 0.02;
 /// Below this probability of being in focus, the tracker searches for the optimum: standing still reveals little.
 const ASSURANCE: f64 = 0.85;
 /// Least change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
-const LOOK: f64 = 0.06;
+const LOOK: f64 = 0.04;
+/// While searching, it turns round only where the other side is so many times as likely: to look to and fro shows less
+/// than to go on, and a surgeon sees each turn.
+const TURNS_FOR: f64 = 3.0;
 /// Change of focal power when the belief is tested.
 const TEST: f64 = 0.1;
 
@@ -41,9 +43,19 @@ pub struct Trace {
     last: Option<Box<Frame>>,
     /// The focal power last asked for.
     asked: Option<f32>,
+    way: Way,
     stand: SharpnessSinceMove,
-    sharpness: SharpnessMemory,
     views: ViewTrace,
+}
+
+/// Which way the lens was last asked to move.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Way {
+    /// It was not.
+    #[default]
+    Neither,
+    Down,
+    Up,
 }
 
 /// The sharpness of the picture since the lens last moved.
@@ -147,7 +159,6 @@ impl Trace {
         let before = self.last.as_ref().unwrap_or(&now);
         let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
         self.stand.see(now.near.features[SHARPNESS], moved);
-        self.sharpness.see(focal_power, now.near.features[SHARPNESS]);
 
         let mut input = [0.0; BELIEF_INPUT];
         let (seen, rest) = input.split_at_mut(SEEN_INPUT);
@@ -179,11 +190,6 @@ impl Trace {
         input
     }
 
-    /// Corrects the network's `belief` (one value per bin) by the sharpness seen lately.
-    pub fn reconsider(&self, belief: &mut [f32]) {
-        self.sharpness.weigh(belief);
-    }
-
     /// Where to go from `focal_power` under `belief` (see [`target`]). Stays while the latest frame shows nothing to
     /// judge focus by, such as a glove or glare.
     #[must_use]
@@ -193,14 +199,19 @@ impl Trace {
             return focal_power;
         }
 
-        let aim = target(focal_power, belief);
+        let aim = target(focal_power, belief, self.way);
         let stands = (aim - focal_power).abs() < f64::from(STILL);
         if stands && self.stand.is_doubtful() { look_aside(focal_power, belief) } else { aim }
     }
 
     /// Records the focal power that was asked for after the frame.
-    pub const fn ask(&mut self, target: f64) {
-        self.asked = Some(target as f32);
+    pub fn ask(&mut self, target: f64) {
+        let target = target as f32;
+        let change = self.last.as_ref().map_or(0.0, |frame| target - frame.focal_power);
+        if change.abs() > STILL {
+            self.way = if change > 0.0 { Way::Up } else { Way::Down };
+        }
+        self.asked = Some(target);
     }
 }
 
@@ -220,7 +231,7 @@ const PLACES: usize = (BINS - 1) * FINENESS + 1;
 /// Value of being `distance` from the optimum: about 1 in focus and 0 out of focus, with a soft edge. It also falls
 /// slightly with distance, so that a tracker that does not know the optimum goes to the middle of where it may be.
 fn worth(distance: f64) -> f64 {
-    const SOFTNESS: f64 = 0.04;
+    const SOFTNESS: f64 = 0.08;
     const SLOPE: f64 = 0.3;
     1.0 / (1.0 + ((distance - IN_FOCUS) / SOFTNESS).exp()) - SLOPE * distance
 }
@@ -312,14 +323,19 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
 
 /// Where to go from `focal_power` under `belief`: to the [`best`] place, by at most [`MAX_MOVE`] per frame, and not at
 /// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and would move by less than
-/// [`LOOK`], it moves by [`LOOK`] towards the likelier side instead.
+/// [`LOOK`], it moves by [`LOOK`] instead, on the `way` that it went last or to the other side if that is much likelier.
 #[must_use]
-fn target(focal_power: f64, belief: &[f32]) -> f64 {
+fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
     if step.abs() < LOOK {
         let Sides { below, here, above } = Sides::of(belief, focal_power);
         if here < ASSURANCE {
-            let look = if above > below { LOOK } else { -LOOK };
+            let up = match way {
+                Way::Neither => above > below,
+                Way::Up => above * TURNS_FOR > below,
+                Way::Down => above > below * TURNS_FOR,
+            };
+            let look = if up { LOOK } else { -LOOK };
             return (focal_power + look).clamp(0.0, 1.0);
         }
     }
@@ -357,7 +373,6 @@ impl BeliefTracker {
 
         let mut belief = vec![0.0; BINS];
         logits.view([-1]).softmax(0, Kind::Float).copy_data(&mut belief, BINS);
-        self.trace.reconsider(&mut belief);
         belief
     }
 }
@@ -433,9 +448,9 @@ mod tests {
 
     #[test]
     fn moves_are_bounded_and_small_ones_left_out() {
-        assert!((target(0.5, &certain(0.9)) - 0.6).abs() < 1e-12);
-        assert!((target(0.5, &certain(0.51)) - 0.5).abs() < 1e-12);
-        assert!((target(0.5, &certain(0.45)) - 0.45).abs() < 0.01);
+        assert!((target(0.5, &certain(0.9), Way::Neither) - 0.7).abs() < 1e-12);
+        assert!((target(0.5, &certain(0.51), Way::Neither) - 0.5).abs() < 1e-12);
+        assert!((target(0.5, &certain(0.45), Way::Neither) - 0.45).abs() < 0.01);
     }
 
     #[test]
@@ -511,8 +526,43 @@ mod tests {
         };
 
         // The middle is the best place under both beliefs, but nothing would be learned there.
-        assert!((target(0.5, &likelier(33)) - 0.56).abs() < 1e-9);
-        assert!((target(0.5, &likelier(7)) - 0.44).abs() < 1e-9);
-        assert!((0.0..=1.0).contains(&target(0.01, &likelier(7))));
+        assert!((target(0.5, &likelier(33), Way::Neither) - 0.54).abs() < 1e-9);
+        assert!((target(0.5, &likelier(7), Way::Neither) - 0.46).abs() < 1e-9);
+        assert!((0.0..=1.0).contains(&target(0.01, &likelier(7), Way::Neither)));
+    }
+
+    #[test]
+    fn while_it_looks_it_turns_round_only_for_what_is_much_likelier() {
+        // All within a depth of focus of 0.5 except for two places, below and above.
+        let beside = |below: f32, above: f32| {
+            let mut belief = [0.0f32; BINS];
+            belief[20] = 1.0 - below - above;
+            belief[14] = below;
+            belief[26] = above;
+            belief
+        };
+        let goes_up = |belief: [f32; BINS], way| target(0.5, &belief, way) > 0.5;
+        let twice_below = beside(0.2, 0.1);
+        assert!(
+            !goes_up(twice_below, Way::Neither) && goes_up(twice_below, Way::Up) && !goes_up(twice_below, Way::Down)
+        );
+        let much_below = beside(0.2, 0.05);
+        assert!(!goes_up(much_below, Way::Up));
+        assert!(!goes_up(beside(0.1, 0.2), Way::Down) && goes_up(beside(0.05, 0.2), Way::Down));
+    }
+
+    #[test]
+    fn its_way_is_that_of_its_last_move() {
+        let stripes = Patch(std::array::from_fn(|i| if i % 8 < 4 { 90.0 } else { 160.0 }));
+        let mut trace = Trace::default();
+        let mut way = |stands: f64, asked: f64| {
+            trace.input(&stripes.into(), stands);
+            trace.ask(asked);
+            trace.way
+        };
+        assert_eq!(way(0.5, 0.5), Way::Neither);
+        assert_eq!(way(0.5, 0.54), Way::Up);
+        assert_eq!(way(0.54, 0.54), Way::Up, "to stand still is no turn");
+        assert_eq!(way(0.54, 0.4), Way::Down);
     }
 }

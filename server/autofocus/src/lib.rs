@@ -11,7 +11,6 @@ pub mod networks;
 mod registration;
 mod registry;
 pub mod scripted;
-mod sharpness_memory;
 pub mod shipped;
 pub mod spectrum;
 mod tiles;

@@ -99,8 +99,7 @@ impl BeliefTrainer {
 
             for (index, actor) in self.actors.iter_mut().enumerate() {
                 let stands = actor.environment.focal_power().get();
-                let belief = &mut believed[index * BINS..][..BINS];
-                actor.trace.reconsider(belief);
+                let belief = &believed[index * BINS..][..BINS];
                 let mut aim = actor.trace.aim(stands, belief);
                 if actor.environment.wanders {
                     aim = lead_astray(aim, &mut self.rng);

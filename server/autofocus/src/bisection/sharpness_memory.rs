@@ -1,6 +1,6 @@
-//! A policy's memory of the sharpness seen at each focal power, used as evidence about the optimum.
+//! A memory of the sharpness seen at each focal power, used as evidence about the optimum.
 
-use super::networks::BINS;
+use crate::networks::BINS;
 
 /// Frames for which an observation counts, at least in part. At the 25 frames per second of scans this is a little more
 /// than a second, in which a hand moves the view only by a part of its width.
@@ -12,8 +12,8 @@ const WEIGHT: f32 = 10.0;
 
 /// The sharpness last seen at each of [`BINS`] places of focal power.
 ///
-/// A network trained in simulation is overconfident on real optics. But of two places both seen within the last second,
-/// the sharper one is nearer to the optimum, whatever the optics. This memory corrects a belief that ignores it.
+/// Comparisons reach a few frames back. But of two places both seen within the last second, the sharper one is nearer
+/// to the optimum. This memory corrects a belief that ignores it.
 #[derive(Debug, Clone)]
 pub struct SharpnessMemory {
     /// Frames seen so far.
