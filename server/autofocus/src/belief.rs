@@ -15,12 +15,14 @@ use parfocal_base::{BlurRate, FocalPower, IN_FOCUS};
 use parfocal_imaging::{Patch, View, WIDER};
 
 /// Largest change of focal power per frame. The lens could jump, but the surgeon should not see it.
-pub const MAX_MOVE: f64 = 0.2;
+const MAX_MOVE: f64 = 0.2;
 /// Smallest change of focal power. Smaller ones would only make the picture restless.
 pub const LEAST_MOVE: f64 = 0.02;
 /// Below this probability of being in focus, the tracker searches for the optimum: standing still reveals little.
 const ASSURANCE: f64 = 0.85;
-/// Least change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
+/// It searches unless the best place is at least so far away: then it goes there, which shows as much.
+const NEAR: f64 = 0.08;
+/// Change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
 const LOOK: f64 = 0.04;
 /// While searching, it turns round only where the other side is so many times as likely: to look to and fro shows less
 /// than to go on, and a surgeon sees each turn.
@@ -322,12 +324,12 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
 }
 
 /// Where to go from `focal_power` under `belief`: to the [`best`] place, by at most [`MAX_MOVE`] per frame, and not at
-/// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and would move by less than
-/// [`LOOK`], it moves by [`LOOK`] instead, on the `way` that it went last or to the other side if that is much likelier.
+/// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and that place is [`NEAR`], it
+/// moves by [`LOOK`] instead, on the `way` that it went last, or to the other side if that is much likelier.
 #[must_use]
 fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
-    if step.abs() < LOOK {
+    if step.abs() < NEAR {
         let Sides { below, here, above } = Sides::of(belief, focal_power);
         if here < ASSURANCE {
             let up = match way {

@@ -3,11 +3,12 @@
 //! Errors depend on how fast the optimum moves. A delay tells more: no observer of the past can be earlier than one
 //! frame, since the optimum of the next frame is not known yet.
 
-use parfocal_autofocus::belief::MAX_MOVE;
 use parfocal_base::FocalPower;
 
 /// Largest delay that is looked for, in frames: two seconds.
 pub const MOST_DELAY: usize = 50;
+/// The observer's largest change of focal power per frame.
+const MAX_MOVE: f64 = 0.1;
 
 /// Mean absolute error, over the frames of one scan, of an observer who knows its `optimum` `late` frames late. It
 /// starts in the middle, as policies do, and moves by at most [`MAX_MOVE`] a frame. With `late` 0 it knows the optimum
