@@ -121,7 +121,7 @@ def test_a_process_has_the_figures_of_the_same_policy_built_in(tmp_path: Path) -
     # Its program and its script are identified as weights are.
     files = [Path(sys.executable).resolve().read_bytes(), (tmp_path / "mine.py").read_bytes()]
     assert report["weights"][rows[1]["policy"]] == hashlib.sha256(b"".join(files)).hexdigest()
-    assert not running(str(tmp_path))
+    wait_until(lambda: not running(str(tmp_path)))
 
 
 def test_what_a_process_prints_confuses_nothing(tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_a_process_that_fails_ends_an_evaluation_with_a_sentence(
 ) -> None:
     (tmp_path / "order").write_text(order)
     assert words in refusal(command(tmp_path, OBEDIENT, tmp_path / "order"))
-    assert not running(str(tmp_path))
+    wait_until(lambda: not running(str(tmp_path)))
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def step(pictures, focal_power):
 parfocal.policy.serve(step, view="view")
 """
     assert words in refusal(command(tmp_path, source))
-    assert not running(str(tmp_path))
+    wait_until(lambda: not running(str(tmp_path)))
 
 
 def test_the_process_in_c_of_the_documentation_works(tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ def test_a_process_drives_a_lens_fails_and_comes_back(tmp_path: Path) -> None:
             until(lambda frame: frame.status["held"] is None)
 
         assert len(running(str(order))) == 1
-    assert not running(str(order))
+    wait_until(lambda: not running(str(order)))
 
 
 def test_no_process_is_left_by_a_server_that_is_killed(tmp_path: Path) -> None:
