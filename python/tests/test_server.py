@@ -42,7 +42,7 @@ def test_a_server_that_does_not_start_says_why(tmp_path: Path) -> None:
     with pytest.raises(parfocal.NoProgram, match=r"'/nowhere/parfocal' was not found.*PARFOCAL"):
         Server(program="/nowhere/parfocal")
     stranger = tmp_path / "parfocal"
-    stranger.write_text("#!/bin/sh\nsleep 60\n")
+    stranger.write_text("#!/bin/sh\nexec sleep 60\n")
     stranger.chmod(0o755)
     with pytest.raises(parfocal.NoProgram, match=r"not ready after 0.2 s"):
         Server(program=stranger, timeout=0.2)
