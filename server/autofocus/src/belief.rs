@@ -1,5 +1,5 @@
-//! The policy `parfocal`. It tracks a belief about the optimum and goes to where the picture is most likely in focus. If
-//! that is in doubt, it moves to find out more.
+//! The policy `parfocal`. It tracks a belief about the optimum and goes to where the picture is most likely in focus.
+//! If that is in doubt, it moves to find out more.
 
 use std::sync::{Arc, LazyLock};
 
@@ -17,10 +17,10 @@ use parfocal_imaging::{Patch, View, WIDER};
 /// Largest change of focal power per frame. The lens could jump, but the surgeon should not see it.
 const MAX_MOVE: f64 = 0.2;
 /// Smallest change of focal power. Smaller ones would only make the picture restless.
-pub const LEAST_MOVE: f64 = 0.02;
+const LEAST_MOVE: f64 = 0.02;
 /// Below this probability of being in focus, the tracker searches for the optimum: standing still reveals little.
 const ASSURANCE: f64 = 0.85;
-/// It searches unless the best place is at least so far away: then it goes there, which shows as much.
+/// While it searches, it still goes to the best place if that is at least so far away, which shows as much as a look.
 const NEAR: f64 = 0.08;
 /// Change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
 const LOOK: f64 = 0.04;
@@ -324,8 +324,9 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
 }
 
 /// Where to go from `focal_power` under `belief`: to the [`best`] place, by at most [`MAX_MOVE`] per frame, and not at
-/// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and that place is [`NEAR`], it
-/// moves by [`LOOK`] instead, on the `way` that it went last, or to the other side if that is much likelier.
+/// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and that place is nearer than
+/// [`NEAR`], it moves by [`LOOK`] instead: on the `way` that it went last, or to the other side if that is much
+/// likelier.
 #[must_use]
 fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
