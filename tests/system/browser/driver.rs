@@ -19,6 +19,24 @@ use tempfile::TempDir;
 use super::pool::{self, Chromium};
 use super::wait::{comes_true, until};
 
+/// Functions for the scripts below. What a person reads of an element: nothing if there is none or it is not shown.
+const READ: &str = "const shown = (element) => element.checkVisibility({ opacityProperty: true, visibilityProperty: true });
+    const read = (element) => {
+        if (!element || !shown(element)) return '';
+        return (element.innerText ?? element.textContent).replaceAll('\\u00a0', ' ').trim();
+    };";
+
+/// Waits within the page, so that it is seen at once and the browser is not asked again and again. What `met` says, or
+/// false after a second: then the page may have been replaced, and whoever waits asks anew.
+const WAIT: &str = "return new Promise((done) => {
+        const end = performance.now() + 1000;
+        const look = () => {
+            if (met() || performance.now() > end) done(met());
+            else setTimeout(look, 20);
+        };
+        look();
+    });";
+
 /// What starts browsers. All tests share one chromedriver, which ends with the test program.
 pub struct Driver(());
 
@@ -201,14 +219,16 @@ impl Browser {
 
     /// Clicks on the button within `css` whose label starts with `label`.
     pub async fn click_labelled(&self, css: &str, label: &str) {
+        let buttons = format!("{css} button");
+        let script = format!(
+            "{READ} const buttons = [...document.querySelectorAll(arguments[0])];
+            return buttons.findIndex((button) => read(button).startsWith(arguments[1]));"
+        );
         until(&format!("the button '{label}'"), || async {
-            for button in self.all(&format!("{css} button")).await {
-                if button.text().await.is_ok_and(|text| text.starts_with(label)) {
-                    return button.click().await.is_ok();
-                }
-            }
-
-            false
+            let found = self.run(&script, &[json!(buttons), json!(label)]).await;
+            let Some(found) = found.as_u64().and_then(|found| usize::try_from(found).ok()) else { return false };
+            let button = self.all(&buttons).await.into_iter().nth(found);
+            matches!(button, Some(button) if button.click().await.is_ok())
         })
         .await;
     }
@@ -273,38 +293,32 @@ impl Browser {
 impl Browser {
     /// Waits until the element is shown and its text contains `text`.
     pub async fn sees(&self, css: &str, text: &str) {
-        let seen = comes_true(|| async { self.text(css).await.contains(text) }).await;
+        let met = "const met = () => read(document.querySelector(arguments[0])).includes(arguments[1]);";
+        let seen = comes_true(async || self.meets(met, &[json!(css), json!(text)]).await).await;
         assert!(seen, "{css} never says '{text}', but '{}'", self.text(css).await);
     }
 
     /// Waits until nothing that `css` selects is shown.
     pub async fn sees_no(&self, css: &str) {
-        until(&format!("{css} to be gone"), || async {
-            for element in self.all(css).await {
-                // An element that has left the page in the meantime is not shown.
-                if element.is_displayed().await.unwrap_or(false) {
-                    return false;
-                }
-            }
+        let met = "const met = () => ![...document.querySelectorAll(arguments[0])].some(shown);";
+        until(&format!("{css} to be gone"), async || self.meets(met, &[json!(css)]).await).await;
+    }
 
-            true
-        })
-        .await;
+    /// Waits within the page, but not for long, until the function `met`, which this script defines, says so.
+    async fn meets(&self, met: &str, arguments: &[Value]) -> bool {
+        let script = format!("{READ} {met} {WAIT}");
+        // A page that is being replaced answers with an error.
+        self.client.execute(&script, arguments.to_vec()).await.is_ok_and(|met| met == true)
     }
 
     /// Text of the element; empty if there is none or it is not shown.
     pub async fn text(&self, css: &str) -> String {
+        let script = format!("{READ} return read(document.querySelector(arguments[0]))");
         loop {
-            let text = match self.find(css).await {
-                Ok(element) => element.text().await,
-                Err(error) if error.is_no_such_element() => return String::new(),
-                Err(error) => Err(error),
-            };
-
-            match text {
-                Ok(text) => return text,
-                // The page has redrawn the element in the meantime.
-                Err(error) if has_left(&error) => {}
+            match self.client.execute(&script, vec![json!(css)]).await {
+                Ok(text) => return text.as_str().expect("text").to_owned(),
+                // The page was being replaced.
+                Err(error) if error.to_string().contains("aborted by navigation") => {}
                 Err(error) => panic!("{css}: {error}"),
             }
         }
@@ -380,12 +394,4 @@ impl Browser {
 async fn area(element: &Element) -> Area {
     let (left, top, width, height) = element.rectangle().await.unwrap();
     Area { left, top, width, height }
-}
-
-/// Whether an element has left the page since it was found. During a reload, only the text of the driver's or browser's
-/// message says so.
-fn has_left(error: &CmdError) -> bool {
-    const IN_WORDS: [&str; 2] = ["does not belong to the document", "aborted by navigation"];
-    let words = error.to_string();
-    error.is_stale_element_reference() || IN_WORDS.iter().any(|said| words.contains(said))
 }
