@@ -20,7 +20,8 @@ use super::pool::{self, Chromium};
 use super::wait::{comes_true, until};
 
 /// Functions for the scripts below. What a person reads of an element: nothing if there is none or it is not shown.
-const READ: &str = "const shown = (element) => element.checkVisibility({ opacityProperty: true, visibilityProperty: true });
+const READ: &str =
+    "const shown = (element) => element.checkVisibility({ opacityProperty: true, visibilityProperty: true });
     const read = (element) => {
         if (!element || !shown(element)) return '';
         return (element.innerText ?? element.textContent).replaceAll('\\u00a0', ' ').trim();
