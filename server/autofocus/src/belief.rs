@@ -21,12 +21,12 @@ const LEAST_MOVE: f64 = 0.02;
 /// Below this probability of being in focus, the tracker searches for the optimum: standing still reveals little.
 const ASSURANCE: f64 = 0.85;
 /// While it searches, it still goes to the best place if that is at least so far away, which shows as much as a look.
-const NEAR: f64 = 0.08;
+const NEAR: f64 = 0.1;
 /// Change of focal power per frame while searching: enough to see a change of blur, too little to leave focus.
 const LOOK: f64 = 0.04;
 /// While searching, it turns round only where the other side is so many times as likely: to look to and fro shows less
 /// than to go on, and a surgeon sees each turn.
-const TURNS_FOR: f64 = 3.0;
+const TURNS_FOR: f64 = 4.0;
 /// Change of focal power when the belief is tested.
 const TEST: f64 = 0.1;
 
@@ -549,9 +549,9 @@ mod tests {
         assert!(
             !goes_up(twice_below, Way::Neither) && goes_up(twice_below, Way::Up) && !goes_up(twice_below, Way::Down)
         );
-        let much_below = beside(0.2, 0.05);
+        let much_below = beside(0.2, 0.04);
         assert!(!goes_up(much_below, Way::Up));
-        assert!(!goes_up(beside(0.1, 0.2), Way::Down) && goes_up(beside(0.05, 0.2), Way::Down));
+        assert!(!goes_up(beside(0.1, 0.2), Way::Down) && goes_up(beside(0.04, 0.2), Way::Down));
     }
 
     #[test]
