@@ -33,7 +33,7 @@ const WAIT: &str = "return new Promise((done) => {
         const end = performance.now() + 1000;
         const look = () => {
             if (met() || performance.now() > end) done(met());
-            else setTimeout(look, 20);
+            else setTimeout(look, 100);
         };
         look();
     });";

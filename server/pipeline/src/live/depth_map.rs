@@ -343,8 +343,8 @@ mod tests {
         // How many places are told after a swing of the lens, or a frame, from the frame `first` on.
         let told = |survey: &mut Survey, first: u64, frames: u64| {
             let focal_power = |number: u64| 0.5 + 0.3 * (number as f64 / 10.0).sin();
-            let map = |number| survey.see(&frame(first + number, focal_power(number), &halves)).unwrap().unwrap();
-            let last = (0..frames).map(map).last().unwrap();
+            let map = |number| survey.see(&frame(number, focal_power(number), &halves)).unwrap().unwrap();
+            let last = (first..first + frames).map(map).last().unwrap();
             last.places.iter().filter(|place| place.side != Side::Unknown).count()
         };
         assert!(told(&mut survey, 0, 40) > 3);
