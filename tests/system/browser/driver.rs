@@ -27,8 +27,8 @@ const READ: &str =
         return (element.innerText ?? element.textContent).replaceAll('\\u00a0', ' ').trim();
     };";
 
-/// Waits within the page, so that it is seen at once and the browser is not asked again and again. What `met` says, or
-/// false after a second: then the page may have been replaced, and whoever waits asks anew.
+/// Waits within the page, so that the browser is not asked again and again. What `met` says, or false after a second:
+/// then whoever waits asks anew.
 const WAIT: &str = "return new Promise((done) => {
         const end = performance.now() + 1000;
         const look = () => {
