@@ -32,7 +32,8 @@ const READ: &str =
 const WAIT: &str = "return new Promise((done) => {
         const end = performance.now() + 1000;
         const look = () => {
-            if (met() || performance.now() > end) done(met());
+            const isMet = met();
+            if (isMet || performance.now() > end) done(isMet);
             else setTimeout(look, 100);
         };
         look();
@@ -220,16 +221,14 @@ impl Browser {
 
     /// Clicks on the button within `css` whose label starts with `label`.
     pub async fn click_labelled(&self, css: &str, label: &str) {
-        let buttons = format!("{css} button");
-        let script = format!(
-            "{READ} const buttons = [...document.querySelectorAll(arguments[0])];
-            return buttons.findIndex((button) => read(button).startsWith(arguments[1]));"
-        );
         until(&format!("the button '{label}'"), || async {
-            let found = self.run(&script, &[json!(buttons), json!(label)]).await;
-            let Some(found) = found.as_u64().and_then(|found| usize::try_from(found).ok()) else { return false };
-            let button = self.all(&buttons).await.into_iter().nth(found);
-            matches!(button, Some(button) if button.click().await.is_ok())
+            for button in self.all(&format!("{css} button")).await {
+                if button.text().await.is_ok_and(|text| text.starts_with(label)) {
+                    return button.click().await.is_ok();
+                }
+            }
+
+            false
         })
         .await;
     }
