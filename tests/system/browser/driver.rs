@@ -39,6 +39,15 @@ const WAIT: &str = "return new Promise((done) => {
         look();
     });";
 
+/// Prepares for a click on the element: tells whether it takes one, and notes in `reached` whether the next click of the
+/// page reaches it, before the page's own listeners.
+const EXPECT_CLICK: &str = "const [element] = arguments;
+    if (element.matches(':disabled')) return false;
+    window.reached = false;
+    const note = (event) => (window.reached = event.composedPath().includes(element));
+    addEventListener('click', note, { capture: true, once: true });
+    return true;";
+
 /// What starts browsers. All tests share one chromedriver, which ends with the test program.
 pub struct Driver(());
 
@@ -216,7 +225,20 @@ impl Browser {
     /// Clicks if that is possible. Returns whether it was.
     pub async fn try_click(&self, css: &str) -> bool {
         let Ok(element) = self.find(css).await else { return false };
-        element.click().await.is_ok()
+        self.click_element(element).await
+    }
+
+    /// Clicks on the element if it takes clicks. Returns whether the click reached it: on a page that grows meanwhile it
+    /// may meet something else.
+    async fn click_element(&self, element: Element) -> bool {
+        let expected = self.client.execute(EXPECT_CLICK, vec![json!(element)]).await;
+        if !expected.is_ok_and(|expected| expected == true) || element.click().await.is_err() {
+            return false;
+        }
+
+        let reached = self.client.execute("return window.reached", Vec::new()).await;
+        // A page that the click has left has nothing to say.
+        reached.map_or(true, |reached| reached != false)
     }
 
     /// Clicks on the button within `css` whose label starts with `label`.
@@ -224,7 +246,7 @@ impl Browser {
         until(&format!("the button '{label}'"), || async {
             for button in self.all(&format!("{css} button")).await {
                 if button.text().await.is_ok_and(|text| text.starts_with(label)) {
-                    return button.click().await.is_ok();
+                    return self.click_element(button).await;
                 }
             }
 
