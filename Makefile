@@ -20,7 +20,7 @@ package:
 container: package
 	@deploy/container/build
 
-.PHONY: run test package container check lint web web-types unit interface python python-interface readme packaged bench screenshots fuzz endurance
+.PHONY: run test package container check lint web web-types compiled unit cameras interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -36,7 +36,7 @@ test:
 TWO_AT_A_TIME := --no-print-directory --jobs 2 --output-sync=target
 check:
 	@$(MAKE) $(TWO_AT_A_TIME) lint web
-	@$(MAKE) --no-print-directory unit
+	@$(MAKE) --no-print-directory --jobs 2 unit cameras
 	@$(MAKE) $(TWO_AT_A_TIME) interface python readme packaged
 
 # Tests and program are one build, so all is compiled once. `cargo test` alone makes a development build, which is
@@ -58,12 +58,21 @@ web-types:
 	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
+compiled:
+	cargo test $(CARGO_FLAGS) --release --locked --no-run $(FEATURES)
+
 # Two for each processor: most tests wait now and then for a disk, a browser or a lens.
 TEST_THREADS := $(shell echo $$((2 * $$(nproc))))
 
 # One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
-unit:
-	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES)
+unit: compiled
+	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 \
+		cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES) -- --skip $(CAMERAS)
+
+# These wait for a camera, and for one another, most of their time: all other tests run meanwhile.
+CAMERAS := network_camera::
+cameras: compiled
+	cargo test $(CARGO_FLAGS) --release --locked $(FEATURES) --test system -- $(CAMERAS)
 
 # What HTTP answers, against its own description, as each role.
 interface:

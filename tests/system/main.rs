@@ -4,8 +4,8 @@
 
 mod browser;
 mod endurance;
-#[cfg(feature = "aravis")]
-mod gige;
 mod http;
+#[cfg(feature = "aravis")]
+mod network_camera;
 mod support;
 mod tls;

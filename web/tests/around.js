@@ -49,18 +49,23 @@ export function fakeStore() {
 }
 
 /**
- * A device's disk. `full` makes every write fail.
+ * A device's disk. `full` makes every write fail, `unreadable` every reading. While it is `busy`, nothing that is written
+ * reaches it.
  *
  * @template {{ id: string }} Thing
  */
 export class FakeDisk {
   full = false;
+  unreadable = false;
+  /** @type {Promise<void>} */
+  busy = Promise.resolve();
   /** @type {Map<string, Thing>} */
   kept = new Map();
 
-  all = async () => [...this.kept.values()];
+  all = async () => (this.unreadable ? null : [...this.kept.values()]);
 
   put = async (/** @type {Thing} */ thing) => {
+    await this.busy;
     if (!this.full) this.kept.set(thing.id, thing);
     return !this.full;
   };

@@ -29,7 +29,7 @@ function openPage() {
   });
   const page = { place: { session: "s", segment: "a", setting: 2, frame: 7, run: 1 } };
   const here = () => page.place;
-  const voice = { heldUp: 0, durable: true, trouble: null };
+  const voice = { heldUp: 0, isKeeping: false, durable: true, trouble: null };
   const comments = new Comments(outbox, new Drafts(store, origins, newId, "tab"), here, voice);
   outbox.subscribe((change) => comments.hear(change));
   comments.follow(VIEW);

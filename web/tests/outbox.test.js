@@ -144,6 +144,24 @@ test("what a tablet forgot when it lost its power is sent from the spare copy, i
   assert.equal(page.spare.kept.size, 0, "what is saved is taken off both copies");
 });
 
+test("a spare copy that cannot be read at first is read again", async () => {
+  const page = openPage();
+  page.server.answers = [noNetwork()];
+  page.open().add("/comments", { session: "s", text: "one" });
+  await settle();
+  page.store.kept.clear();
+  page.spare.unreadable = true;
+  const later = openPage(page.store, page.time, page.newId, page.spare);
+  const outbox = later.open();
+  await outbox.ready;
+  assert.equal(outbox.waiting.length, 0);
+
+  page.spare.unreadable = false;
+  await page.time.pass(2000);
+  await settle();
+  assert.deepEqual(texts(later.server), ["one"]);
+});
+
 test("what this page or another tab has in hand is not taken from the spare copy", async () => {
   const page = openPage();
   page.server.answers = Array.from({ length: 9 }, noNetwork);

@@ -146,6 +146,52 @@ test("a device without room says so, and sends all the same", async () => {
   assert.equal(outbox.durable, true);
 });
 
+test("nothing that was said is called kept before this device has it", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.answers.push(...Array.from({ length: 9 }, noNetwork));
+  const comment = outbox.begin(PLACE, page.origins.stamp());
+  assert.equal(outbox.isKeeping, true);
+  await settle();
+  assert.equal(outbox.isKeeping, false);
+
+  let free = () => {};
+  page.store.busy = new Promise((resolve) => {
+    free = resolve;
+  });
+  add(outbox, comment, 1);
+  assert.equal(outbox.isKeeping, false, "the second that is being spoken");
+  add(outbox, comment, 2);
+  assert.equal(outbox.isKeeping, true, "this device is more than a second behind");
+  free();
+  await settle();
+  assert.equal(outbox.isKeeping, false);
+
+  add(outbox, comment, 3, "released");
+  assert.equal(outbox.isKeeping, true, "the end is not there yet");
+  await settle();
+  assert.deepEqual([outbox.isKeeping, page.store.kept.size, outbox.heldUp], [false, 4, 1]);
+});
+
+test("a device that cannot be read at first is read again, and what it keeps is sent", async () => {
+  const page = openPage();
+  page.answers.push(noNetwork());
+  page.open().begin(PLACE, page.origins.stamp());
+  await settle();
+  page.store.unreadable = true;
+  const again = openPage(page.store);
+  const outbox = again.open();
+  await outbox.ready;
+  await settle();
+  assert.deepEqual([again.got, outbox.waiting], [[], 0]);
+
+  page.store.unreadable = false;
+  await again.time.pass(2000);
+  await settle();
+  assert.deepEqual(again.got, ["begin voice 7"]);
+  assert.equal(page.store.kept.size, 0);
+});
+
 test("one line tells everything that waits, where it is, and what becomes of it", () => {
   const held = { comments: 3, recordings: 1, durable: true, trouble: say("no-connection") };
   assert.equal(heldWords(held), "Saved here: 3 comments, 1 recording. Sent when the network is back.");

@@ -69,7 +69,7 @@ export class Comments {
    * @param {import("./outbox.js").Outbox} outbox
    * @param {import("./drafts.js").Drafts} drafts
    * @param {() => Place | null} here null outside a session
-   * @param {Pick<import("./voice_outbox.js").VoiceOutbox, "heldUp" | "durable" | "trouble">} voice
+   * @param {Pick<import("./voice_outbox.js").VoiceOutbox, "heldUp" | "isKeeping" | "durable" | "trouble">} voice
    */
   constructor(outbox, drafts, here, voice) {
     this.#outbox = outbox;
@@ -278,7 +278,8 @@ export class Comments {
     }
 
     const trouble = this.#outbox.trouble ?? this.#voice.trouble;
-    if (trouble === null && recordings === 0) return { kind: "saving", text: say("saving") };
+    const isKeeping = recordings > 0 && this.#voice.isKeeping;
+    if (isKeeping || (trouble === null && recordings === 0)) return { kind: "saving", text: say("saving") };
     const durable = this.#outbox.durable && this.#voice.durable;
     return { kind: "unsaved", text: heldWords({ comments: waiting, recordings, durable, trouble }) };
   }

@@ -67,7 +67,7 @@ export function openVoiceOutbox() {
   addEventListener("online", () => outbox.wake());
   document.addEventListener("visibilitychange", () => document.hidden || outbox.wake());
   addEventListener("beforeunload", (event) => {
-    if (!outbox.durable) event.preventDefault();
+    if (!outbox.durable || outbox.isKeeping) event.preventDefault();
   });
   return outbox;
 }

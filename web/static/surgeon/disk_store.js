@@ -8,7 +8,7 @@ const KEPT = "steps";
  *
  * @template {{ id: string }} Thing
  * @typedef {object} DiskStore
- * @property {() => Promise<Thing[]>} all
+ * @property {() => Promise<Thing[] | null>} all resolves to null if the disk cannot be read now
  * @property {(thing: Thing) => Promise<boolean>} put resolves to whether the thing is on the disk
  * @property {(id: string) => Promise<void>} remove
  */
@@ -38,7 +38,7 @@ export function diskStoreOn(factory, name) {
         const database = await open();
         return await done(database.transaction(KEPT).objectStore(KEPT).getAll());
       } catch {
-        return [];
+        return null;
       }
     },
 
@@ -48,6 +48,8 @@ export function diskStoreOn(factory, name) {
         // By default browsers leave it to the operating system when data reach the disk.
         const transaction = database.transaction(KEPT, "readwrite", { durability: "strict" });
         transaction.objectStore(KEPT).put(thing);
+        // By itself the browser commits only after the page has heard of it, and never if the page closes before.
+        transaction.commit();
         await ended(transaction);
         return true;
       } catch {

@@ -11,6 +11,9 @@ import { Delivery } from "./delivery.js";
 
 const PREFIX = "parfocal.outbox.";
 
+/** If the spare copy cannot be read, it is tried again after this time. */
+const READ_AGAIN_MS = 2000;
+
 /** An entry that is sent and not answered for so long is told as late. The request goes on. */
 const LATE_MS = 2000;
 
@@ -102,7 +105,12 @@ export class Outbox {
 
   /** Restores entries that the device lost with its power. If one was already sent, the server recognises its key. */
   async #restore() {
-    for (const entry of await this.#around.spare.all()) {
+    const left = await this.#around.spare.all();
+    if (left === null) {
+      this.#around.later(() => this.#restore(), READ_AGAIN_MS);
+      return;
+    }
+    for (const entry of left) {
       const isElsewhere = this.#around.store.read(PREFIX + entry.id) !== null;
       if (isElsewhere || this.#done.has(entry.id) || this.#entries.has(entry.id)) continue;
       this.#take(entry);

@@ -206,14 +206,15 @@ export class Talk {
     // The browser may end a recording by itself.
     this.#lost(held);
     const { comment, ending } = held;
-    if (comment !== null && ending !== null) {
-      const piece = held.pieces + 1;
-      const through_ms = Math.round(this.#around.now() - held.began);
-      held.pieced = held.pieced.then(() =>
-        this.#add(held, comment, piece, through_ms, new ArrayBuffer(0), ending),
-      );
-    }
-    this.#close(held);
+    const piece = held.pieces + 1;
+    const through_ms = Math.round(this.#around.now() - held.began);
+    held.pieced = held.pieced.then(() => {
+      if (comment !== null && ending !== null) {
+        this.#add(held, comment, piece, through_ms, new ArrayBuffer(0), ending);
+      }
+      // Only now: who reads that the recording is over may close the page.
+      this.#close(held);
+    });
   }
 
   /** @param {Held} held */

@@ -40,6 +40,9 @@ import { Delivery } from "./delivery.js";
 
 /** @typedef {Begin | Piece} Step */
 
+/** If the device cannot be read, it is tried again after this time. */
+const READ_AGAIN_MS = 2000;
+
 /**
  * @typedef {object} Surroundings
  * @property {import("./disk_store.js").DiskStore<Step>} store
@@ -63,6 +66,8 @@ export class VoiceOutbox {
   #steps = new Map();
   /** Why the server refused a recording, by comment. @type {Map<string, string>} */
   #refused = new Map();
+  /** The steps that are on their way to this device's disk, by id. @type {Set<string>} */
+  #keeping = new Set();
   /** The steps that this device does not keep over a reload, by id. @type {Set<string>} */
   #unkept = new Set();
   /** @type {Set<() => void>} */
@@ -70,6 +75,7 @@ export class VoiceOutbox {
   /** @type {Delivery<Step>} */
   #delivery;
   #latest = 0;
+  #cancelReading = () => {};
   /** Ids of the steps that this page has sent. @type {Set<string>} */
   #done = new Set();
   /** Whether the last step that was sent ended a recording. */
@@ -84,7 +90,17 @@ export class VoiceOutbox {
   }
 
   async #load() {
-    for (const step of await this.#around.store.all()) {
+    const left = await this.#around.store.all();
+    this.#cancelReading();
+    if (left === null) {
+      const again = () => {
+        this.ready = this.#load();
+      };
+      this.#cancelReading = this.#around.later(again, READ_AGAIN_MS);
+      return;
+    }
+
+    for (const step of left) {
       // It may have been sent while the store was read.
       if (this.#done.has(step.id)) continue;
       this.#steps.set(step.id, step);
@@ -96,6 +112,7 @@ export class VoiceOutbox {
 
   /** Sends what this device keeps, also what a tab has left that was closed meanwhile. Each step is saved only once. */
   wake() {
+    this.nudge();
     this.ready = this.#load();
   }
 
@@ -112,6 +129,15 @@ export class VoiceOutbox {
   /** Whether this device keeps every unsaved step over a reload. */
   get durable() {
     return this.#unkept.size === 0;
+  }
+
+  /**
+   * Whether this device's disk still lacks something that was said. The second that is being spoken does not count: a
+   * piece is on its way each second.
+   */
+  get isKeeping() {
+    const steps = [...this.#keeping].flatMap((id) => this.#steps.get(id) ?? []);
+    return steps.length > 1 || steps.some((step) => step.kind === "begin" || step.ended !== null);
   }
 
   /** How many recordings are not saved yet, without those that the server refused. */
@@ -214,14 +240,16 @@ export class VoiceOutbox {
 
   /** @param {Step} step */
   async #keep(step) {
+    this.#keeping.add(step.id);
     const kept = await this.#around.store.put(step);
+    this.#keeping.delete(step.id);
     if (!this.#steps.has(step.id)) {
       // The server has saved the step meanwhile.
       await this.#around.store.remove(step.id);
-    } else if (!kept) {
-      this.#unkept.add(step.id);
-      this.#tell();
+      return;
     }
+    if (!kept) this.#unkept.add(step.id);
+    this.#tell();
   }
 
   /** The steps that are to be sent, in order. */

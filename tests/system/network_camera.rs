@@ -277,7 +277,7 @@ fn hardly_a_frame_is_lost_in(time: Duration) {
     assert!(usize::try_from(lost).unwrap() * 100 < due, "{lost} of {due} frames were lost");
 }
 
-/// Run with `cargo test --features aravis --test system gige:: -- --ignored --nocapture`.
+/// Run with `cargo test --features aravis --test system network_camera:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute"]
 fn mono16_at_25_fps_loses_hardly_a_frame_in_a_minute() {
