@@ -84,13 +84,33 @@ impl Driver {
         let lock = std::fs::read_link(browser.profile.path().join("SingletonLock")).unwrap();
         let process = lock.to_str().and_then(|lock| lock.rsplit('-').next()?.parse().ok()).and_then(Pid::from_raw);
         let process = process.expect("the lock ends with a process's number");
-        kill_process(process, Signal::KILL).unwrap();
+        // One of its processes has the disk, and would go on a little without the browser.
+        let processes = with_descendants(process);
+        for &process in &processes {
+            // One may just have ended by itself.
+            let _ = kill_process(process, Signal::KILL);
+        }
+
         // An ended process stays listed as a zombie until its parent waits for it.
-        let stat = format!("/proc/{process}/stat");
-        let is_gone = || std::fs::read_to_string(&stat).map_or(true, |stat| stat.contains(") Z "));
-        until("the browser to be gone", || async { is_gone() }).await;
+        let stat = |process: &Pid| std::fs::read_to_string(format!("/proc/{process}/stat"));
+        let is_gone = |process: &Pid| stat(process).map_or(true, |stat| stat.contains(") Z "));
+        until("the browser to be gone", || async { processes.iter().all(is_gone) }).await;
         Browser::controls(pool::start(Arc::clone(&browser.profile), options, json!({})).await, false)
     }
+}
+
+/// `process`, the processes that it started, and theirs.
+fn with_descendants(process: Pid) -> Vec<Pid> {
+    let mut found = vec![process];
+    let mut next = 0;
+    while let Some(parent) = found.get(next) {
+        let threads = std::fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten();
+        let children = threads.flat_map(|thread| std::fs::read_to_string(thread.path().join("children")));
+        let children: String = children.collect();
+        found.extend(children.split_whitespace().filter_map(|child| Pid::from_raw(child.parse().ok()?)));
+        next += 1;
+    }
+    found
 }
 
 /// A box on the page, in CSS pixels.
