@@ -79,23 +79,6 @@ impl AccountRole {
     /// All roles.
     pub const ALL: [Self; 4] = [Self::Lead, Self::Operator, Self::Researcher, Self::Monitor];
 
-    /// The role's name, as stored in the database.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Lead => "lead",
-            Self::Operator => "operator",
-            Self::Researcher => "researcher",
-            Self::Monitor => "monitor",
-        }
-    }
-
-    /// The role with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|role| role.name() == name)
-    }
-
     /// Whether a person with this role may act as `role`. `changes`: whether the request may change something.
     #[must_use]
     pub const fn may_act_as(self, role: Role, changes: bool) -> bool {
@@ -114,6 +97,8 @@ impl AccountRole {
         matches!(self, Self::Lead)
     }
 }
+
+names!(AccountRole { Lead: "lead", Operator: "operator", Researcher: "researcher", Monitor: "monitor" });
 
 impl fmt::Display for AccountRole {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

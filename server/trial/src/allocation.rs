@@ -56,21 +56,6 @@ impl Algorithm {
         }
     }
 
-    /// The algorithm's name, as in the database, in exports and in commitments.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Shuffle1 => "parfocal-shuffle-1",
-            Self::Balanced1 => "parfocal-balanced-1",
-        }
-    }
-
-    /// The algorithm with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Shuffle1, Self::Balanced1].into_iter().find(|algorithm| algorithm.name() == name)
-    }
-
     /// Number of sessions that share a seed: the size of a balanced set, otherwise 1.
     #[must_use]
     pub fn set_size(self, policies: usize) -> usize {
@@ -99,6 +84,8 @@ impl Algorithm {
         order.into_iter().map(|policy| relabelling[policy]).collect()
     }
 }
+
+names!(Algorithm { Shuffle1: "parfocal-shuffle-1", Balanced1: "parfocal-balanced-1" });
 
 impl fmt::Display for Algorithm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -48,22 +48,7 @@ pub enum Medium {
     Screen,
 }
 
-impl Medium {
-    /// The medium's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Screen => "screen",
-        }
-    }
-
-    /// The medium with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Paper, Self::Screen].into_iter().find(|medium| medium.name() == name)
-    }
-}
+names!(Medium { Paper: "paper", Screen: "screen" });
 
 /// Checks the consent `new` that `by` records on the day `today`, and returns it without blanks around its texts.
 /// `required` is the text version that the session's protocol requires, if any.

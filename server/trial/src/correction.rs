@@ -68,23 +68,7 @@ pub enum Subject {
     Comment,
 }
 
-impl Subject {
-    /// The subject's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Session => "session",
-            Self::Answer => "answer",
-            Self::Comment => "comment",
-        }
-    }
-
-    /// The subject with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Session, Self::Answer, Self::Comment].into_iter().find(|subject| subject.name() == name)
-    }
-}
+names!(Subject { Session: "session", Answer: "answer", Comment: "comment" });
 
 /// The corrected part of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
@@ -98,23 +82,7 @@ pub enum Field {
     Note,
 }
 
-impl Field {
-    /// The field's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Participant => "participant",
-            Self::Value => "value",
-            Self::Note => "note",
-        }
-    }
-
-    /// The field with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Participant, Self::Value, Self::Note].into_iter().find(|field| field.name() == name)
-    }
-}
+names!(Field { Participant: "participant", Value: "value", Note: "note" });
 
 /// Checks whether `by` may correct a session for `reason`. `ended`: whether the session has ended. Returns the reason
 /// without surrounding blanks.

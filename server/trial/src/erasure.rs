@@ -35,27 +35,13 @@ pub enum Erasable {
     StudyEvent,
 }
 
-impl Erasable {
-    /// The kind's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Answer => "answer",
-            Self::Comment => "comment",
-            Self::Correction => "correction",
-            Self::Event => "event",
-            Self::StudyEvent => "study-event",
-        }
-    }
-
-    /// The kind with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        const ALL: [Erasable; 5] =
-            [Erasable::Answer, Erasable::Comment, Erasable::Correction, Erasable::Event, Erasable::StudyEvent];
-        ALL.into_iter().find(|subject| subject.name() == name)
-    }
-}
+names!(Erasable {
+    Answer: "answer",
+    Comment: "comment",
+    Correction: "correction",
+    Event: "event",
+    StudyEvent: "study-event",
+});
 
 /// Checks whether `by` may erase words for `reason`. `under_way`: whether any session is under way. Returns the reason
 /// without surrounding blanks.

@@ -1,6 +1,9 @@
 //! Trials: protocol, allocation, the session's state machine, instruments. Pure code: callers pass in the time and the
 //! random source.
 
+#[macro_use]
+mod names;
+
 pub mod acceptance;
 pub mod account;
 pub mod action;

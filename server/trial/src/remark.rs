@@ -101,22 +101,7 @@ pub enum WaitClock {
     WallClock,
 }
 
-impl WaitClock {
-    /// The clock's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PageClock => "page-clock",
-            Self::WallClock => "wall-clock",
-        }
-    }
-
-    /// The clock with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::PageClock, Self::WallClock].into_iter().find(|clock| clock.name() == name)
-    }
-}
+names!(WaitClock { PageClock: "page-clock", WallClock: "wall-clock" });
 
 /// The content of a comment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -17,21 +17,4 @@ pub enum Role {
     System,
 }
 
-impl Role {
-    /// The role's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Surgeon => "surgeon",
-            Self::Operator => "operator",
-            Self::Researcher => "researcher",
-            Self::System => "system",
-        }
-    }
-
-    /// The role with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Surgeon, Self::Operator, Self::Researcher, Self::System].into_iter().find(|role| role.name() == name)
-    }
-}
+names!(Role { Surgeon: "surgeon", Operator: "operator", Researcher: "researcher", System: "system" });

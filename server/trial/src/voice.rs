@@ -79,24 +79,7 @@ pub enum Ending {
     Left,
 }
 
-impl Ending {
-    /// The ending's name, as in the database and in exports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Released => "released",
-            Self::Limit => "limit",
-            Self::MicrophoneLost => "microphone-lost",
-            Self::Left => "left",
-        }
-    }
-
-    /// The ending with this name, if there is one.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Released, Self::Limit, Self::MicrophoneLost, Self::Left].into_iter().find(|ending| ending.name() == name)
-    }
-}
+names!(Ending { Released: "released", Limit: "limit", MicrophoneLost: "microphone-lost", Left: "left" });
 
 /// A piece of a recording as a surgeon's browser sends it.
 #[derive(Debug, Clone, PartialEq, Eq)]
