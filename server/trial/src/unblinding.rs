@@ -75,7 +75,7 @@ impl Circumstances {
                 study.name
             )));
         }
-        Ok(check_unblinding_reason(reason, &study.policies)?)
+        check_unblinding_reason(reason, &study.policies)
     }
 
     fn check_unblinding(&self, session: SessionId, despite_outstanding: bool) -> Result<(), Refusal> {

@@ -11,7 +11,6 @@ use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
 use parfocal_trial::remark::{CommentContent, NewComment, Origin, Sight};
 use parfocal_trial::role::Role;
-use parfocal_trial::study::refusal::StudyRefusal;
 use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::stage::Stage;
 use parfocal_trial::study::state::Change;
@@ -123,8 +122,10 @@ async fn only_those_whom_the_study_names_unblind_it_and_only_the_researcher_chan
         let change = trial.conductor.change_study(role, STUDY.to_owned(), Change::Close, signed("because"));
         assert!(matches!(change.await, Err(ConductError::Forbidden(_))), "{role:?}");
     }
-    assert_eq!(Signature::new(" ", "because"), Err(StudyRefusal::NoPerson { longest: 200 }));
-    assert_eq!(Signature::new("Dr Lead", "\n"), Err(StudyRefusal::NoReason { longest: 1000 }));
+    let nobody = Signature::new(" ", "because").unwrap_err();
+    assert!(nobody.to_string().starts_with("say who you are, in 1 to 200 characters"), "{nobody}");
+    let unreasoned = Signature::new("Dr Lead", "\n").unwrap_err();
+    assert!(unreasoned.to_string().starts_with("give a reason, in 1 to 1000 characters"), "{unreasoned}");
 }
 
 #[tokio::test]

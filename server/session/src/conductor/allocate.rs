@@ -16,9 +16,9 @@ use parfocal_trial::commitment::Allocation;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::protocol::Protocol;
+use parfocal_trial::refusal::Refusal;
 use parfocal_trial::study::lists::List;
 use parfocal_trial::study::places::next_place;
-use parfocal_trial::study::refusal::StudyRefusal;
 
 /// The protocol and the place in an order that a new session gets.
 struct DrawnOrder {
@@ -94,10 +94,14 @@ impl Shared {
 
         let definition = &stored.definition;
         let here = definition.site(&site).filter(|site| stored.sites.contains(&site.name));
-        let site = here.ok_or_else(|| StudyRefusal::UnknownSite { site, here: stored.sites.clone() })?;
-        let protocol = definition.protocol(protocol).ok_or_else(|| StudyRefusal::UnknownProtocol {
-            protocol: protocol.chars().take(40).collect(),
-            known: definition.protocols.iter().map(|protocol| protocol.name.clone()).collect(),
+        let site = here.ok_or_else(|| {
+            let here = stored.sites.join(", ");
+            Refusal::Invalid(format!("the study has no site '{site}' here; there are: {here}"))
+        })?;
+        let protocol = definition.protocol(protocol).ok_or_else(|| {
+            let name: String = protocol.chars().take(40).collect();
+            let known: Vec<&str> = definition.protocols.iter().map(|protocol| protocol.name.as_str()).collect();
+            Refusal::Invalid(format!("the study has no protocol '{name}'; it has: {}", known.join(", ")))
         })?;
         self.check_runnable(protocol)?;
 

@@ -4,7 +4,6 @@ use parfocal_base::ids::SessionId;
 use parfocal_language::Message;
 use parfocal_records::store::StoreError;
 use parfocal_trial::refusal::{Refusal, RefusalKind};
-use parfocal_trial::study::refusal::StudyRefusal;
 
 /// The reason why the conductor did not do something.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -49,12 +48,6 @@ impl ConductError {
 impl From<StoreError> for ConductError {
     fn from(error: StoreError) -> Self {
         Self::Storage(error.to_string())
-    }
-}
-
-impl From<StudyRefusal> for ConductError {
-    fn from(refusal: StudyRefusal) -> Self {
-        Refusal::from(refusal).into()
     }
 }
 

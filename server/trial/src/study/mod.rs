@@ -6,7 +6,6 @@ pub mod definition;
 pub mod event;
 pub mod lists;
 pub mod places;
-pub mod refusal;
 pub mod signature;
 pub mod stage;
 pub mod state;

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::definition::{Definition, PlaceRules, Repetition, Replacement, Site};
-use super::refusal::StudyRefusal;
 use crate::phase::SessionStatus;
+use crate::refusal::Refusal;
 use parfocal_base::ids::SessionId;
 
 /// A session of a study.
@@ -69,10 +69,10 @@ pub fn next_place(
     site: &Site,
     protocol: &str,
     participant: &str,
-) -> Result<usize, StudyRefusal> {
+) -> Result<usize, Refusal> {
     let rules = definition.rules;
     if sessions.iter().any(|session| session.surgeon() == participant && session.withdrawn) {
-        return Err(StudyRefusal::Withdrew { participant: participant.to_owned() });
+        return Err(Refusal::Conflict(format!("{participant} withdrew from the study; choose another participant")));
     }
 
     let list: Vec<&Enrolled> =
@@ -82,7 +82,9 @@ pub fn next_place(
         .iter()
         .any(|session| session.surgeon() == participant && session.protocol == protocol && session.stands(rules));
     if repeats && rules.repeated == Repetition::Refuse {
-        return Err(StudyRefusal::Repeated { participant: participant.to_owned() });
+        return Err(Refusal::Conflict(format!(
+            "{participant} has a session by this protocol, and the study allows no second one"
+        )));
     }
 
     if let Some(place) = given_back(&list, rules) {
@@ -91,14 +93,13 @@ pub fn next_place(
 
     let next = list.iter().map(|session| session.place).max().unwrap_or(0) + 1;
     let opened = spares_opened(&list, rules) + usize::from(repeats);
-    let open = site.places().min(site.surgeons + opened);
+    let places = site.places();
+    let open = places.min(site.surgeons + opened);
     if next > open {
-        return Err(StudyRefusal::UsedUp {
-            site: site.name.clone(),
-            open,
-            places: site.places(),
-            advice: definition.when_used_up.clone(),
-        });
+        return Err(Refusal::Conflict(format!(
+            "no place is left in the list of {}: {open} of {places} were open, all are used. {}",
+            site.name, definition.when_used_up
+        )));
     }
     Ok(next)
 }

@@ -1,7 +1,7 @@
 //! Signatures: who changes a study, how, and why.
 
-use super::refusal::StudyRefusal;
 use crate::account::{Account, AccountName};
+use crate::refusal::Refusal;
 use crate::role::Role;
 
 /// Maximum length of a reason, in characters.
@@ -51,23 +51,28 @@ impl Signature {
     ///
     /// # Errors
     /// If the name or the reason is missing or too long.
-    pub fn new(person: &str, reason: &str) -> Result<Self, StudyRefusal> {
+    pub fn new(person: &str, reason: &str) -> Result<Self, Refusal> {
         let person = person.trim();
         let reason = reason.trim();
 
         if !(1..=LONGEST_PERSON).contains(&person.chars().count()) {
-            return Err(StudyRefusal::NoPerson { longest: LONGEST_PERSON });
+            return Err(Refusal::Invalid(format!(
+                "say who you are, in 1 to {LONGEST_PERSON} characters: it is kept with the change"
+            )));
         }
         if !(1..=LONGEST_REASON).contains(&reason.chars().count()) {
-            return Err(StudyRefusal::NoReason { longest: LONGEST_REASON });
+            return Err(Refusal::Invalid(format!(
+                "give a reason, in 1 to {LONGEST_REASON} characters: it is kept with the change"
+            )));
         }
         Ok(Self { person: person.to_owned(), reason: reason.to_owned(), account: None })
     }
+
     /// A signature of the person who is signed in to `account`, with `reason`.
     ///
     /// # Errors
     /// If the reason is missing or too long.
-    pub fn of_account(account: &Account, reason: &str) -> Result<Self, StudyRefusal> {
+    pub fn of_account(account: &Account, reason: &str) -> Result<Self, Refusal> {
         Ok(Self { account: Some(account.account.clone()), ..Self::new(&account.display, reason)? })
     }
 }

@@ -7,13 +7,17 @@ use utoipa::ToSchema;
 use super::definition::Definition;
 use super::event::{StudyEvent, StudyEventKind};
 use super::places::Enrolled;
-use super::refusal::StudyRefusal;
 use super::signature::{Channel, Signature};
 use super::stage::Stage;
 use crate::phase::SessionStatus;
+use crate::refusal::Refusal;
 use crate::role::Role;
 use parfocal_base::PolicyName;
 use parfocal_base::ids::SessionId;
+
+/// No account is enabled, so nobody could act in the study.
+const NO_ACCOUNTS: &str = "in a study everybody but the surgeon acts under a personal account, and nobody has one: make \
+                           accounts first, with `parfocal account add NAME --role lead`";
 
 /// A change to a study that a person requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -114,7 +118,7 @@ impl StudyState {
         way: Channel,
         signature: &Signature,
         circumstances: StudyCircumstances<'_>,
-    ) -> Result<(), StudyRefusal> {
+    ) -> Result<(), Refusal> {
         check_way(way)?;
         match change {
             Change::Open { despite_concerns } => self.check_open(circumstances, despite_concerns),
@@ -129,97 +133,126 @@ impl StudyState {
     ///
     /// # Errors
     /// If the study is not open.
-    pub const fn check_takes_sessions(&self) -> Result<(), StudyRefusal> {
+    pub fn check_takes_sessions(&self) -> Result<(), Refusal> {
         match self.stage {
             Stage::Open => Ok(()),
-            stage => Err(StudyRefusal::NotOpen(stage)),
+            stage => Err(Refusal::Conflict(format!(
+                "the study is {}; sessions can be made only while it is open",
+                stage.name()
+            ))),
         }
     }
 
-    fn check_open(&self, circumstances: StudyCircumstances<'_>, despite_concerns: bool) -> Result<(), StudyRefusal> {
+    fn check_open(&self, circumstances: StudyCircumstances<'_>, despite_concerns: bool) -> Result<(), Refusal> {
         let StudyCircumstances { has_accounts, concerns, .. } = circumstances;
         match self.stage {
-            Stage::Planned | Stage::Closed if !has_accounts => Err(StudyRefusal::NoAccounts),
+            Stage::Planned | Stage::Closed if !has_accounts => Err(Refusal::conflict(NO_ACCOUNTS)),
             Stage::Planned if !concerns.is_empty() && !despite_concerns => {
-                Err(StudyRefusal::Concerns { concerns: concerns.join(" ") })
+                let concerns = concerns.join(" ");
+                Err(Refusal::Conflict(format!("{concerns} Plan a new study, or confirm it (despite_concerns)")))
             }
             Stage::Planned | Stage::Closed => Ok(()),
-            Stage::Open => Err(StudyRefusal::AlreadyOpen),
-            Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),
+            Stage::Open => Err(Refusal::conflict("the study is open already")),
+            Stage::Locked | Stage::Unblinded => Err(locked()),
         }
     }
 
-    const fn check_close(&self) -> Result<(), StudyRefusal> {
+    fn check_close(&self) -> Result<(), Refusal> {
         match self.stage {
             Stage::Open => Ok(()),
-            Stage::Planned => Err(StudyRefusal::NotOpenedYet),
-            Stage::Closed => Err(StudyRefusal::AlreadyClosed),
-            Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),
+            Stage::Planned => Err(Refusal::conflict("the study has not been opened yet")),
+            Stage::Closed => Err(Refusal::conflict("the study is closed already")),
+            Stage::Locked | Stage::Unblinded => Err(locked()),
         }
     }
 
-    fn check_lock(&self, circumstances: StudyCircumstances<'_>, despite_outstanding: bool) -> Result<(), StudyRefusal> {
+    fn check_lock(&self, circumstances: StudyCircumstances<'_>, despite_outstanding: bool) -> Result<(), Refusal> {
         match self.stage {
             Stage::Closed => {}
-            Stage::Planned | Stage::Open => return Err(StudyRefusal::NotClosed(self.stage)),
-            Stage::Locked | Stage::Unblinded => return Err(StudyRefusal::Locked),
+            Stage::Planned | Stage::Open => {
+                let stage = self.stage.name();
+                return Err(Refusal::Conflict(format!("the study is {stage}; close it first, then lock it")));
+            }
+            Stage::Locked | Stage::Unblinded => return Err(locked()),
         }
 
         let StudyCircumstances { sessions, on_screens, outstanding, .. } = circumstances;
         let goes_on =
             |session: &&Enrolled| session.status == SessionStatus::UnderWay || on_screens == Some(session.session);
         if let Some(session) = sessions.iter().find(goes_on) {
-            return Err(StudyRefusal::SessionUnderWay { participant: session.participant.clone() });
+            return Err(under_way(&session.participant));
         }
 
         if outstanding > 0 && !despite_outstanding {
-            return Err(StudyRefusal::Outstanding { sessions: outstanding });
+            return Err(Refusal::Conflict(format!(
+                "for {outstanding} of its sessions, a surgeon's device may still hold comments or answers, which would \
+                 then not count; wait, or confirm it (despite_outstanding)"
+            )));
         }
         Ok(())
     }
 
-    fn check_unblind(&self, signature: &Signature, definition: &Definition) -> Result<(), StudyRefusal> {
+    fn check_unblind(&self, signature: &Signature, definition: &Definition) -> Result<(), Refusal> {
         match self.stage {
             Stage::Locked => {}
-            Stage::Unblinded => return Err(StudyRefusal::AlreadyUnblinded),
-            Stage::Planned | Stage::Open | Stage::Closed => return Err(StudyRefusal::NotLocked(self.stage)),
+            Stage::Unblinded => return Err(Refusal::conflict("the study is unblinded already")),
+            Stage::Planned | Stage::Open | Stage::Closed => {
+                return Err(Refusal::Conflict(format!(
+                    "the study is {}; a whole study can be unblinded only after it was locked",
+                    self.stage.name()
+                )));
+            }
         }
 
         if !definition.may_unblind.contains(&signature.person) {
-            let may = definition.may_unblind.clone();
-            return Err(StudyRefusal::MayNotUnblind { person: signature.person.clone(), may });
+            return Err(Refusal::NotAllowed(format!(
+                "'{}' is not among those who may unblind this study: {}",
+                signature.person,
+                definition.may_unblind.join("; ")
+            )));
         }
         let policies = definition.protocols.iter().flat_map(|protocol| &protocol.policies);
         check_unblinding_reason(&signature.reason, policies)
     }
 
-    fn check_withdrawal(&self, session: SessionId, circumstances: StudyCircumstances<'_>) -> Result<(), StudyRefusal> {
+    fn check_withdrawal(&self, session: SessionId, circumstances: StudyCircumstances<'_>) -> Result<(), Refusal> {
         let StudyCircumstances { sessions, on_screens, .. } = circumstances;
         let enrolled = sessions.iter().find(|enrolled| enrolled.session == session);
-        let enrolled = enrolled.ok_or(StudyRefusal::UnknownSession)?;
-        let participant = enrolled.participant.clone();
+        let enrolled = enrolled.ok_or_else(|| Refusal::conflict("the study has no such session; reload the page"))?;
+        let participant = &enrolled.participant;
 
         if matches!(self.stage, Stage::Locked | Stage::Unblinded) {
-            return Err(StudyRefusal::Locked);
+            return Err(locked());
         }
         if enrolled.status == SessionStatus::UnderWay || on_screens == Some(session) {
-            return Err(StudyRefusal::SessionUnderWay { participant });
+            return Err(under_way(participant));
         }
         if enrolled.withdrawn {
-            return Err(StudyRefusal::AlreadyWithdrawn { participant });
+            return Err(Refusal::Conflict(format!("the withdrawal of {participant} is recorded already")));
         }
         Ok(())
     }
+}
+
+fn locked() -> Refusal {
+    Refusal::conflict("the study is locked: nothing of it can be changed any more")
+}
+
+/// The refusal because the session of `participant` has not ended, or is still on the operator's page.
+fn under_way(participant: &str) -> Refusal {
+    Refusal::Conflict(format!(
+        "the session of {participant} has not ended, or is still on the operator's page; close it there first"
+    ))
 }
 
 /// Checks whether a study may be changed by `way`.
 ///
 /// # Errors
 /// If `way` is a role other than the researcher.
-pub fn check_way(way: Channel) -> Result<(), StudyRefusal> {
+pub fn check_way(way: Channel) -> Result<(), Refusal> {
     match way {
         Channel::CommandLine | Channel::Role(Role::Researcher) => Ok(()),
-        Channel::Role(_) => Err(StudyRefusal::NotTheResearcher),
+        Channel::Role(_) => Err(Refusal::NotAllowed("only the researcher can change a study".to_owned())),
     }
 }
 
@@ -231,11 +264,13 @@ pub fn check_way(way: Channel) -> Result<(), StudyRefusal> {
 pub fn check_unblinding_reason<'a>(
     reason: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
-) -> Result<(), StudyRefusal> {
+) -> Result<(), Refusal> {
     let reason = reason.to_lowercase();
     let mut names = policies.into_iter().map(PolicyName::as_str).filter(|name| name.contains('-'));
     match names.find(|name| reason.contains(name)) {
-        Some(policy) => Err(StudyRefusal::ReasonNamesPolicy { policy: policy.to_owned() }),
+        Some(policy) => Err(Refusal::Invalid(format!(
+            "the reason names the policy '{policy}', and every export shows the reason; remove the name"
+        ))),
         None => Ok(()),
     }
 }
