@@ -19,7 +19,7 @@ pub fn check_comment(said: &CommentContent) -> Result<(), Refusal> {
     if text.trim().is_empty() {
         return Err(Refusal::Said(RefusalKind::Invalid, Message::new("refused-empty")));
     }
-    check_length(text)
+    answers::check_length(text)
 }
 
 /// Checks whether a spoken comment is allowed. `voice`: whether the session's protocol asks for voice comments. Without
@@ -47,8 +47,7 @@ pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) 
     if !state.takes_answers(new.segment) {
         return Err(Refusal::not_now("refused-question-not-asked"));
     }
-    let fits = answers::check(question, &new.value, plan.segments.len());
-    fits.map_err(Refusal::from)
+    answers::check(question, &new.value, plan.segments.len())
 }
 
 /// Checks the answer `new` in a session of `segments` whose questions are unknown, because this version cannot read the
@@ -58,16 +57,12 @@ pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) 
 /// If the session has no such segment, or the answer is too long.
 pub fn check_unasked(new: &NewAnswer, segments: &[SegmentId]) -> Result<(), Refusal> {
     if let AnswerValue::Text(text) = &new.value {
-        check_length(text)?;
+        answers::check_length(text)?;
     }
     match new.segment {
         Some(segment) if !segments.contains(&segment) => Err(Refusal::unknown_segment()),
         _ => Ok(()),
     }
-}
-
-fn check_length(text: &str) -> Result<(), Refusal> {
-    answers::check_length(text).map_err(Refusal::from)
 }
 
 #[cfg(test)]

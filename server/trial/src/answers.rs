@@ -8,46 +8,14 @@ use parfocal_language::Message;
 /// Maximum length of the text of an answer or comment, in bytes of UTF-8: about 2500 words.
 pub const LONGEST_TEXT: usize = 16 * 1024;
 
-/// Why an answer does not fit its question.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Misfit {
-    /// The question expects another kind of answer.
-    #[error("question '{question}' takes {expected}")]
-    Kind {
-        /// The question's id.
-        question: String,
-        /// The answers that the question takes, in words.
-        expected: String,
-    },
-    /// The text is too long.
-    #[error("{}", too_long(*length))]
-    TooLong {
-        /// Length of the text in bytes.
-        length: usize,
-    },
-}
-
-fn too_long(length: usize) -> Message {
-    Message::new("refused-too-long").number("length", length).number("limit", LONGEST_TEXT)
-}
-
-impl From<Misfit> for Refusal {
-    fn from(misfit: Misfit) -> Self {
-        match misfit {
-            Misfit::TooLong { length } => Self::Said(RefusalKind::Invalid, too_long(length)),
-            Misfit::Kind { .. } => Self::Invalid(misfit.to_string()),
-        }
-    }
-}
-
 /// Checks that `value` is an answer to `question` in a session of `settings` settings.
 ///
 /// # Errors
 /// If it is not. The error says which answers the question takes.
-pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Result<(), Misfit> {
+pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Result<(), Refusal> {
     if !instruments::fits(&question.kind, value, settings) {
         let expected = instruments::expected(&question.kind, settings);
-        return Err(Misfit::Kind { question: question.id.clone(), expected });
+        return Err(Refusal::Invalid(format!("question '{}' takes {expected}", question.id)));
     }
     match value {
         AnswerValue::Text(text) => check_length(text),
@@ -59,8 +27,12 @@ pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Resul
 ///
 /// # Errors
 /// If it is longer than [`LONGEST_TEXT`].
-pub const fn check_length(text: &str) -> Result<(), Misfit> {
-    if text.len() > LONGEST_TEXT { Err(Misfit::TooLong { length: text.len() }) } else { Ok(()) }
+pub fn check_length(text: &str) -> Result<(), Refusal> {
+    if text.len() <= LONGEST_TEXT {
+        return Ok(());
+    }
+    let too_long = Message::new("refused-too-long").number("length", text.len()).number("limit", LONGEST_TEXT);
+    Err(Refusal::Said(RefusalKind::Invalid, too_long))
 }
 
 /// The answer after `given` was added to `earlier`. A 0 among the points keeps the earlier point. So each item of a

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::answers;
-use super::participant::ParticipantCode;
+use super::participant;
 use super::protocol::Protocol;
 use super::question::{AnswerValue, QuestionKind};
 use super::reason;
@@ -110,9 +110,9 @@ pub fn check_participant<'a>(
     new: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Result<(), Refusal> {
-    let code = ParticipantCode::new(new).map_err(|error| Refusal::Invalid(error.to_string()))?;
-    if !known.into_iter().any(|known| known == code.as_str()) {
-        return Err(Refusal::Invalid(format!("there is no participant '{code}'; add the code first")));
+    participant::check_code(new)?;
+    if !known.into_iter().any(|known| known == new) {
+        return Err(Refusal::Invalid(format!("there is no participant '{new}'; add the code first")));
     }
     check_change(current, old, new)
 }
@@ -145,7 +145,7 @@ pub fn check_value(
         return Err(Refusal::conflict("a surgeon's words are never corrected; add a note instead"));
     }
 
-    answers::check(question, new, settings).map_err(|misfit| Refusal::Invalid(misfit.to_string()))?;
+    answers::check(question, new, settings)?;
     if !answers::is_whole(new) {
         return Err(Refusal::Invalid("a corrected answer must be complete; give every item".to_owned()));
     }
@@ -157,7 +157,7 @@ pub fn check_value(
 /// # Errors
 /// If `new` is too long, the note was changed in the meantime, or nothing would change.
 pub fn check_note(current: &str, old: &str, new: &str) -> Result<(), Refusal> {
-    answers::check_length(new).map_err(|misfit| Refusal::Invalid(misfit.to_string()))?;
+    answers::check_length(new).map_err(|too_long| Refusal::Invalid(too_long.to_string()))?;
     check_change(current, old, new)
 }
 

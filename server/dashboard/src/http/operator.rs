@@ -29,7 +29,7 @@ use parfocal_trial::pointing::NewChoice;
 use parfocal_trial::role::Role;
 use parfocal_trial::view::OperatorView;
 
-/// What [`ParticipantCode`](parfocal_trial::participant::ParticipantCode) accepts, for browsers to check while typing.
+/// What [`check_code`](parfocal_trial::participant::check_code) accepts, for browsers to check while typing.
 const CODE_PATTERN: &str = r"[A-Z0-9\-]{2,16}";
 const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-01";
 

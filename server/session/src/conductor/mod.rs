@@ -42,7 +42,7 @@ use parfocal_pipeline::control::{Aim, Command, ControlHandle};
 use parfocal_records::store::Store;
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
-use parfocal_trial::participant::ParticipantCode;
+use parfocal_trial::participant;
 use parfocal_trial::permission::{self, CurrentSession, Request};
 use parfocal_trial::phase::Phase;
 use parfocal_trial::protocol::Record;
@@ -231,8 +231,8 @@ impl Conductor {
     /// If `code` is not a valid code, `by` may not add participants, or the disk failed.
     pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
         permission::check(by, Request::AddParticipant, CurrentSession::None)?;
-        let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
-        Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
+        participant::check_code(code)?;
+        Ok(self.shared.store.add_participant(code, self.shared.clock.wall()).await?)
     }
 
     /// Makes a session for `participant` by `protocol` and draws its allocation. The session waits for
