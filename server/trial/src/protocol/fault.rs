@@ -34,7 +34,7 @@ impl Fault {
 
     /// The fault as an error with file name, line and key.
     pub fn in_file(self, file: &str, source: &str) -> ProtocolError {
-        let start = floor_char_boundary(source, self.span.start);
+        let start = source.floor_char_boundary(self.span.start);
         let line = source[..start].bytes().filter(|&byte| byte == b'\n').count() + 1;
         let key = self.key.or_else(|| key_at(source, line));
         ProtocolError { file: file.to_owned(), line, key, message: self.message }
@@ -45,12 +45,9 @@ impl From<toml::de::Error> for Fault {
     fn from(error: toml::de::Error) -> Self {
         let message = error.message().trim().replace('\n', "; ");
         // A missing key has no place in the text, so its name is taken from the message.
-        let key = message.starts_with("missing field").then(String::new);
-        let mut fault = Self { span: error.span().unwrap_or(0..0), key: None, message };
-        if let Some(missing) = key.and(fault.message.split('`').nth(1)) {
-            fault.key = Some(missing.to_owned());
-        }
-        fault
+        let missing = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
+        let key = missing.map(str::to_owned);
+        Self { span: error.span().unwrap_or(0..0), key, message }
     }
 }
 
@@ -70,8 +67,4 @@ fn key_of(line: &str) -> Option<String> {
     let key = key.trim();
     let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     bare.then(|| key.to_owned())
-}
-
-fn floor_char_boundary(source: &str, at: usize) -> usize {
-    (0..=at.min(source.len())).rev().find(|&at| source.is_char_boundary(at)).unwrap_or(0)
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::fault::{Fault, ProtocolError};
-use super::{Prompt, Protocol, Record};
+use super::{Prompt, Protocol, Record, named_policy};
 use crate::allocation::Order;
 use crate::consent;
 use crate::grace::DEFAULT_GRACE;
@@ -62,7 +62,6 @@ impl Protocol {
 #[serde(deny_unknown_fields)]
 struct File {
     name: Spanned<String>,
-    #[serde(default)]
     language: Option<Spanned<String>>,
     title: Spanned<String>,
     researcher_title: Spanned<String>,
@@ -72,30 +71,22 @@ struct File {
     repeats: Spanned<usize>,
     order: Spanned<Order>,
     segment_seconds: Spanned<u32>,
-    #[serde(default)]
     start_focal_power: Option<Spanned<f64>>,
-    #[serde(default)]
     prompt_seconds: Option<Spanned<u32>>,
-    #[serde(default)]
     grace_minutes: Option<Spanned<u32>>,
     #[serde(default)]
     record: Record,
     #[serde(default)]
     voice: bool,
-    #[serde(default)]
     voice_days: Option<Spanned<u32>>,
     #[serde(default)]
     when_tablet_away: WhenAway,
-    #[serde(default)]
     patch: Option<Spanned<String>>,
-    #[serde(default)]
     patch_stays: Option<Spanned<bool>>,
     patch_follows: Option<Spanned<String>>,
     #[serde(default)]
     hold: bool,
-    #[serde(default)]
     least_picture_width: Option<Spanned<u32>>,
-    #[serde(default)]
     consent_version: Option<Spanned<String>>,
     #[serde(default)]
     quick_comments: Vec<Spanned<String>>,
@@ -189,6 +180,10 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         between(minutes, "grace_minutes", 0..=24 * 60, " minutes").map(|minutes| Duration::from_mins(minutes.into()))
     })?;
 
+    let width = file.least_picture_width.as_ref();
+    let least_picture_width = width.map(|width| between(width, "least_picture_width", 1..=WIDEST_PICTURE, " pixels"));
+    let consent = file.consent_version.as_ref().map(|version| text(version, "consent_version", consent::LONGEST));
+
     let mut ids = BTreeSet::new();
     Ok(Protocol {
         language,
@@ -209,8 +204,8 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         when_tablet_away: file.when_tablet_away,
         patch: patch_rule(&file)?,
         hold: file.hold,
-        least_picture_width: file.least_picture_width.as_ref().map(least_picture_width).transpose()?,
-        consent: file.consent_version.as_ref().map(consent_version).transpose()?,
+        least_picture_width: least_picture_width.transpose()?,
+        consent: consent.transpose()?,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
         policies,
@@ -303,20 +298,14 @@ fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {
     })
 }
 
-/// Reads the width in pixels that the surgeon's picture must have.
-fn least_picture_width(given: &Spanned<u32>) -> Result<u32, Fault> {
-    between(given, "least_picture_width", 1..=WIDEST_PICTURE, " pixels")
-}
-
-/// Reads the version of the consent text that is required.
-fn consent_version(given: &Spanned<String>) -> Result<String, Fault> {
-    let version = given.get_ref().trim();
-    let length = version.chars().count();
-    if (1..=consent::LONGEST).contains(&length) {
-        return Ok(version.to_owned());
+/// Checks that a text is neither empty nor longer than `longest` characters, and returns it without surrounding blanks.
+pub(crate) fn text(value: &Spanned<String>, key: &str, longest: usize) -> Result<String, Fault> {
+    let text = value.get_ref().trim();
+    let length = text.chars().count();
+    if (1..=longest).contains(&length) {
+        return Ok(text.to_owned());
     }
-    let message = format!("must be 1 to {} characters, not {length}", consent::LONGEST);
-    Err(Fault::new(given.span(), "consent_version", message))
+    Err(Fault::new(value.span(), key, format!("must be 1 to {longest} characters, not {length}")))
 }
 
 pub(crate) fn between<T>(
@@ -377,22 +366,13 @@ impl Reader<'_> {
 
     /// Checks a text for surgeons: it must be neither empty nor too long, and must not name a policy.
     fn shown(&self, value: &Spanned<String>, key: &str) -> Result<String, Fault> {
-        let text = value.get_ref().trim();
-        let length = text.chars().count();
-        if !(1..=LONGEST_TEXT).contains(&length) {
-            let message = format!("must be 1 to {LONGEST_TEXT} characters, not {length}");
-            return Err(Fault::new(value.span(), key, message));
-        }
-
-        let lower = text.to_lowercase();
-        // A name without a dash ("fixed") is also an ordinary word, which texts may use.
-        let named = self.known.iter().map(PolicyName::as_str).find(|name| name.contains('-') && lower.contains(name));
-        named.map_or_else(
-            || Ok(text.to_owned()),
-            |name| {
+        let text = text(value, key, LONGEST_TEXT)?;
+        match named_policy(&text, self.known) {
+            None => Ok(text),
+            Some(name) => {
                 Err(Fault::new(value.span(), key, format!("names the policy '{name}', which surgeons must not know")))
-            },
-        )
+            }
+        }
     }
 
     fn all_shown(&self, values: &[Spanned<String>], key: &str) -> Result<Vec<String>, Fault> {
@@ -449,8 +429,10 @@ impl Reader<'_> {
 
         match kind {
             Kind::Text => Ok(QuestionKind::Text),
-            Kind::Likert if question.labels.is_some() => self.labelled(question),
-            Kind::Likert => self.likert(question),
+            Kind::Likert => match &question.labels {
+                Some(labels) => self.labelled(question, labels),
+                None => self.likert(question),
+            },
             Kind::VisualAnalogue => {
                 let low = self.end(question, question.low.as_ref(), "low")?;
                 let high = self.end(question, question.high.as_ref(), "high")?;
@@ -502,26 +484,18 @@ impl Reader<'_> {
     }
 
     /// Reads a Likert scale with a label on every point.
-    fn labelled(&self, question: &FileQuestion) -> Result<QuestionKind, Fault> {
+    fn labelled(&self, question: &FileQuestion, labels: &Spanned<Vec<Spanned<String>>>) -> Result<QuestionKind, Fault> {
         if let Some((key, span)) = question.own_keys().find(|(key, _)| *key != "labels") {
             return Err(Fault::new(span, key, "not allowed together with 'labels'"));
         }
 
-        let labels = question.labels.as_ref().map_or(&[][..], |labels| labels.get_ref().as_slice());
-        let span = question.labels.as_ref().map_or(0..0, Spanned::span);
-        let labels = self.all_shown(labels, "labels")?;
-        let points = u8::try_from(labels.len()).ok().filter(|points| LABELS.contains(points));
-        let points = points.ok_or_else(|| {
-            let message = format!("must be {} to {} labels, not {}", LABELS.start(), LABELS.end(), labels.len());
-            Fault::new(span.clone(), "labels", message)
-        })?;
-
-        match labels.as_slice() {
-            [low, .., high] => {
-                Ok(QuestionKind::Likert { points, low: low.clone(), high: high.clone(), labels: labels.clone() })
-            }
-            _ => Err(Fault::new(span, "labels", "name at least two points")),
-        }
+        let shown = self.all_shown(labels.get_ref(), "labels")?;
+        let points = u8::try_from(shown.len()).ok().filter(|points| LABELS.contains(points));
+        let (Some(points), [low, .., high]) = (points, shown.as_slice()) else {
+            let message = format!("must be {} to {} labels, not {}", LABELS.start(), LABELS.end(), shown.len());
+            return Err(Fault::new(labels.span(), "labels", message));
+        };
+        Ok(QuestionKind::Likert { points, low: low.clone(), high: high.clone(), labels: shown.clone() })
     }
 
     /// Reads the meaning of an end of a scale.

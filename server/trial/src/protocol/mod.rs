@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 pub use fault::ProtocolError;
-pub(crate) use file::{between, identifier};
+pub(crate) use file::{between, identifier, text};
 
 use super::allocation::Order;
 use super::pointing::PatchRule;
@@ -136,6 +136,16 @@ impl Protocol {
             .filter(|&at| at > inspected)
             .min()
     }
+}
+
+/// The first of `policies` that `text` names. A name without a dash ("fixed") is also an ordinary word, which texts may
+/// use.
+pub(crate) fn named_policy<'a>(
+    text: &str,
+    policies: impl IntoIterator<Item = &'a PolicyName>,
+) -> Option<&'a PolicyName> {
+    let text = text.to_lowercase();
+    policies.into_iter().find(|policy| policy.as_str().contains('-') && text.contains(policy.as_str()))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use crate::allocation::Order;
 use crate::protocol::fault::{Fault, ProtocolError};
-use crate::protocol::{Protocol, between, identifier};
+use crate::protocol::{Protocol, between, identifier, text};
 
 /// Maximum number of sites in a study.
 const MOST_SITES: usize = 50;
@@ -234,16 +234,6 @@ fn parse(source: &str, installed: &[Protocol]) -> Result<Definition, Fault> {
         name: StudyName(file.name.into_inner()),
         source: source.into(),
     })
-}
-
-/// Checks that a text is neither empty nor longer than `longest` characters, and returns it without surrounding blanks.
-fn text(value: &Spanned<String>, key: &str, longest: usize) -> Result<String, Fault> {
-    let text = value.get_ref().trim();
-    let length = text.chars().count();
-    if (1..=longest).contains(&length) {
-        return Ok(text.to_owned());
-    }
-    Err(Fault::new(value.span(), key, format!("must be 1 to {longest} characters, not {length}")))
 }
 
 fn people(given: &Spanned<Vec<Spanned<String>>>) -> Result<Vec<String>, Fault> {

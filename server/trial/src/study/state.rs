@@ -10,6 +10,7 @@ use super::places::Enrolled;
 use super::signature::{Channel, Signature};
 use super::stage::Stage;
 use crate::phase::SessionStatus;
+use crate::protocol::named_policy;
 use crate::refusal::Refusal;
 use crate::role::Role;
 use parfocal_base::PolicyName;
@@ -256,8 +257,7 @@ pub fn check_way(way: Channel) -> Result<(), Refusal> {
     }
 }
 
-/// Checks that the reason for an unblinding names none of `policies`, because every export shows the reason. A name
-/// without a dash ("fixed") is also an ordinary word, which the reason may use.
+/// Checks that the reason for an unblinding names none of `policies`, because every export shows the reason.
 ///
 /// # Errors
 /// If the reason names one of the policies.
@@ -265,9 +265,7 @@ pub fn check_unblinding_reason<'a>(
     reason: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
 ) -> Result<(), Refusal> {
-    let reason = reason.to_lowercase();
-    let mut names = policies.into_iter().map(PolicyName::as_str).filter(|name| name.contains('-'));
-    match names.find(|name| reason.contains(name)) {
+    match named_policy(reason, policies) {
         Some(policy) => Err(Refusal::Invalid(format!(
             "the reason names the policy '{policy}', and every export shows the reason; remove the name"
         ))),
