@@ -15,12 +15,13 @@ use super::roles::Researcher;
 use super::security::Nonce;
 use super::{AppState, now};
 use parfocal_session::conductor::ConductError;
-use parfocal_session::reports::{StudyDetail, StudyLine, StudySession};
+use parfocal_session::reports::{StudyDetail, StudyLine};
 use parfocal_trial::account::Account;
 use parfocal_trial::allocation::Order;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::role::Role;
 use parfocal_trial::study::definition::{Repetition, Replacement};
+use parfocal_trial::study::places::Enrolled;
 use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::stage::Stage;
 use parfocal_trial::study::state::Change;
@@ -150,7 +151,7 @@ pub(super) fn channel(by: &str) -> &'static str {
 }
 
 /// The state of a session, in words.
-pub(super) const fn session_state(session: &StudySession) -> &'static str {
+pub(super) const fn session_state(session: &Enrolled) -> &'static str {
     match session.status {
         SessionStatus::UnderWay => "under way",
         SessionStatus::Completed => "completed",

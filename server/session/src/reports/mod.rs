@@ -19,7 +19,7 @@ use crate::conductor::{ConductError, Course, RunClock, outstanding};
 
 pub use beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 pub use session::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
-pub use studies::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol, StudySession};
+pub use studies::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol};
 pub use timeline::{
     PauseSpan, Played, SetAside, SettingSpan, SightSpan, Timeline, TimelineComment, TimelinePoint, TimelineVoice,
 };

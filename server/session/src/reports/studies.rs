@@ -9,7 +9,6 @@ use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::StoredStudy;
 use parfocal_trial::allocation::Order;
-use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::{PlaceRules, Site};
 use parfocal_trial::study::event::StudyEvent;
@@ -64,7 +63,7 @@ pub struct StudyDetail {
     /// unless the study is closed.
     pub outstanding: usize,
     /// The study's sessions, in the order in which they were made.
-    pub study_sessions: Vec<StudySession>,
+    pub study_sessions: Vec<Enrolled>,
     /// The study's events, oldest first.
     pub log: Vec<StudyLogLine>,
 }
@@ -88,29 +87,6 @@ pub struct SiteDetail {
     pub here: bool,
     /// Number of sessions made at the site.
     pub sessions: usize,
-}
-
-/// A session of a study.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct StudySession {
-    /// The session.
-    pub session: SessionId,
-    /// The participant's code.
-    pub participant: String,
-    /// The corrected code; none if it was not corrected.
-    pub corrected_participant: Option<String>,
-    /// Name of the site.
-    pub site: String,
-    /// Name of the protocol.
-    pub protocol: String,
-    /// Place in the list of this site and protocol, from 1.
-    pub place: usize,
-    /// State of the session.
-    pub status: SessionStatus,
-    /// Whether the session's policies were revealed.
-    pub unblinded: bool,
-    /// Whether the surgeon withdrew.
-    pub withdrawn: bool,
 }
 
 /// An event of a study in words.
@@ -232,26 +208,11 @@ impl StudyDetail {
             analysis: definition.analysis.clone(),
             concerns: Vec::new(),
             outstanding: 0,
-            study_sessions: sessions(study),
+            study_sessions: study.sessions.clone(),
             log: log(study),
             line,
         }
     }
-}
-
-fn sessions(study: &StoredStudy) -> Vec<StudySession> {
-    let session = |enrolled: &Enrolled| StudySession {
-        session: enrolled.session,
-        participant: enrolled.participant.clone(),
-        corrected_participant: enrolled.corrected_participant.clone(),
-        site: enrolled.site.clone(),
-        protocol: enrolled.protocol.clone(),
-        place: enrolled.place,
-        status: enrolled.status,
-        unblinded: enrolled.unblinded,
-        withdrawn: enrolled.withdrawn,
-    };
-    study.sessions.iter().map(session).collect()
 }
 
 fn log(study: &StoredStudy) -> Vec<StudyLogLine> {

@@ -2,31 +2,35 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 use super::definition::{Definition, PlaceRules, Repetition, Replacement, Site};
 use crate::phase::SessionStatus;
 use crate::refusal::Refusal;
 use parfocal_base::ids::SessionId;
 
 /// A session of a study.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[schema(as = StudySession)]
 pub struct Enrolled {
-    /// Id of the session.
+    /// The session.
     pub session: SessionId,
-    /// Code of the session's participant, as it was recorded.
+    /// The participant's code.
     pub participant: String,
-    /// Corrected code of the participant; none if it was not corrected.
+    /// The corrected code; none if it was not corrected.
     pub corrected_participant: Option<String>,
-    /// Name of the session's site.
+    /// Name of the site.
     pub site: String,
-    /// Name of the session's protocol.
+    /// Name of the protocol.
     pub protocol: String,
-    /// Place in the list for the site and the protocol, from 1.
+    /// Place in the list of this site and protocol, from 1.
     pub place: usize,
-    /// Whether the session is under way, completed or aborted.
+    /// State of the session.
     pub status: SessionStatus,
-    /// Whether the session was unblinded.
+    /// Whether the session's policies were revealed.
     pub unblinded: bool,
-    /// Whether the session's surgeon withdrew.
+    /// Whether the surgeon withdrew.
     pub withdrawn: bool,
 }
 
