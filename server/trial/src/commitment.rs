@@ -30,10 +30,14 @@ impl Allocation {
     /// `seed`.
     #[must_use]
     pub fn draw(session: SessionId, protocol: &Protocol, seed: Seed, index: usize) -> Self {
-        let algorithm = protocol.order.algorithm();
-        let order = algorithm.draw(seed, protocol.policies.len(), protocol.repeats, index);
-        let schedule = order.into_iter().map(|policy| protocol.policies[policy].clone()).collect();
-        Self { session, algorithm, seed, index, protocol_sha256: protocol.sha256(), schedule }
+        Self {
+            session,
+            algorithm: protocol.order.algorithm(),
+            seed,
+            index,
+            protocol_sha256: protocol.sha256(),
+            schedule: protocol.draw(seed, index),
+        }
     }
 
     /// The text that is hashed: seven lines, each ending with a line feed.

@@ -143,10 +143,9 @@ impl Shared {
     /// A seed, and a place in the set of sessions that share it: the first free place of the latest set if that is
     /// still open, otherwise place 0 of a new seed.
     async fn draw_place(&self, protocol: &Protocol, random: &mut ChaCha12Rng) -> Result<(Seed, usize), ConductError> {
-        let algorithm = protocol.order.algorithm();
-        let size = algorithm.set_size(protocol.policies.len());
-
+        let size = protocol.set_size();
         if size > 1 {
+            let algorithm = protocol.order.algorithm();
             let latest = self.store.reader().latest_set(&hex::encode(protocol.sha256()), algorithm).await?;
             let free = latest.and_then(|set| Some((set.seed, set.free_place(size)?)));
             if let Some(place) = free {

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 pub use fault::ProtocolError;
 pub(crate) use file::{between, identifier, text};
 
-use super::allocation::Order;
+use super::allocation::{Order, Seed};
 use super::pointing::PatchRule;
 use super::question::Question;
 use super::tablet::WhenAway;
@@ -105,6 +105,19 @@ impl Protocol {
     #[must_use]
     pub fn settings(&self) -> usize {
         self.policies.len() * self.repeats
+    }
+
+    /// Number of sessions whose orders are drawn together from one seed: 1 if they are plainly shuffled.
+    #[must_use]
+    pub fn set_size(&self) -> usize {
+        self.order.algorithm().set_size(self.policies.len())
+    }
+
+    /// Draws the order of session `index` (from 0) of the set with this seed: the policy of each segment.
+    #[must_use]
+    pub fn draw(&self, seed: Seed, index: usize) -> Vec<PolicyName> {
+        let order = self.order.algorithm().draw(seed, self.policies.len(), self.repeats, index);
+        order.into_iter().map(|policy| self.policies[policy].clone()).collect()
     }
 
     /// SHA-256 of the TOML text.

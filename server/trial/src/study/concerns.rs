@@ -18,7 +18,7 @@ pub fn concerns(definition: &Definition, accounts: &[Account], here: &[String]) 
 
 /// A last set that is never complete: in it, not every order comes equally often.
 fn incomplete_set(site: &Site, protocol: &Protocol) -> Option<String> {
-    let in_a_set = protocol.order.algorithm().set_size(protocol.policies.len());
+    let in_a_set = protocol.set_size();
     let over = site.surgeons % in_a_set;
     if over == 0 {
         return None;

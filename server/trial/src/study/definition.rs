@@ -173,7 +173,7 @@ impl Definition {
     /// A definition to start from, for a study by `protocol` that `lead` unblinds.
     #[must_use]
     pub fn template(protocol: &Protocol, lead: &str) -> String {
-        let in_a_set = protocol.order.algorithm().set_size(protocol.policies.len());
+        let in_a_set = protocol.set_size();
         let surgeons = in_a_set * 12_usize.div_ceil(in_a_set);
         let order = if protocol.order == Order::Balanced { "balanced" } else { "shuffled" };
         format!(

@@ -105,21 +105,17 @@ impl List {
     /// Draws the list for `site` and `protocol`, with `places` places. `seed` is the seed of the whole study.
     #[must_use]
     pub fn draw(site: &str, protocol: &Protocol, places: usize, seed: Seed) -> Self {
-        let algorithm = protocol.order.algorithm();
-        let in_a_set = algorithm.set_size(protocol.policies.len());
-
+        let in_a_set = protocol.set_size();
         let place = |place: usize| {
             let seed = set_seed(seed, site, &protocol.name, place / in_a_set + 1);
             let index = place % in_a_set;
-            let order = algorithm.draw(seed, protocol.policies.len(), protocol.repeats, index);
-            let schedule = order.into_iter().map(|policy| protocol.policies[policy].clone()).collect();
-            ListPlace { seed, index, schedule }
+            ListPlace { seed, index, schedule: protocol.draw(seed, index) }
         };
 
         Self {
             site: site.to_owned(),
             protocol: protocol.name.clone(),
-            algorithm,
+            algorithm: protocol.order.algorithm(),
             places: (0..places).map(place).collect(),
         }
     }
