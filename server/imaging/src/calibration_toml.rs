@@ -11,26 +11,8 @@ use super::frame::MosaicFrame;
 
 /// Why a calibration could not be read. The caller knows the file and puts its name in front.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum CalibrationError {
-    /// The text is not TOML.
-    #[error("line {line}: {problem}")]
-    Syntax {
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        problem: String,
-    },
-    /// A key is unknown, or its value is invalid.
-    #[error("line {line}, key '{key}': {problem}")]
-    Key {
-        /// Line of the value, from 1.
-        line: usize,
-        /// The key.
-        key: String,
-        /// What is wrong with it.
-        problem: String,
-    },
-}
+#[error("{0}")]
+pub struct CalibrationError(String);
 
 impl Calibration {
     /// Reads a calibration:
@@ -54,25 +36,14 @@ impl Calibration {
     pub fn from_toml(text: &str) -> Result<Self, CalibrationError> {
         let no_pictures =
             "a count, or a list of 16; the name of a picture is only allowed in a calibration that is read from a file";
-        Self::from_toml_with(text, |_| Err(format!("must be {no_pictures}")))
+        Self::default().changed_by_toml(text, |_| Err(format!("must be {no_pictures}")))
     }
 
-    /// Like [`Calibration::from_toml`]. `picture` reads the reference picture of a given name, or says what is wrong
-    /// with it.
+    /// This calibration with the values of the keys that `text` has. `picture` reads the reference picture of a given
+    /// name, or says what is wrong with it.
     ///
     /// # Errors
     /// As [`Calibration::from_toml`], and if a picture cannot be read or does not fit.
-    pub fn from_toml_with(
-        text: &str,
-        picture: impl Fn(&str) -> Result<MosaicFrame, String>,
-    ) -> Result<Self, CalibrationError> {
-        Self::default().changed_by_toml(text, picture)
-    }
-
-    /// This calibration with the values of the keys that `text` has.
-    ///
-    /// # Errors
-    /// As [`Calibration::from_toml_with`].
     pub fn changed_by_toml(
         self,
         text: &str,
@@ -126,15 +97,15 @@ struct Keys<'a> {
 
 impl<'a> Keys<'a> {
     fn parse(text: &'a str) -> Result<Self, CalibrationError> {
-        let values = toml::from_str(text).map_err(|error| CalibrationError::Syntax {
-            line: error.span().map_or(1, |span| line_of(text, span.start)),
-            problem: error.message().to_owned(),
+        let values = toml::from_str(text).map_err(|error| {
+            let line = error.span().map_or(1, |span| line_of(text, span.start));
+            CalibrationError(format!("line {line}: {}", error.message()))
         })?;
         Ok(Self { text, values })
     }
 
-    fn error(&self, key: &str, at: usize, problem: String) -> CalibrationError {
-        CalibrationError::Key { line: line_of(self.text, at), key: key.to_owned(), problem }
+    fn error(&self, key: &str, at: usize, problem: &str) -> CalibrationError {
+        CalibrationError(format!("line {}, key '{key}': {problem}", line_of(self.text, at)))
     }
 
     /// Removes `key` and reads its value as a `T` that passes `check`. `None` if the key is absent.
@@ -148,9 +119,9 @@ impl<'a> Keys<'a> {
 
         let at = value.span().start;
         let read = value.into_inner().try_into::<T>();
-        let read = read.map_err(|error| self.error(key, at, format!("must be {expected}: {}", error.message())))?;
+        let read = read.map_err(|error| self.error(key, at, &format!("must be {expected}: {}", error.message())))?;
 
-        check(&read).map_err(|problem| self.error(key, at, problem))?;
+        check(&read).map_err(|problem| self.error(key, at, &problem))?;
         Ok(Some(read))
     }
 
@@ -213,12 +184,12 @@ impl<'a> Keys<'a> {
         let dark_means = calibration.dark.band_means();
         let white_means = calibration.white.band_means();
         if !white_means.iter().zip(&dark_means).all(|(white, dark)| *white >= dark + 1.0) {
-            return Err(self.error("white", places[1], above_dark));
+            return Err(self.error("white", places[1], &above_dark));
         }
 
         match calibration.size() {
             Some((width, height)) if !calibration.fits(width, height) => {
-                Err(self.error("white", places[1], "must be a picture of the size of the dark one".to_owned()))
+                Err(self.error("white", places[1], "must be a picture of the size of the dark one"))
             }
             _ => Ok(()),
         }
@@ -237,10 +208,10 @@ impl<'a> Keys<'a> {
 
         let at = self.values.get(key).map_or(0, |value| value.span().start);
         let name = self.text(key)?.unwrap_or_default();
-        let frame = read(&name).map_err(|problem| self.error(key, at, problem))?;
+        let frame = read(&name).map_err(|problem| self.error(key, at, &problem))?;
 
         if frame.samples().iter().any(|&sample| f32::from(sample) > most) {
-            return Err(self.error(key, at, format!("{name} has counts above {most}, the limit of the bit depth")));
+            return Err(self.error(key, at, &format!("{name} has counts above {most}, the limit of the bit depth")));
         }
 
         Ok(Some(Reference::PerPixel(frame)))
@@ -267,7 +238,7 @@ impl<'a> Keys<'a> {
     fn none_left(&self) -> Result<(), CalibrationError> {
         let Some((key, value)) = self.values.first_key_value() else { return Ok(()) };
         let known = "name, unit, version, date, bit_depth, centre_nm, fwhm_nm, dark, white, spectral_correction";
-        Err(self.error(key, value.span().start, format!("is not a key of a calibration; the keys are: {known}")))
+        Err(self.error(key, value.span().start, &format!("is not a key of a calibration; the keys are: {known}")))
     }
 }
 

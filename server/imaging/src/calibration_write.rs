@@ -1,4 +1,4 @@
-//! Writing a calibration as TOML text, as [`Calibration::from_toml_with`] reads it.
+//! Writing a calibration as TOML text, as [`Calibration::changed_by_toml`] reads it.
 
 use std::fmt::Write;
 
@@ -71,7 +71,7 @@ mod tests {
         calibration.correction[3][5] = -0.125;
 
         let text = calibration.to_toml("dark.tiff", "white.tiff");
-        let read = Calibration::from_toml_with(&text, |name| {
+        let read = Calibration::default().changed_by_toml(&text, |name| {
             assert_eq!(name, "white.tiff");
             Ok(white.clone())
         });

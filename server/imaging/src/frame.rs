@@ -14,28 +14,8 @@ pub struct MosaicFrame {
 
 /// A picture whose data do not match its size.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
-    /// Width or height is not a positive multiple of 4.
-    #[error("a mosaic frame must be a positive multiple of 4 wide and high, not {width}x{height}")]
-    BadSize {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-    },
-    /// The number of samples is not width times height.
-    #[error("a {width}x{height} picture needs {expected} values, but {found} were given")]
-    WrongLength {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// Number of values in a picture of this size.
-        expected: usize,
-        /// Number of values given.
-        found: usize,
-    },
-}
+#[error("{0}")]
+pub struct FrameError(String);
 
 impl MosaicFrame {
     /// A frame of `samples`, row by row.
@@ -44,7 +24,9 @@ impl MosaicFrame {
     /// If a side is not a positive multiple of 4, or the number of samples does not fit.
     pub fn new(width: usize, height: usize, samples: Vec<u16>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 || !width.is_multiple_of(CELL) || !height.is_multiple_of(CELL) {
-            return Err(FrameError::BadSize { width, height });
+            return Err(FrameError(format!(
+                "a mosaic frame must be a positive multiple of {CELL} wide and high, not {width}x{height}"
+            )));
         }
 
         check_length(width, height, 1, samples.len())?;
@@ -134,5 +116,8 @@ impl GrayImage {
 
 fn check_length(width: usize, height: usize, channels: usize, found: usize) -> Result<(), FrameError> {
     let expected = width * height * channels;
-    if found == expected { Ok(()) } else { Err(FrameError::WrongLength { width, height, expected, found }) }
+    if found == expected {
+        return Ok(());
+    }
+    Err(FrameError(format!("a {width}x{height} picture needs {expected} values, but {found} were given")))
 }

@@ -41,24 +41,9 @@ pub struct Spectrum {
 }
 
 /// A place outside the picture, or a circle that is none.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum BadCircle {
-    /// The centre is not in the picture.
-    #[error("the place {x},{y} is outside the picture of {width}x{height} samples")]
-    Outside {
-        /// Samples from the left.
-        x: f64,
-        /// Samples from the top.
-        y: f64,
-        /// Width of the picture.
-        width: usize,
-        /// Height of the picture.
-        height: usize,
-    },
-    /// The radius is negative or no number.
-    #[error("a radius must be 0 or more samples, not {0}")]
-    Radius(f64),
-}
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct BadCircle(String);
 
 /// Adds up the cells within a circle, frame by frame.
 pub struct SpectrumSum<'a> {
@@ -108,10 +93,11 @@ impl<'a> SpectrumSum<'a> {
     ) -> Result<Self, BadCircle> {
         let Circle { x, y, radius } = circle;
         if !((0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y)) {
-            return Err(BadCircle::Outside { x, y, width, height });
+            let problem = format!("the place {x},{y} is outside the picture of {width}x{height} samples");
+            return Err(BadCircle(problem));
         }
         if !(radius.is_finite() && radius >= 0.0) {
-            return Err(BadCircle::Radius(radius));
+            return Err(BadCircle(format!("a radius must be 0 or more samples, not {radius}")));
         }
 
         Ok(Self {

@@ -1,7 +1,7 @@
 //! The available protocols: those that ship, and those of a folder, which take precedence.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -41,28 +41,15 @@ pub struct ProtocolSummary {
     pub segment_seconds: u64,
 }
 
-/// Why the protocols could not be read.
+/// Why the protocols could not be read. The message names the file or folder.
 #[derive(Debug, thiserror::Error)]
-pub enum LibraryError {
-    /// A protocol is malformed.
-    #[error("{0}")]
-    Malformed(#[from] ProtocolError),
-    /// The folder or a file could not be read.
-    #[error("cannot read the protocols in {}: {error}", .path.display())]
-    Unreadable {
-        /// Folder or file.
-        path: PathBuf,
-        /// The cause.
-        error: std::io::Error,
-    },
-    /// Two files define protocols with the same name.
-    #[error("{} and another file of its folder both hold a protocol called '{name}'; rename one", .path.display())]
-    Twice {
-        /// The second file.
-        path: PathBuf,
-        /// The name.
-        name: String,
-    },
+#[error("{0}")]
+pub struct LibraryError(String);
+
+impl From<ProtocolError> for LibraryError {
+    fn from(error: ProtocolError) -> Self {
+        Self(error.to_string())
+    }
 }
 
 impl Library {
@@ -130,8 +117,8 @@ impl ProtocolSummary {
 
 fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, Protocol>, LibraryError> {
     let unreadable = |path: &Path| {
-        let path = path.to_owned();
-        move |error| LibraryError::Unreadable { path, error }
+        let path = path.display().to_string();
+        move |error: std::io::Error| LibraryError(format!("cannot read the protocols in {path}: {error}"))
     };
 
     let mut files = Vec::new();
@@ -149,7 +136,11 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
         let source = std::fs::read_to_string(&path).map_err(unreadable(&path))?;
         let protocol = Protocol::parse(&source, &path.display().to_string(), known)?;
         if protocols.contains_key(&protocol.name) {
-            return Err(LibraryError::Twice { path, name: protocol.name });
+            return Err(LibraryError(format!(
+                "{} and another file of its folder both hold a protocol called '{}'; rename one",
+                path.display(),
+                protocol.name
+            )));
         }
         protocols.insert(protocol.name.clone(), protocol);
     }

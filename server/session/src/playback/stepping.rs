@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use parfocal_autofocus::{Fault, Observation, Policy};
+use parfocal_autofocus::{Observation, Policy};
 use parfocal_base::FocalPower;
 use parfocal_base::PatchPlace;
 use parfocal_devices::camera::FrameImage;
@@ -19,42 +19,9 @@ pub enum SteppingError {
     /// A frame cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// A frame has no patch.
-    #[error("frame {frame} holds nothing to focus on: {reason}")]
-    NoPatch {
-        /// Index of the frame, from 0.
-        frame: usize,
-        /// Why no patch was found.
-        reason: Arc<str>,
-    },
-    /// The policy returned an invalid focal power.
-    #[error("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1")]
-    InvalidTarget {
-        /// Index of the frame, from 0.
-        frame: usize,
-        /// Value that the policy returned.
-        target: f64,
-    },
-    /// A policy in another process gave no focal power.
-    #[error("at frame {frame} the policy gave no focal power: {fault}")]
-    Fault {
-        /// Index of the frame, from 0.
-        frame: usize,
-        /// Why.
-        fault: Fault,
-    },
-    /// The recording names a place for the patch that is not in the picture.
-    #[error(
-        "frame {frame} has its patch at {x}, {y}, outside the picture; the columns patch_x and patch_y are damaged"
-    )]
-    Outside {
-        /// Index of the frame, from 0.
-        frame: usize,
-        /// Left column of the patch.
-        x: u64,
-        /// Top row of the patch.
-        y: u64,
-    },
+    /// What a frame shows, or what the policy makes of it, cannot be used; says which frame, and why.
+    #[error("{0}")]
+    Frame(String),
 }
 
 /// A policy's step on one frame. Focal powers are normalised to 0..=1.
@@ -107,9 +74,14 @@ impl<'a> Stepping<'a> {
         let focal_power = self.exposed_at(frame, row);
         let decision = self.policy.step(&Observation { view: &view, focal_power });
         let target = decision.target;
-        let target = FocalPower::new(target).map_err(|_| match self.policy.fault() {
-            Some(fault) => SteppingError::Fault { frame, fault },
-            None => SteppingError::InvalidTarget { frame, target },
+        let target = FocalPower::new(target).map_err(|_| {
+            SteppingError::Frame(match self.policy.fault() {
+                // A policy in another process.
+                Some(fault) => format!("at frame {frame} the policy gave no focal power: {fault}"),
+                None => {
+                    format!("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1")
+                }
+            })
         })?;
 
         Ok(Step {
@@ -128,7 +100,9 @@ impl<'a> Stepping<'a> {
 
     /// The patch where the control loop had it. Where it jumped, the policy forgets what it saw, as it did then.
     fn patch(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, SteppingError> {
-        let no_patch = |reason: HoldReason| SteppingError::NoPatch { frame, reason: reason.message };
+        let no_patch = |reason: HoldReason| {
+            SteppingError::Frame(format!("frame {frame} holds nothing to focus on: {}", reason.message))
+        };
         let central = self.eye.find(image, PatchPlace::CENTRE, None).map_err(no_patch)?;
         if self.jumps.replace(patch.jumps).is_some_and(|jumps| jumps != patch.jumps) {
             self.policy.forget();
@@ -142,7 +116,9 @@ impl<'a> Stepping<'a> {
         let (x, y) = patch.corner;
         match (within(x, width), within(y, height)) {
             (Some(x), Some(y)) => Ok(PatchArea { x, y, ..central }),
-            _ => Err(SteppingError::Outside { frame, x, y }),
+            _ => Err(SteppingError::Frame(format!(
+                "frame {frame} has its patch at {x}, {y}, outside the picture; the columns patch_x and patch_y are damaged"
+            ))),
         }
     }
 
