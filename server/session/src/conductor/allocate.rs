@@ -169,7 +169,7 @@ impl Shared {
         let with_id = |policy: PolicyName| (SegmentId(random_uuid(random)), policy);
         NewSession {
             session,
-            stamp: Stamp { wall: self.clock.wall(), at: self.clock.now() },
+            stamp: self.stamp(),
             participant: participant.to_owned(),
             protocol: protocol.name.clone(),
             protocol_toml: protocol.source.to_string(),

@@ -15,7 +15,7 @@ use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_pipeline::control::{Command, Drive};
-use parfocal_records::store::{Comment, NewSession, Reader, RunClocks, Store, StoreError};
+use parfocal_records::store::{Comment, NewSession, Reader, RunClocks, Stamp, Store, StoreError};
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::consent::Consent;
@@ -99,8 +99,7 @@ const SMALL_FOR: Duration = Duration::from_secs(3);
 struct Movement {
     by: Actor,
     to: FocalPower,
-    at: Moment,
-    wall: Timestamp,
+    stamp: Stamp,
 }
 
 /// A hand that has not moved the lens for this long is at rest.
@@ -130,8 +129,7 @@ impl RunClock {
 struct Stop {
     by: Actor,
     cause: StopCause,
-    at: Moment,
-    wall: Timestamp,
+    stamp: Stamp,
 }
 
 /// What does not wait for the disk.
@@ -226,7 +224,7 @@ impl Course {
     }
 
     /// Makes the next events: numbers and stamps `kinds`.
-    pub fn number(&self, by: &Actor, kinds: Vec<EventKind>, at: Moment, wall: Timestamp) -> Vec<Event> {
+    pub fn number(&self, by: &Actor, kinds: Vec<EventKind>, Stamp { at, wall }: Stamp) -> Vec<Event> {
         let next = self.events.last().map_or(1, |event| event.number + 1);
         let event = |(kind, number)| Event { number, by: by.role, account: by.account.clone(), at, wall, kind };
         kinds.into_iter().zip(next..).map(event).collect()
@@ -246,12 +244,11 @@ impl Course {
         by: &Actor,
         action: &Action,
         circumstances: &Circumstances,
-        at: Moment,
-        wall: Timestamp,
+        stamp: Stamp,
     ) -> Result<Vec<Event>, Refusal> {
-        let kinds = circumstances.decide(self.session(), &self.state, by.role, action, at)?;
+        let kinds = circumstances.decide(self.session(), &self.state, by.role, action, stamp.at)?;
         self.writing = !kinds.is_empty();
-        Ok(self.number(by, kinds, at, wall))
+        Ok(self.number(by, kinds, stamp))
     }
 
     /// Applies `events`, which are now on disk; pass none if writing failed. Stops that happened in the meantime come
@@ -274,13 +271,13 @@ impl Course {
     ///
     /// # Errors
     /// If `by` may not do this, or the action does not fit the session's state.
-    pub fn stop(&mut self, by: Actor, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
+    pub fn stop(&mut self, by: Actor, action: Action, stamp: Stamp) -> Result<(), Refusal> {
         self.record_movement();
         // Who holds the focus goes on looking.
         if !matches!(action, Action::HoldFocus { .. }) {
-            self.record_sight(at, wall);
+            self.record_sight(stamp);
         }
-        self.take(Stop { by, cause: StopCause::Action(action), at, wall })
+        self.take(Stop { by, cause: StopCause::Action(action), stamp })
     }
 
     /// Sends the lens to `to` by hand; `lens_at` is where it is. The first place of a movement is recorded as soon as
@@ -293,17 +290,16 @@ impl Course {
         by: Actor,
         to: FocalPower,
         lens_at: FocalPower,
-        at: Moment,
-        wall: Timestamp,
+        stamp: Stamp,
     ) -> Result<(), Refusal> {
         let left_at = self.by_hand.is_none().then_some(lens_at);
-        let is_first = self.movement.is_none() && !self.moved_within(AT_REST, at);
+        let is_first = self.movement.is_none() && !self.moved_within(AT_REST, stamp.at);
         if is_first {
-            return self.take(Stop { by, cause: StopCause::ByHand { to, left_at }, at, wall });
+            return self.take(Stop { by, cause: StopCause::ByHand { to, left_at }, stamp });
         }
 
         decide_by_hand(&self.state, by.role, to, left_at)?;
-        self.movement = Some(Movement { by, to, at, wall });
+        self.movement = Some(Movement { by, to, stamp });
         Ok(())
     }
 
@@ -311,8 +307,8 @@ impl Course {
     ///
     /// # Errors
     /// If `by` may not do this, the protocol does not allow it, or no setting is being inspected.
-    pub fn choose(&mut self, by: Actor, choice: Choice, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
-        self.take(Stop { by, cause: StopCause::Choice(choice), at, wall })
+    pub fn choose(&mut self, by: Actor, choice: Choice, stamp: Stamp) -> Result<(), Refusal> {
+        self.take(Stop { by, cause: StopCause::Choice(choice), stamp })
     }
 
     /// Whether the last event is a movement by hand no longer than `time` before `at`.
@@ -323,14 +319,14 @@ impl Course {
 
     /// Makes an event of the operator's last movement of the lens, if there is one that is none yet.
     pub fn record_movement(&mut self) {
-        let Some(Movement { by, to, at, wall }) = self.movement.take() else { return };
+        let Some(Movement { by, to, stamp }) = self.movement.take() else { return };
         // It is refused only if the session is under way again.
-        let _ = self.take(Stop { by, cause: StopCause::ByHand { to, left_at: None }, at, wall });
+        let _ = self.take(Stop { by, cause: StopCause::ByHand { to, left_at: None }, stamp });
     }
 
     /// The same once the hand is at rest at `now`. Returns whether there was something to record.
     pub fn record_movement_at_rest(&mut self, now: Moment) -> bool {
-        let at_rest = self.movement.as_ref().is_some_and(|movement| now.since(movement.at) >= AT_REST);
+        let at_rest = self.movement.as_ref().is_some_and(|movement| now.since(movement.stamp.at) >= AT_REST);
         if at_rest {
             self.record_movement();
         }
@@ -343,38 +339,34 @@ impl Course {
     }
 
     /// Ends the setting if its time is up; its events wait for the disk. Returns whether it ended.
-    pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
+    pub fn keep_time(&mut self, stamp: Stamp) -> bool {
         let before = self.events.len();
-        if decide_time(&self.state, at).is_empty() {
+        if decide_time(&self.state, stamp.at).is_empty() {
             return false;
         }
-        self.record_sight(at, wall);
-        // The time limit is never refused.
-        let _ = self.take(Stop { by: Role::System.into(), cause: StopCause::TimeLimit, at, wall });
+        self.record_sight(stamp);
+        self.notice(StopCause::TimeLimit, stamp);
         self.events.len() > before
     }
 
     /// Follows what the surgeon's tablets report. Returns whether there is something to record.
-    pub fn follow_tablets(&mut self, report: &TabletReport, at: Moment, wall: Timestamp) -> bool {
+    pub fn follow_tablets(&mut self, report: &TabletReport, stamp: Stamp) -> bool {
         let before = self.events.len();
-        let system = |cause| Stop { by: Role::System.into(), cause, at, wall };
-
-        self.see(report, at, wall);
-        if !decide_tablet(&self.state, report.presence, at).is_empty() {
-            self.record_sight(at, wall);
-            // What the server itself notices is never refused.
-            let _ = self.take(system(StopCause::Tablet(report.presence)));
+        self.see(report, stamp);
+        if !decide_tablet(&self.state, report.presence, stamp.at).is_empty() {
+            self.record_sight(stamp);
+            self.notice(StopCause::Tablet(report.presence), stamp);
         }
-        if self.small_since.is_some_and(|since| at.since(since) >= SMALL_FOR) {
+        if self.small_since.is_some_and(|since| stamp.at.since(since) >= SMALL_FOR) {
             self.small_since = None;
-            self.record_sight(at, wall);
-            let _ = self.take(system(StopCause::SmallPicture));
+            self.record_sight(stamp);
+            self.notice(StopCause::SmallPicture, stamp);
         }
         self.events.len() > before
     }
 
     /// Notes the pictures of `report` that were seen during an inspection.
-    fn see(&mut self, report: &TabletReport, at: Moment, wall: Timestamp) {
+    fn see(&mut self, report: &TabletReport, stamp: Stamp) {
         let Some(segment) = self.state.segment().filter(|_| self.state.running()) else {
             self.seen_pictures = None;
             self.small_since = None;
@@ -383,34 +375,41 @@ impl Course {
         let Some(size) = report.size else { return };
 
         let least = self.protocol.least_picture_width.unwrap_or(0);
-        self.small_since = if size.width < least { self.small_since.or(Some(at)) } else { None };
+        self.small_since = if size.width < least { self.small_since.or(Some(stamp.at)) } else { None };
 
         if self.seen_pictures.is_some_and(|seen_pictures| seen_pictures.size != size) {
-            self.record_sight(at, wall);
+            self.record_sight(stamp);
         }
-        let seen_pictures = self.seen_pictures.get_or_insert(SeenPictures { segment, size, since: at, pictures: 0 });
+        let seen_pictures =
+            self.seen_pictures.get_or_insert(SeenPictures { segment, size, since: stamp.at, pictures: 0 });
         seen_pictures.pictures += report.pictures;
     }
 
-    /// Makes an event of what the surgeon saw until `at`.
-    fn record_sight(&mut self, at: Moment, wall: Timestamp) {
+    /// Makes an event of what the surgeon saw until now.
+    fn record_sight(&mut self, stamp: Stamp) {
         let Some(SeenPictures { segment, size, since, pictures }) = self.seen_pictures.take() else { return };
         if !self.state.running() || self.state.segment() != Some(segment) {
             return;
         }
-        let over_ms = u64::try_from(at.since(since).as_millis()).unwrap_or(u64::MAX);
+        let over_ms = u64::try_from(stamp.at.since(since).as_millis()).unwrap_or(u64::MAX);
         let seen = EventKind::PicturesSeen { segment, size, pictures, over_ms };
-        let _ = self.take(Stop { by: Role::System.into(), cause: StopCause::Seen(seen), at, wall });
+        self.notice(StopCause::Seen(seen), stamp);
+    }
+
+    /// Takes what the server itself notices, which is never refused.
+    fn notice(&mut self, cause: StopCause, stamp: Stamp) {
+        let _ = self.take(Stop { by: Role::System.into(), cause, stamp });
     }
 
     fn take(&mut self, stop: Stop) -> Result<(), Refusal> {
+        let at = stop.stamp.at;
         let kinds = match &stop.cause {
-            StopCause::Action(action) => decide(&self.state, stop.by.role, action, stop.at)?,
-            StopCause::TimeLimit => decide_time(&self.state, stop.at),
+            StopCause::Action(action) => decide(&self.state, stop.by.role, action, at)?,
+            StopCause::TimeLimit => decide_time(&self.state, at),
             StopCause::ByHand { to, left_at } => decide_by_hand(&self.state, stop.by.role, *to, *left_at)?,
             StopCause::Choice(choice) => decide_choice(&self.state, stop.by.role, choice)?,
-            StopCause::Tablet(presence) => decide_tablet(&self.state, *presence, stop.at),
-            StopCause::SmallPicture => decide_small_picture(&self.state, stop.at),
+            StopCause::Tablet(presence) => decide_tablet(&self.state, *presence, at),
+            StopCause::SmallPicture => decide_small_picture(&self.state, at),
             StopCause::Seen(seen) => vec![seen.clone()],
         };
 
@@ -418,7 +417,7 @@ impl Course {
         if kinds.is_empty() && !(self.writing && matches!(stop.cause, StopCause::Action(_))) {
             return Ok(());
         }
-        for event in self.number(&stop.by, kinds, stop.at, stop.wall) {
+        for event in self.number(&stop.by, kinds, stop.stamp) {
             self.apply(self.clock.time(event.at), event);
         }
         self.stops.push(stop);

@@ -15,6 +15,7 @@ use parfocal_base::FocalPower;
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_pipeline::control::{Aim, Command, Drive};
+use parfocal_records::store::Stamp;
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::event::{Event, EventKind};
@@ -37,6 +38,11 @@ impl Shared {
         self.live.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The present time, by both clocks.
+    pub(super) fn stamp(&self) -> Stamp {
+        Stamp { wall: self.clock.wall(), at: self.clock.now() }
+    }
+
     pub(super) async fn act(
         self: &Arc<Self>,
         by: &Actor,
@@ -57,11 +63,10 @@ impl Shared {
     async fn stop(self: &Arc<Self>, by: &Actor, session: SessionId, action: &Action) -> Result<(), ConductError> {
         let stopped = {
             let mut live = self.live();
-            let at = self.clock.now();
-            let wall = self.clock.wall();
+            let stamp = self.stamp();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            course.keep_time(at, wall);
-            let stopped = course.stop(by.clone(), action.clone(), at, wall);
+            course.keep_time(stamp);
+            let stopped = course.stop(by.clone(), action.clone(), stamp);
             self.hold(&mut live);
             stopped
         };
@@ -106,7 +111,7 @@ impl Shared {
             if course.is_unrecorded() {
                 continue;
             }
-            break course.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
+            break course.begin_writing(by, action, &circumstances, self.stamp())?;
         };
         if events.is_empty() {
             return Ok(());
@@ -139,7 +144,7 @@ impl Shared {
         let mut earlier = self.load(session).await?;
         let circumstances = self.circumstances(&mut pen, Subject::of(&earlier), action, signature).await?;
         permission::check_while_on_screen(action)?;
-        let events = earlier.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
+        let events = earlier.begin_writing(by, action, &circumstances, self.stamp())?;
         self.append(session, &events, signature).await
     }
 
@@ -183,7 +188,7 @@ impl Shared {
         }
 
         let kinds = decide_restart(&course.state, inspected);
-        let events = course.number(&Role::System.into(), kinds, self.clock.now(), self.clock.wall());
+        let events = course.number(&Role::System.into(), kinds, self.stamp());
         self.store.append_events(course.session(), &events).await?;
         course.written(events);
 
@@ -196,13 +201,12 @@ impl Shared {
     /// Returns whether there was something to record.
     pub(super) fn keep_time(&self) -> bool {
         let mut live = self.live();
-        let at = self.clock.now();
-        let wall = self.clock.wall();
-        let ended = live.course.as_mut().is_some_and(|course| course.keep_time(at, wall));
+        let stamp = self.stamp();
+        let ended = live.course.as_mut().is_some_and(|course| course.keep_time(stamp));
         if ended {
             self.hold(&mut live);
         }
-        let rested = live.course.as_mut().is_some_and(|course| course.record_movement_at_rest(at));
+        let rested = live.course.as_mut().is_some_and(|course| course.record_movement_at_rest(stamp.at));
         ended || rested
     }
 
@@ -216,10 +220,8 @@ impl Shared {
         {
             let mut live = self.live();
             let lens_at = self.control.status.borrow().focal_power;
-            let at = self.clock.now();
-            let wall = self.clock.wall();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            course.focus_by_hand(by.clone(), to, lens_at, at, wall)?;
+            course.focus_by_hand(by.clone(), to, lens_at, self.stamp())?;
             self.drive(&mut live);
         }
 
@@ -238,9 +240,8 @@ impl Shared {
 
         let changed = {
             let mut live = self.live();
-            let at = self.clock.now();
-            let wall = self.clock.wall();
-            let changed = live.course.as_mut().is_some_and(|course| course.follow_tablets(report, at, wall));
+            let stamp = self.stamp();
+            let changed = live.course.as_mut().is_some_and(|course| course.follow_tablets(report, stamp));
             if changed {
                 self.hold(&mut live);
             }

@@ -52,10 +52,8 @@ impl Shared {
     async fn choose(self: &Arc<Self>, by: &Actor, session: SessionId, choice: Choice) -> Result<(), ConductError> {
         {
             let mut live = self.live();
-            let at = self.clock.now();
-            let wall = self.clock.wall();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            course.choose(by.clone(), choice, at, wall)?;
+            course.choose(by.clone(), choice, self.stamp())?;
             let (place, held) = course.aim().unwrap_or_default();
             let aim = Aim { place, held, choices: live.aim.choices + 1, follows: false };
             self.look(&mut live, aim);

@@ -4,7 +4,7 @@ use super::course::Course;
 use super::{ConductError, Shared};
 use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_records::store::{Answer, Comment, KeepOutcome, Stamp};
+use parfocal_records::store::{Answer, Comment, KeepOutcome};
 use parfocal_trial::acceptance;
 use parfocal_trial::grace::Grace;
 use parfocal_trial::refusal::Refusal;
@@ -122,10 +122,6 @@ impl Shared {
         let voice = stored.protocol().map_or(true, |protocol| protocol.voice);
         let segments = stored.made.segments.into_iter().map(|(segment, _)| segment).collect();
         Ok(SessionFacts { segments, grace, voice })
-    }
-
-    pub(super) fn stamp(&self) -> Stamp {
-        Stamp { wall: self.clock.wall(), at: self.clock.now() }
     }
 }
 
