@@ -9,20 +9,20 @@ use std::{io, thread};
 use tokio::sync::{mpsc, watch};
 
 use super::eye::Eye;
-use super::lock::{FocusLock, LockWatch};
+use super::lock::LockWatch;
 use super::pilot::HoldReason;
 use super::runner::guarded;
 use super::source::FrameSource;
 use super::stepper::Stepper;
 use super::tap::Tap;
 use super::window::LatencyWindow;
-use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Following, LatestSlot, PictureGeometry};
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
-use parfocal_devices::camera::{Camera, CameraOffer, Controls, Frame};
+use parfocal_devices::camera::{Camera, Controls, Frame};
 use parfocal_devices::lens::{Lens, LensDynamics};
 use parfocal_imaging::Reconstructor;
 
@@ -90,18 +90,17 @@ impl ControlLoop {
 
         let tap = Tap::default();
         let outlets = Outlets { telemetry, frames: frames.clone(), tap: tap.clone() };
-        let worker = Worker::new(stepper, source, clock, outlets, controls.clone());
-        let status = worker.status.subscribe();
+        let mut worker = Worker::new(stepper, source, clock, outlets, controls.clone());
+        let (publisher, status) = watch::channel(Arc::new(worker.status(worker.published_at)));
         let handle = ControlHandle { commands: commands_in, status, frames, camera: controls, tap };
 
         let stopping = stop.clone();
-        let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
+        let thread =
+            thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &publisher, &stopping))?;
 
         Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
     }
-}
 
-impl ControlLoop {
     /// Ends the loop, just like dropping it.
     pub fn stop(self) {
         drop(self);
@@ -134,7 +133,6 @@ struct Worker {
     outlets: Outlets,
     /// Read only for the status.
     controls: Option<Controls>,
-    status: watch::Sender<Arc<ControlStatus>>,
     published_at: Moment,
     last_frame_at: Moment,
     /// Why there are no usable frames: none come, or they are too small for a patch.
@@ -158,34 +156,12 @@ impl Worker {
         controls: Option<Controls>,
     ) -> Self {
         let now = clock.now();
-        let first = ControlStatus {
-            at: now,
-            camera: source.health(),
-            camera_offer: CameraOffer::default(),
-            lens: stepper.lens_health(),
-            policy: None,
-            focal_power: stepper.focal_power(),
-            held: None,
-            held_for: Duration::ZERO,
-            message: None,
-            steps_per_second: 0.0,
-            steps: 0,
-            telemetry_dropped: 0,
-            latency_p50_micros: 0,
-            latency_p99_micros: 0,
-            priority: Scheduling::Ordinary,
-            geometry: PictureGeometry::default(),
-            lock: FocusLock::default(),
-            following: Following::default(),
-        };
-
         Self {
             stepper,
             source,
             clock,
             outlets,
             controls,
-            status: watch::Sender::new(Arc::new(first)),
             published_at: now,
             last_frame_at: now,
             camera_fault: None,
@@ -198,7 +174,12 @@ impl Worker {
         }
     }
 
-    fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
+    fn run(
+        mut self,
+        mut commands: mpsc::UnboundedReceiver<Command>,
+        publisher: &watch::Sender<Arc<ControlStatus>>,
+        stop: &AtomicBool,
+    ) {
         self.priority = priority::raise(ThreadRole::Loop);
         while !stop.load(Ordering::Relaxed) {
             let frame = self.source.frames.take(TICK);
@@ -206,7 +187,7 @@ impl Worker {
                 self.stepper.obey(command);
             }
             // The last line of defence: if a frame causes a panic, the loop continues with the next one.
-            if let Err(panic) = guarded(|| self.turn(frame)) {
+            if let Err(panic) = guarded(|| self.turn(frame, publisher)) {
                 tracing::error!(panic, "a step of the control loop failed");
             }
         }
@@ -220,12 +201,12 @@ impl Worker {
         }
     }
 
-    fn turn(&mut self, frame: Option<Frame>) {
+    fn turn(&mut self, frame: Option<Frame>, publisher: &watch::Sender<Arc<ControlStatus>>) {
         match frame {
             Some(frame) => self.step(frame),
             None => self.wait_on(),
         }
-        self.publish();
+        self.publish(publisher);
     }
 
     fn step(&mut self, frame: Frame) {
@@ -259,20 +240,19 @@ impl Worker {
     }
 
     /// Publishes the status if it is due, or if something changed that people must see at once.
-    fn publish(&mut self) {
+    fn publish(&mut self, publisher: &watch::Sender<Arc<ControlStatus>>) {
         let now = self.clock.now();
-        let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
+        let reason = self.hold_reason();
         self.held_since = reason.map(|reason| {
             let caused_by_policy = reason.hold.caused_by_policy();
             self.held_since.filter(|held| held.0 == caused_by_policy).unwrap_or((caused_by_policy, now))
         });
-        let held = reason.map(|reason| reason.hold);
-        let message = reason.map(|reason| reason.message.clone());
 
         let changed = {
-            let last = self.status.borrow();
-            last.held != held
-                || last.message != message
+            let last = publisher.borrow();
+            let reason = self.hold_reason();
+            last.held != reason.map(|reason| reason.hold)
+                || last.message.as_ref() != reason.map(|reason| &reason.message)
                 || last.policy.as_ref() != self.stepper.policy()
                 || last.geometry != self.stepper.geometry()
                 || last.lock != self.lock.told()
@@ -283,11 +263,23 @@ impl Worker {
         }
 
         self.published_at = now;
+        publisher.send_replace(Arc::new(self.status(now)));
+    }
+
+    /// Why the lens is held; `None` if it is not.
+    fn hold_reason(&self) -> Option<&HoldReason> {
+        self.camera_fault.as_ref().or(self.stepper.hold_reason())
+    }
+
+    /// The loop's state at `now`.
+    fn status(&mut self, now: Moment) -> ControlStatus {
         let figures = self.window.figures(now);
+        let reason = self.hold_reason();
+        let held = reason.map(|reason| reason.hold);
         let mut camera = self.source.health();
         camera.working &= held != Some(Hold::CameraFailed);
 
-        self.status.send_replace(Arc::new(ControlStatus {
+        ControlStatus {
             at: now,
             camera,
             camera_offer: self.controls.as_ref().map(Controls::offered).unwrap_or_default(),
@@ -296,7 +288,7 @@ impl Worker {
             focal_power: self.stepper.focal_power(),
             held,
             held_for: self.held_since.map_or(Duration::ZERO, |(_, since)| now.since(since)),
-            message,
+            message: reason.map(|reason| reason.message.clone()),
             steps_per_second: figures.steps as f64,
             steps: self.steps,
             telemetry_dropped: self.telemetry_dropped,
@@ -306,6 +298,6 @@ impl Worker {
             geometry: self.stepper.geometry(),
             lock: self.lock.told(),
             following: self.stepper.following(),
-        }));
+        }
     }
 }
