@@ -90,6 +90,13 @@ impl RgbImage {
         check_length(width, height, 3, data.len())?;
         Ok(Self { width, height, data })
     }
+
+    /// Makes room for `width` x `height` pixels; keeps its memory if that is large enough.
+    pub(super) fn resize(&mut self, width: usize, height: usize) {
+        self.width = width;
+        self.height = height;
+        self.data.resize(3 * width * height, 0);
+    }
 }
 
 /// A gray picture on the 0..255 scale, row by row.
@@ -111,6 +118,13 @@ impl GrayImage {
     pub fn new(width: usize, height: usize, data: Vec<f32>) -> Result<Self, FrameError> {
         check_length(width, height, 1, data.len())?;
         Ok(Self { width, height, data })
+    }
+
+    /// Makes room for `width` x `height` pixels; keeps its memory if that is large enough.
+    pub(super) fn resize(&mut self, width: usize, height: usize) {
+        self.width = width;
+        self.height = height;
+        self.data.resize(width * height, 0.0);
     }
 }
 

@@ -92,9 +92,7 @@ impl Developer {
         }
 
         let (width, height) = size.of(mosaic);
-        rgb.width = width;
-        rgb.height = height;
-        rgb.data.resize(3 * width * height, 0);
+        rgb.resize(width, height);
 
         let mut luma = vec![0; width];
         let mut blue = vec![0; width];
@@ -132,12 +130,11 @@ impl Developer {
         }
 
         let (width, height) = size.of(mosaic);
-        luminance.width = width;
-        luminance.height = height;
-        luminance.data.resize(width * height, 0.0);
+        luminance.resize(width, height);
 
         self.resize(mosaic, size, 1);
-        let mut cells = cell_gray(mosaic, GrayImage::default());
+        let mut cells = GrayImage::default();
+        cells.resize(mosaic.band_width(), mosaic.band_height());
         let per_cell = size.per_cell();
 
         for y in 0..mosaic.band_height() + AHEAD_OF_LUMINANCE {
@@ -175,7 +172,7 @@ impl Developer {
 
     /// Begins a picture with a chroma value for every `step` pixels along either side.
     fn begin<'a>(&'a mut self, mosaic: &'a MosaicFrame, size: Size, step: usize, gray: &'a mut GrayImage) -> Rows<'a> {
-        *gray = cell_gray(mosaic, std::mem::take(gray));
+        gray.resize(mosaic.band_width(), mosaic.band_height());
         self.resize(mosaic, size, step);
         Rows { developer: self, mosaic, per_cell: size.per_cell(), gray, begun: 0, done: 0 }
     }
@@ -264,12 +261,4 @@ impl Rows<'_> {
             colour.make_chroma(place, row, self.per_cell, luminance, chroma);
         }
     }
-}
-
-/// Resizes `gray` to one value per cell.
-fn cell_gray(mosaic: &MosaicFrame, mut gray: GrayImage) -> GrayImage {
-    gray.width = mosaic.band_width();
-    gray.height = mosaic.band_height();
-    gray.data.resize(gray.width * gray.height, 0.0);
-    gray
 }

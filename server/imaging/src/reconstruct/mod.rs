@@ -95,27 +95,17 @@ impl Reconstructor {
     /// mosaic of another size the means of their bands are used.
     pub fn reconstruct(&mut self, mosaic: &MosaicFrame, rgb: &mut RgbImage, gray: &mut GrayImage) {
         let width = mosaic.band_width();
-        let height = mosaic.band_height();
+        rgb.resize(width, mosaic.band_height());
+        gray.resize(width, mosaic.band_height());
+        let (rgb, gray) = (&mut *rgb.data, &mut *gray.data);
 
-        rgb.width = width;
-        rgb.height = height;
-        gray.width = width;
-        gray.height = height;
-        rgb.data.resize(3 * width * height, 0);
-        gray.data.resize(width * height, 0.0);
-
-        self.reconstruct_rows(mosaic, 0, &mut rgb.data, &mut gray.data);
-    }
-
-    /// Makes the pixels and gray values of as many rows of cells as fit into `gray`, from row `first` on.
-    pub(super) fn reconstruct_rows(&mut self, mosaic: &MosaicFrame, first: usize, rgb: &mut [u8], gray: &mut [f32]) {
-        self.lines.colours.iter_mut().for_each(|line| line.resize(mosaic.band_width(), 0.0));
         let lines = &mut self.lines;
+        lines.colours.iter_mut().for_each(|line| line.resize(width, 0.0));
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
-            None => rows_of_counts(&self.of_counts, mosaic, first, &self.encoder, lines, rgb, gray),
+            None => rows_of_counts(&self.of_counts, mosaic, &self.encoder, lines, rgb, gray),
             Some(of_balanced) => {
                 lines.balanced.resize(CELL * mosaic.width(), 0);
-                rows_of_balanced(of_balanced, mosaic, first, &self.encoder, lines, rgb, gray);
+                rows_of_balanced(of_balanced, mosaic, &self.encoder, lines, rgb, gray);
             }
         }
     }
@@ -180,7 +170,6 @@ pub(super) fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
 fn rows_of_counts(
     mixes: &Mixes,
     mosaic: &MosaicFrame,
-    first: usize,
     encoder: &Encoder,
     lines: &mut Lines,
     rgb: &mut [u8],
@@ -188,7 +177,7 @@ fn rows_of_counts(
 ) {
     let width = mosaic.band_width();
     let rows = rgb.chunks_exact_mut(3 * width).zip(gray.chunks_exact_mut(width));
-    for (y, (rgb, gray)) in (first..).zip(rows) {
+    for (y, (rgb, gray)) in rows.enumerate() {
         picture_row(mixes, cell_row(mosaic, 0, y, width), encoder, &mut lines.colours, rgb, gray);
     }
 }
@@ -197,7 +186,6 @@ fn rows_of_counts(
 fn rows_of_balanced(
     (balance, mixes): &(Arc<PixelBalance>, Mixes),
     mosaic: &MosaicFrame,
-    first: usize,
     encoder: &Encoder,
     lines: &mut Lines,
     rgb: &mut [u8],
@@ -205,7 +193,7 @@ fn rows_of_balanced(
 ) {
     let width = mosaic.band_width();
     let rows = rgb.chunks_exact_mut(3 * width).zip(gray.chunks_exact_mut(width));
-    for (y, (rgb, gray)) in (first..).zip(rows) {
+    for (y, (rgb, gray)) in rows.enumerate() {
         balance.apply(cell_row(mosaic, 0, y, width), 0, y, &mut lines.balanced);
         picture_row(mixes, quarters(&lines.balanced), encoder, &mut lines.colours, rgb, gray);
     }
