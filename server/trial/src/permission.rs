@@ -53,19 +53,15 @@ impl CurrentSession {
 /// # Errors
 /// If `by` may not make this request, or `current` does not allow it.
 pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), Refusal> {
-    match request {
-        Request::MakeSession | Request::CloseSession | Request::MoveLens | Request::SeeSpectra
-            if by != Role::Operator =>
-        {
-            return Err(Refusal::only("the operator"));
+    let (who, fits) = match request {
+        Request::MakeSession | Request::CloseSession | Request::MoveLens | Request::SeeSpectra => {
+            ("the operator", by == Role::Operator)
         }
-        Request::PlacePatch if !matches!(by, Role::Surgeon | Role::Operator) => {
-            return Err(Refusal::only("the surgeon or the operator"));
-        }
-        Request::AddParticipant if !matches!(by, Role::Operator | Role::Researcher) => {
-            return Err(Refusal::only("the operator or a researcher"));
-        }
-        _ => {}
+        Request::PlacePatch => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
+        Request::AddParticipant => ("the operator or a researcher", matches!(by, Role::Operator | Role::Researcher)),
+    };
+    if !fits {
+        return Err(Refusal::only(who));
     }
 
     match (request, current) {

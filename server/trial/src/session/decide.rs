@@ -150,11 +150,10 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
     let (who, fits): (&str, bool) = match action {
         Action::Start | Action::GiveReason { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
         Action::Pause { .. } => ("the operator or the surgeon", matches!(by, Role::Operator | Role::Surgeon)),
-        Action::HoldFocus { .. } | Action::ReleaseFocus { .. } => {
+        Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
+        Action::FinishSegment { .. } | Action::HoldFocus { .. } | Action::ReleaseFocus { .. } => {
             ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator))
         }
-        Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
-        Action::FinishSegment { .. } => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
         Action::Resume => {
             let surgeon_may = state.paused != Some(PauseCause::Operator);
             ("the operator", by == Role::Operator || (by == Role::Surgeon && surgeon_may))
