@@ -123,13 +123,8 @@ async fn a_picture_that_stays_smaller_than_the_protocol_allows_pauses_the_settin
     assert!(trial.view().may_resume);
 
     let events = trial.store.reader().events(session).await.unwrap();
-    let seen: Vec<(u32, u64)> = events
-        .iter()
-        .filter_map(|(_, event)| match &event.kind {
-            EventKind::PicturesSeen { size, pictures, .. } => Some((size.width, *pictures)),
-            _ => None,
-        })
-        .collect();
+    let seen: Vec<(u32, u64)> =
+        events.iter().filter_map(|(_, event)| event.kind.seen()).map(|seen| (seen.size.width, seen.pictures)).collect();
     assert_eq!(seen[..2], [(512, 40), (2048, 200)], "{seen:?}");
     assert_eq!(seen[2].0, 512);
     let paused = events.last().unwrap().1.kind.in_words(|_| 1);

@@ -85,17 +85,7 @@ pub enum EventKind {
     /// A tablet shows the surgeon's page again.
     TabletBack,
     /// What the surgeon saw for a while: until the size of the picture changed, or the inspection ended or paused.
-    PicturesSeen {
-        /// Segment that was inspected.
-        segment: SegmentId,
-        /// Size of the pictures.
-        #[serde(flatten)]
-        size: PictureSize,
-        /// Number of pictures drawn.
-        pictures: u64,
-        /// For how long, milliseconds.
-        over_ms: u64,
-    },
+    PicturesSeen(Seen),
     /// Somebody chose what is to be in focus: the patch went to the place that was touched.
     PatchPlaced {
         /// Segment that was inspected.
@@ -157,11 +147,12 @@ pub enum EventKind {
 }
 
 /// What the surgeon saw for a while, all of it of one size.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seen {
     /// Segment that was inspected.
     pub segment: SegmentId,
     /// Size of the pictures.
+    #[serde(flatten)]
     pub size: PictureSize,
     /// Number of pictures drawn.
     pub pictures: u64,
@@ -184,7 +175,7 @@ impl EventKind {
             Self::FocusedByHand { .. } => "focused-by-hand",
             Self::TabletAway { .. } => "tablet-away",
             Self::TabletBack => "tablet-back",
-            Self::PicturesSeen { .. } => "pictures-seen",
+            Self::PicturesSeen(_) => "pictures-seen",
             Self::PatchPlaced { .. } => "patch-placed",
             Self::PatchCentred { .. } => "patch-centred",
             Self::FocusHeld { .. } => "focus-held",
@@ -204,7 +195,7 @@ impl EventKind {
         match self {
             Self::SegmentStarted { segment }
             | Self::SegmentFinished { segment, .. }
-            | Self::PicturesSeen { segment, .. }
+            | Self::PicturesSeen(Seen { segment, .. })
             | Self::PatchPlaced { segment, .. }
             | Self::PatchCentred { segment, .. }
             | Self::FocusHeld { segment }
@@ -279,9 +270,7 @@ impl EventKind {
     #[must_use]
     pub const fn seen(&self) -> Option<Seen> {
         match self {
-            Self::PicturesSeen { segment, size, pictures, over_ms } => {
-                Some(Seen { segment: *segment, size: *size, pictures: *pictures, over_ms: *over_ms })
-            }
+            Self::PicturesSeen(seen) => Some(*seen),
             _ => None,
         }
     }
@@ -298,26 +287,11 @@ impl EventKind {
         }
     }
 
-    /// A copy without the reason.
-    #[must_use]
-    pub fn without_reason(&self) -> Self {
-        let mut kind = self.clone();
-        match &mut kind {
-            Self::Paused { reason, .. }
-            | Self::ReasonGiven { reason, .. }
-            | Self::Aborted { reason, .. }
-            | Self::Withdrawn { reason }
-            | Self::Unblinded { reason, .. } => reason.clear(),
-            _ => {}
-        }
-        kind
-    }
-
     /// A copy without what only the researcher may read: the reason for unblinding, which may name a policy.
     #[must_use]
     pub fn for_the_blinded(&self) -> Self {
         match self {
-            Self::Unblinded { .. } => self.without_reason(),
+            Self::Unblinded { emergency, .. } => Self::Unblinded { reason: String::new(), emergency: *emergency },
             other => other.clone(),
         }
     }
@@ -342,7 +316,7 @@ impl EventKind {
             Self::TabletAway { hidden: false } => "The surgeon’s tablet is away".to_owned(),
             Self::TabletAway { hidden: true } => "The surgeon’s page is not on screen".to_owned(),
             Self::TabletBack => "The surgeon’s tablet is back".to_owned(),
-            Self::PicturesSeen { segment, size, pictures, over_ms } => {
+            Self::PicturesSeen(Seen { segment, size, pictures, over_ms }) => {
                 let rate = per_second(*pictures, *over_ms);
                 let PictureSize { width, height } = size;
                 format!("Setting {} seen at {width}x{height}, {rate:.1} pictures a second", setting(*segment))
@@ -396,12 +370,12 @@ mod tests {
             EventKind::FocusedByHand { focal_power: FocalPower::MIDDLE, left_at: None },
             EventKind::TabletAway { hidden: true },
             EventKind::TabletBack,
-            EventKind::PicturesSeen {
+            EventKind::PicturesSeen(Seen {
                 segment,
                 size: PictureSize { width: 512, height: 272 },
                 pictures: 20,
                 over_ms: 1000,
-            },
+            }),
             EventKind::PatchPlaced { segment, frame: 7, x: 300.25, y: 90.5, place: PatchPlace::nearest(0.25, -0.5) },
             EventKind::PatchCentred { segment, frame: 9 },
             EventKind::FocusHeld { segment },

@@ -56,11 +56,9 @@ mod tests {
     #[test]
     fn a_setting_has_its_smallest_picture_and_means_over_its_time() {
         let segment = SegmentId(uuid::Uuid::nil());
-        let seen = |width, pictures, over_ms| EventKind::PicturesSeen {
-            segment,
-            size: PictureSize { width, height: width / 2 },
-            pictures,
-            over_ms,
+        let seen = |width, pictures, over_ms| {
+            let size = PictureSize { width, height: width / 2 };
+            EventKind::PicturesSeen(Seen { segment, size, pictures, over_ms })
         };
         let events = [seen(2048, 90, 3000), EventKind::Resumed, seen(512, 10, 1000)];
         let sights = sights_by_segment(&events);

@@ -19,7 +19,7 @@ use parfocal_records::store::{Comment, NewSession, Reader, RunClocks, Stamp, Sto
 use parfocal_trial::account::Actor;
 use parfocal_trial::action::Action;
 use parfocal_trial::consent::Consent;
-use parfocal_trial::event::{Event, EventKind};
+use parfocal_trial::event::{Event, EventKind, Seen};
 use parfocal_trial::grace::{Grace, Outstanding};
 use parfocal_trial::phase::Phase;
 use parfocal_trial::pointing::Choice;
@@ -392,7 +392,7 @@ impl Course {
             return;
         }
         let over_ms = u64::try_from(stamp.at.since(since).as_millis()).unwrap_or(u64::MAX);
-        let seen = EventKind::PicturesSeen { segment, size, pictures, over_ms };
+        let seen = EventKind::PicturesSeen(Seen { segment, size, pictures, over_ms });
         self.notice(StopCause::Seen(seen), stamp);
     }
 
@@ -475,7 +475,7 @@ impl Course {
             | EventKind::ReasonGiven { .. }
             | EventKind::TabletAway { .. }
             | EventKind::TabletBack
-            | EventKind::PicturesSeen { .. }
+            | EventKind::PicturesSeen(_)
             | EventKind::PatchPlaced { .. }
             | EventKind::PatchCentred { .. }
             | EventKind::FocusHeld { .. }

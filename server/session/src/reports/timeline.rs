@@ -17,7 +17,7 @@ use parfocal_records::store::{
 };
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
-use parfocal_trial::event::{Event, EventKind, per_second};
+use parfocal_trial::event::{Event, EventKind, Seen, per_second};
 use parfocal_trial::permission;
 use parfocal_trial::protocol::Record;
 use parfocal_trial::question::AnswerValue;
@@ -472,14 +472,10 @@ fn holds(events: &[(f64, &EventKind)]) -> Vec<HoldSpan> {
 
 /// What the surgeon saw. Each of these events describes the time before it.
 fn sights(events: &[(f64, &EventKind)]) -> Vec<SightSpan> {
-    let span = |&(to, kind): &(f64, &EventKind)| match kind {
-        EventKind::PicturesSeen { size, pictures, over_ms, .. } => Some(SightSpan {
-            from: to - milliseconds(*over_ms),
-            to,
-            size: *size,
-            per_second: per_second(*pictures, *over_ms),
-        }),
-        _ => None,
+    let span = |&(to, kind): &(f64, &EventKind)| {
+        let Seen { size, pictures, over_ms, .. } = kind.seen()?;
+        let per_second = per_second(pictures, over_ms);
+        Some(SightSpan { from: to - milliseconds(over_ms), to, size, per_second })
     };
     events.iter().filter_map(span).collect()
 }

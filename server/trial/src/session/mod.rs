@@ -304,7 +304,7 @@ impl SessionState {
             EventKind::Created
             | EventKind::QuestionsFinished { segment: None }
             | EventKind::FocusedByHand { .. }
-            | EventKind::PicturesSeen { .. } => {}
+            | EventKind::PicturesSeen(_) => {}
             EventKind::Started => self.phase = Phase::Notice,
             EventKind::SegmentStarted { .. } => {
                 self.phase = Phase::Inspecting;
