@@ -66,13 +66,13 @@ fn parts(app: AppState, pass: Option<Pass>, token: Option<Token>) -> impl Stream
             (None, None) => std::future::pending().await,
         }
     };
-    let watcher = app.live.watch(Size::Cell);
+    let viewer = app.live.viewer(Size::Cell, false);
 
-    let frames = stream::unfold((app, watcher), async |(app, mut watcher)| {
-        let frame = watcher.next().await?;
+    let frames = stream::unfold((app, viewer), async |(app, mut viewer)| {
+        let frame = viewer.next().await?;
         app.metrics.frames_sent.inc();
         app.metrics.bytes_sent.inc_by(frame.picture.jpeg.len() as u64);
-        Some((frame.picture.jpeg.clone(), (app, watcher)))
+        Some((frame.picture.jpeg.clone(), (app, viewer)))
     });
 
     let frames = frames.flat_map(|jpeg| stream::iter([jpeg, Bytes::from_static(NEXT_PART)]));

@@ -47,11 +47,6 @@ pub struct LiveHandle {
 
 impl LiveHandle {
     /// Joins the viewers of `size`, or of the largest size if that is smaller. A size without viewers is not made.
-    #[must_use]
-    pub fn watch(&self, size: Size) -> Watcher {
-        self.join(size, false)
-    }
-
     fn join(&self, size: Size, leads: bool) -> Watcher {
         let size = size.min(self.largest());
         self.counts.of(size).viewers.fetch_add(1, Ordering::Relaxed);
@@ -91,7 +86,7 @@ impl LiveHandle {
 
 /// One viewer among those of a size; leaves when dropped.
 #[derive(Debug)]
-pub struct Watcher {
+struct Watcher {
     size: Size,
     frames: LatestFrame,
     counts: Arc<Counts>,
@@ -100,15 +95,9 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// The size of its frames.
-    #[must_use]
-    pub const fn size(&self) -> Size {
-        self.size
-    }
-
     /// The latest frame not seen yet, waiting for one if needed; `None` once the imaging thread has
     /// ended. Dropping the future loses nothing.
-    pub async fn next(&mut self) -> Option<Arc<EncodedFrame>> {
+    async fn next(&mut self) -> Option<Arc<EncodedFrame>> {
         loop {
             self.frames.changed().await.ok()?;
             if let Some(frame) = self.frames.borrow_and_update().clone() {

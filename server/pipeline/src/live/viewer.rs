@@ -34,13 +34,13 @@ impl Viewer {
     /// The size of the frames that it gets now; `None` while it looks away.
     #[must_use]
     pub fn size(&self) -> Option<Size> {
-        self.watcher.as_ref().map(Watcher::size)
+        self.watcher.as_ref().map(|watcher| watcher.size)
     }
 
     /// The size that was last asked for; `None` while it looks away.
     #[must_use]
     pub fn asked(&self) -> Option<Size> {
-        self.coming.as_ref().or(self.watcher.as_ref()).map(Watcher::size)
+        self.coming.as_ref().or(self.watcher.as_ref()).map(|watcher| watcher.size)
     }
 
     /// Whether the first frame of a larger size has not arrived yet.
@@ -56,8 +56,8 @@ impl Viewer {
         let asked = self.asked();
         let Some(watcher) = self.watcher.as_mut().filter(|_| asked != Some(size)) else { return false };
 
-        self.coming = (size > watcher.size()).then(|| self.live.join(size, self.leads));
-        if size < watcher.size() {
+        self.coming = (size > watcher.size).then(|| self.live.join(size, self.leads));
+        if size < watcher.size {
             *watcher = self.live.join(size, self.leads);
         }
         true
