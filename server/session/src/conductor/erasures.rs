@@ -4,7 +4,7 @@ use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Answer, Comment, Erased, Erasure, Reader, StoreError, StoredCorrection};
+use parfocal_records::store::{Erased, Erasure, Reader, StoreError};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -136,10 +136,27 @@ impl Shared {
     ) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let corrections = reader.corrections(session).await?;
-        match subject {
-            Erasable::Comment => is_comment(&reader.comments(session).await?, &record)?,
-            Erasable::Answer => is_text(&reader.answers(session).await?, &record)?,
-            _ => is_note(&corrections, &record)?,
+        let (has_words, refusal) = match subject {
+            Erasable::Comment => {
+                let comments = reader.comments(session).await?;
+                let comment = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
+                let has_words = comment.map(|(_, comment)| can_be_erased(&comment.said));
+                (has_words, "only words can be erased; this comment has none")
+            }
+            Erasable::Answer => {
+                let answers = reader.answers(session).await?;
+                let answer = answers.iter().find(|(_, answer)| answer.key.to_string() == record);
+                let has_words = answer.map(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
+                (has_words, "only words can be erased; this answer is a number")
+            }
+            _ => {
+                let stored = corrections.iter().find(|stored| stored.number.to_string() == record);
+                let has_words = stored.map(|stored| stored.correction.field == Field::Note);
+                (has_words, "only a note can be erased; this correction is a value")
+            }
+        };
+        if !has_words.ok_or_else(no_such_record)? {
+            return Err(Refusal::conflict(refusal).into());
         }
 
         let notes = corrections.iter().filter(|stored| stored.correction.record == record);
@@ -182,42 +199,15 @@ fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind
     }
 }
 
-fn is_comment(comments: &[(i64, Comment)], record: &str) -> Result<(), ConductError> {
-    let found = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
-    let (_, comment) = found.ok_or_else(no_such_record)?;
-    if comment.said.has_words() || comment.said == CommentContent::Voice {
-        return Ok(());
-    }
-    Err(Refusal::conflict("only words can be erased; this comment has none").into())
-}
-
-fn is_text(answers: &[(i64, Answer)], record: &str) -> Result<(), ConductError> {
-    let found = answers.iter().find(|(_, answer)| answer.key.to_string() == record);
-    let (_, answer) = found.ok_or_else(no_such_record)?;
-    match answer.value {
-        AnswerValue::Text(_) => Ok(()),
-        AnswerValue::Point(_) | AnswerValue::Points(_) => {
-            Err(Refusal::conflict("only words can be erased; this answer is a number").into())
-        }
-    }
-}
-
-fn is_note(corrections: &[StoredCorrection], record: &str) -> Result<(), ConductError> {
-    let found = corrections.iter().find(|stored| stored.number.to_string() == record);
-    let stored = found.ok_or_else(no_such_record)?;
-    match stored.correction.field {
-        Field::Note => Ok(()),
-        Field::Participant | Field::Value => {
-            Err(Refusal::conflict("only a note can be erased; this correction is a value").into())
-        }
-    }
+/// Whether a comment's words, written or spoken, can be erased.
+fn can_be_erased(said: &CommentContent) -> bool {
+    said.has_words() || *said == CommentContent::Voice
 }
 
 /// The records of `session` whose words nobody has erased: comments, answers in words, notes.
 pub(crate) async fn words_left(reader: &Reader, session: SessionId) -> Result<Vec<(Erasable, String)>, StoreError> {
     let comments = reader.comments(session).await?.into_iter();
-    let wordless = |said: &CommentContent| !said.has_words() && *said != CommentContent::Voice;
-    let comments = comments.filter(|(_, comment)| !wordless(&comment.said));
+    let comments = comments.filter(|(_, comment)| can_be_erased(&comment.said));
     let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
     let answers = reader.answers(session).await?.into_iter();
     let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
