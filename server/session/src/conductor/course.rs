@@ -218,6 +218,11 @@ impl Course {
         self.made.session
     }
 
+    /// All its events, each with its time by the server's clocks over its restarts.
+    pub fn timed_events(&self) -> impl Iterator<Item = (Timestamp, &Event)> {
+        self.times.iter().copied().zip(&self.events)
+    }
+
     /// Number of `segment` as surgeons read it, from 1; 0 if the segment is not of this session.
     pub fn setting(&self, segment: SegmentId) -> usize {
         self.state.plan().position(segment).map_or(0, |position| position + 1)

@@ -163,18 +163,17 @@ impl Reports {
     /// The events of the session, and those of camera and lens since the session was made.
     async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
         let clocks = &self.run_clock.clocks;
-        let events = self.reader.events(course.session()).await?;
         let devices = self.reader.device_events(course.session()).await?;
 
         // In the order in which things happened, even if the wall clock was changed in between.
         let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
-        for (run, event) in events {
+        for (at, event) in course.timed_events() {
             let text = event.kind.in_words(|segment| course.setting(segment));
             let account = event.account.as_ref().map(ToString::to_string);
             let has_reason = event.kind.reason().is_some_and(|reason| !reason.is_empty());
             let erasable_event = has_reason.then_some(event.number);
             let line = LogLine { at: event.wall, by: event.by, account, text, erasable_event };
-            lines.push((clocks.wall(run, event.at), line));
+            lines.push((at, line));
         }
 
         let made = lines.first().map(|(at, _)| *at);

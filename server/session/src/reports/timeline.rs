@@ -17,7 +17,7 @@ use parfocal_records::store::{
 };
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
-use parfocal_trial::event::{Event, EventKind, Seen, per_second};
+use parfocal_trial::event::{EventKind, Seen, per_second};
 use parfocal_trial::permission;
 use parfocal_trial::protocol::Record;
 use parfocal_trial::question::AnswerValue;
@@ -216,10 +216,7 @@ impl Reports {
         let with_metric = permission::may_see_metric(by, course.state.unblinded());
         let reader = &self.reader;
         let runs = &self.run_clock.clocks;
-        let events = reader.events(session).await?;
-        let events: Vec<(Timestamp, Event)> =
-            events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
-        let start = start(&course, &events);
+        let start = start(&course);
         let point = |point: PathPoint| TimelinePoint {
             seconds: seconds(start, runs.wall(point.run, point.exposed)),
             setting: point.setting,
@@ -261,7 +258,7 @@ impl Reports {
 
         let answers = reader.answers(session).await?;
         let events: Vec<(f64, &EventKind)> =
-            events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
+            course.timed_events().map(|(at, event)| (seconds(start, at), &event.kind)).collect();
         let points: Vec<TimelinePoint> = reader.focal_path(session, points).await?.into_iter().map(point).collect();
         Ok(Timeline {
             settings: settings(&course, &events),
@@ -279,9 +276,9 @@ impl Reports {
 }
 
 /// The zero of the session's seconds: its start, or the time when it was made if it has not started.
-fn start(course: &Course, events: &[(Timestamp, Event)]) -> Timestamp {
-    let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
-    started.map_or(course.made.stamp.wall, |(at, _)| *at)
+fn start(course: &Course) -> Timestamp {
+    let started = course.timed_events().find(|(_, event)| event.kind == EventKind::Started);
+    started.map_or(course.made.stamp.wall, |(at, _)| at)
 }
 
 /// The facts about a session that are needed to play its recordings.
@@ -322,12 +319,9 @@ impl Reports {
         permission::check_reading(course.state.withdrawn())?;
         permission::check_playing(by, course.state.unblinded())?;
 
-        let clocks = Arc::clone(&self.run_clock.clocks);
-        let events = self.reader.events(session).await?;
-        let events: Vec<_> = events.into_iter().map(|(run, event)| (clocks.wall(run, event.at), event)).collect();
         Ok(Played {
-            start: start(&course, &events),
-            clocks,
+            start: start(&course),
+            clocks: Arc::clone(&self.run_clock.clocks),
             asked: course.protocol.record,
             ended: course.state.phase().has_ended(),
         })
