@@ -202,11 +202,8 @@ impl<'a> Keys<'a> {
         most: f32,
         read: &impl Fn(&str) -> Result<MosaicFrame, String>,
     ) -> Result<Option<Reference>, CalibrationError> {
-        if !self.values.get(key).is_some_and(|value| value.get_ref().is_str()) {
-            return Ok(None);
-        }
-
-        let at = self.values.get(key).map_or(0, |value| value.span().start);
+        let Some(value) = self.values.get(key).filter(|value| value.get_ref().is_str()) else { return Ok(None) };
+        let at = value.span().start;
         let name = self.text(key)?.unwrap_or_default();
         let frame = read(&name).map_err(|problem| self.error(key, at, &problem))?;
 

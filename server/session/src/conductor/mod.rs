@@ -109,6 +109,7 @@ pub struct StudySite {
     pub site: String,
 }
 
+#[derive(Default)]
 struct Live {
     course: Option<Course>,
     /// The session's last command to the control loop.
@@ -175,13 +176,7 @@ impl Conductor {
             registry,
             clock,
             run_clock,
-            live: std::sync::Mutex::new(Live {
-                course: None,
-                commanded: None,
-                aim: Aim::default(),
-                aimed_by_session: false,
-                unrecorded_because: None,
-            }),
+            live: std::sync::Mutex::default(),
             pen: Mutex::new(Pen { random, practice_random }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),
