@@ -48,16 +48,13 @@ pub struct Choice {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, ToSchema)]
 pub struct NewChoice {
     /// The session that the page was showing; none outside sessions.
-    #[serde(default)]
     pub session: Option<SessionId>,
     /// Number of the frame that was on screen.
     pub frame: u64,
     /// Where to look; none for the centre of the bright circle.
-    #[serde(default)]
     pub at: Option<Touch>,
     /// Whether a place follows the tissue from now on, instead of staying on the screen; none leaves it as it is. Only
     /// the operator decides it, and only outside sessions.
-    #[serde(default)]
     pub follows: Option<bool>,
 }
 

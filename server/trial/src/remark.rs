@@ -18,7 +18,6 @@ pub struct NewComment {
     /// Number of the frame that was on the screen.
     pub frame: Option<u64>,
     /// Run of the server that counted the frame, as given in the frame's header.
-    #[serde(default)]
     pub run: Option<i64>,
     /// What the surgeon saw.
     #[serde(flatten)]
@@ -36,10 +35,8 @@ pub struct NewComment {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, ToSchema)]
 pub struct Sight {
     /// Width of the picture on screen, pixels.
-    #[serde(default)]
     pub picture_width: Option<u32>,
     /// Pictures drawn a second.
-    #[serde(default)]
     pub pictures_per_second: Option<f64>,
 }
 
@@ -64,19 +61,14 @@ const MOST_A_SECOND: f64 = 1000.0;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct Origin {
     /// Device on which it was given.
-    #[serde(default)]
     pub device: Option<DeviceId>,
     /// Number that grows with every comment or answer on the device, in all its tabs. Gaps have no meaning.
-    #[serde(default)]
     pub sequence: Option<i64>,
     /// When it was given: milliseconds since 1970 by the browser's clock.
-    #[serde(default)]
     pub client_millis: Option<i64>,
     /// Milliseconds that it waited on the device before this attempt to send it.
-    #[serde(default)]
     pub waited_millis: Option<i64>,
     /// Clock that measured the wait.
-    #[serde(default)]
     pub waited_by: Option<WaitClock>,
 }
 
