@@ -31,6 +31,11 @@ impl Measure {
 /// Shown in place of a missing item.
 pub(super) const MISSING: &str = "–";
 
+/// An item in words, for people.
+pub(super) fn in_words(item: u8) -> String {
+    if item == 0 { MISSING.to_owned() } else { item.to_string() }
+}
+
 /// An item as a number; none if it is unanswered, which is written as 0.
 pub(super) fn given(item: u8) -> Option<f64> {
     (item > 0).then(|| f64::from(item))

@@ -13,8 +13,8 @@ mod workload;
 
 pub use measure::Measure;
 
-use super::question::{AnswerValue, QuestionKind};
-use measure::MISSING;
+use super::question::{AnswerValue, QuestionKind, Scale};
+use measure::in_words as item_in_words;
 
 /// Whether `value` is an answer to a question of `kind` in a session of `settings` settings. A questionnaire also takes
 /// partial answers.
@@ -48,6 +48,7 @@ pub fn sus_score(kind: Option<&QuestionKind>, value: &AnswerValue) -> Option<f64
 /// The answers that a question of `kind` takes in a session of `settings` settings, in words.
 #[must_use]
 pub fn expected(kind: &QuestionKind, settings: usize) -> String {
+    let gradations = |scales: &[Scale]| format!("{} gradations from 1 to {}", scales.len(), workload::GRADATIONS);
     match kind {
         QuestionKind::Text => "text".to_owned(),
         QuestionKind::Likert { points, .. } => format!("a point from 1 to {points}"),
@@ -60,18 +61,11 @@ pub fn expected(kind: &QuestionKind, settings: usize) -> String {
             format!("a place from 1 to {settings} for each of the {settings} settings, {OPEN}")
         }
         QuestionKind::Sus { .. } => format!("{} points from 1 to 5, {OPEN}", sus::ITEMS),
-        QuestionKind::NasaTlx { scales } => {
-            format!("{} gradations from 1 to {}, {OPEN}", scales.len(), workload::GRADATIONS)
+        QuestionKind::NasaTlx { scales } => format!("{}, {OPEN}", gradations(scales)),
+        QuestionKind::SurgTlx { scales, pairs } if pairs.is_empty() => format!("{}, {OPEN}", gradations(scales)),
+        QuestionKind::SurgTlx { scales, pairs } => {
+            format!("{} and {} choices of 1 or 2, {OPEN}", gradations(scales), pairs.len())
         }
-        QuestionKind::SurgTlx { scales, pairs } if pairs.is_empty() => {
-            format!("{} gradations from 1 to {}, {OPEN}", scales.len(), workload::GRADATIONS)
-        }
-        QuestionKind::SurgTlx { scales, pairs } => format!(
-            "{} gradations from 1 to {} and {} choices of 1 or 2, {OPEN}",
-            scales.len(),
-            workload::GRADATIONS,
-            pairs.len()
-        ),
     }
 }
 
@@ -111,10 +105,6 @@ pub fn in_words(kind: Option<&QuestionKind>, value: &AnswerValue) -> String {
         }
         (_, AnswerValue::Text(text)) => text.clone(),
     }
-}
-
-fn item_in_words(point: u8) -> String {
-    if point == 0 { MISSING.to_owned() } else { point.to_string() }
 }
 
 #[cfg(test)]

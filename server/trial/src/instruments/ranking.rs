@@ -2,7 +2,7 @@
 //! each setting, in the order of the settings' numbers. Settings that share a place get the mean of the ranks that they
 //! occupy together, as rank statistics require (Friedman 1937, Journal of the American Statistical Association 32:675).
 
-use super::measure::{MISSING, Measure};
+use super::measure::{self, Measure};
 
 /// Whether `order` lists each of the settings 1 to `settings` exactly once.
 pub fn is_order(order: &[u8], settings: usize) -> bool {
@@ -55,10 +55,7 @@ fn shared_ranks(places: &[u8]) -> Vec<Option<f64>> {
 
 /// Each setting with its place.
 pub fn in_words(places: &[u8]) -> String {
-    let part = |(setting, place): (usize, &u8)| {
-        let place = if *place == 0 { MISSING.to_owned() } else { place.to_string() };
-        format!("setting {setting}: {place}")
-    };
+    let part = |(setting, place): (usize, &u8)| format!("setting {setting}: {}", measure::in_words(*place));
     (1..).zip(places).map(part).collect::<Vec<_>>().join(", ")
 }
 
