@@ -23,21 +23,14 @@ pub struct FrameMessages {
     id: u32,
     /// Focal power at which it was exposed; `None` in a blinded session, or if it is unknown.
     focal_power: Option<f64>,
-    in_two: OnceLock<Bytes>,
-    in_three: OnceLock<Bytes>,
+    /// The picture's message in each version, made when somebody speaks it.
+    made: [OnceLock<Bytes>; 2],
 }
 
 impl FrameMessages {
     /// The frame whose picture is `picture`, exposed at `at`.
     pub fn new(picture: &RgbImage, spacing: f32, at: Timestamp, id: u32, focal_power: Option<f64>) -> Self {
-        Self {
-            content: message::image(picture, spacing),
-            stamp: stamp(at),
-            id,
-            focal_power,
-            in_two: OnceLock::new(),
-            in_three: OnceLock::new(),
-        }
+        Self { content: message::image(picture, spacing), stamp: stamp(at), id, focal_power, made: Default::default() }
     }
 
     /// Whether it says more than the picture.
@@ -47,15 +40,11 @@ impl FrameMessages {
 
     /// The picture's message. In version 3 its metadata has the focal power.
     pub fn picture(&self, version: Version) -> Bytes {
-        let kept = match version {
-            Version::Two => &self.in_two,
-            Version::Three => &self.in_three,
-        };
         let make = || {
             let metadata: Vec<_> = self.focal_power.iter().map(|value| (FOCAL_POWER, value.to_string())).collect();
             self.envelope("IMAGE", PICTURES).seal(version, &self.content, &metadata)
         };
-        kept.get_or_init(make).clone()
+        self.made[version as usize].get_or_init(make).clone()
     }
 
     /// The focal power's message, if it is told.
