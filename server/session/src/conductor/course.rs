@@ -191,10 +191,10 @@ impl Course {
         }
     }
 
-    /// Loads session `session` from the database, or `None`; `clock` is this run's, and knows the earlier runs.
+    /// Loads session `session` from the database; `clock` is this run's, and knows the earlier runs.
     #[boxed]
-    pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Option<Self>, ConductError> {
-        let Some(stored) = reader.session(session).await? else { return Ok(None) };
+    pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Self, ConductError> {
+        let stored = reader.session(session).await?.ok_or_else(ConductError::no_session)?;
         let protocol =
             stored.protocol().map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
 
@@ -210,7 +210,7 @@ impl Course {
             course.keep_consent(latest.consent);
         }
         reader.comments(session).await?.into_iter().for_each(|(_, comment)| course.heard(comment));
-        Ok(Some(course))
+        Ok(course)
     }
 
     /// The session's identifier.

@@ -173,8 +173,7 @@ impl Shared {
     }
 
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        let course = Course::load(self.store.reader(), &self.run_clock, session).await?;
-        course.ok_or_else(ConductError::no_session)
+        Course::load(self.store.reader(), &self.run_clock, session).await
     }
 
     /// Resumes the session that was under way when the server ended; the lens is held where it was.

@@ -163,7 +163,7 @@ impl Conductor {
         let run_clock = RunClock::of(&store).await?;
 
         let course = match store.reader().session_under_way().await? {
-            Some(session) => Course::load(store.reader(), &run_clock, session).await?,
+            Some(session) => Some(Course::load(store.reader(), &run_clock, session).await?),
             None => None,
         };
 

@@ -66,7 +66,7 @@ impl Reports {
     }
 
     async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        Course::load(&self.reader, &self.run_clock, session).await?.ok_or_else(ConductError::no_session)
+        Course::load(&self.reader, &self.run_clock, session).await
     }
 
     /// What may still arrive for the session of `course` and would not count after unblinding.
