@@ -2,7 +2,6 @@
 //! a tracker looks on, of the kind that drives the lens by a belief, while something else moves the lens. The map is
 //! made only while somebody looks at it, by a thread that takes the latest frame whenever it is done with one.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,7 +9,7 @@ use serde::Serialize;
 use tokio::sync::watch;
 
 use super::frame_thread::{FrameSlot, FrameThread};
-use crate::control::{ControlledFrame, Eye, cells};
+use crate::control::{ControlledFrame, Eye, cells, guarded};
 use parfocal_autofocus::belief::{SURE, Sides};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Policy, PolicyError, Registry};
@@ -125,8 +124,7 @@ impl Worker {
             };
 
             // One bad picture must not end the live view.
-            let map = catch_unwind(AssertUnwindSafe(|| self.survey.see(&frame)));
-            match map {
+            match guarded(|| self.survey.see(&frame)) {
                 Ok(Ok(map)) => drop(self.maps.send_replace(map.map(Arc::new))),
                 Ok(Err(error)) => {
                     // Not once a frame.

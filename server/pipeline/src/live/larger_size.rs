@@ -1,14 +1,13 @@
 //! The thread that makes the pictures of one larger size, while it has viewers. It takes the latest
 //! frame whenever it is done with one, so neither the smallest size nor the loop waits for it.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
 use super::frame_encoder::FrameEncoder;
 use super::frame_thread::{FrameSlot, FrameThread};
 use super::publisher::Publisher;
-use crate::control::ControlledFrame;
+use crate::control::{ControlledFrame, guarded};
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::{Developer, Size};
 
@@ -70,7 +69,7 @@ impl Worker {
             }
 
             // One bad picture must not end the live view.
-            if catch_unwind(AssertUnwindSafe(|| self.make(frame))).is_err() {
+            if guarded(|| self.make(frame)).is_err() {
                 tracing::error!("a larger picture could not be made; continuing with the next");
             }
         }

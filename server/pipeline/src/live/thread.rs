@@ -1,7 +1,6 @@
 //! The imaging thread: takes the loop's latest frame, makes the picture at the size of the cells, hands the
 //! frame on to the larger sizes, and looks for the content area.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -14,7 +13,7 @@ use super::frame_encoder::FrameEncoder;
 use super::larger_size::LargerSize;
 use super::publisher::Publisher;
 use super::{Counts, LiveHandle};
-use crate::control::{Command, ControlHandle, ControlledFrame, Eye};
+use crate::control::{Command, ControlHandle, ControlledFrame, Eye, guarded};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
 use parfocal_imaging::{Developer, Size, content_area};
@@ -102,7 +101,7 @@ impl Worker {
             let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
 
             // One bad picture must not end the live view.
-            if catch_unwind(AssertUnwindSafe(|| self.turn(&frame))).is_err() {
+            if guarded(|| self.turn(&frame)).is_err() {
                 tracing::error!("a picture could not be made; continuing with the next");
             }
         }
