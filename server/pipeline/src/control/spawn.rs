@@ -89,9 +89,26 @@ impl ControlLoop {
         let stop = Arc::new(AtomicBool::new(false));
 
         let tap = Tap::default();
-        let outlets = Outlets { telemetry, frames: frames.clone(), tap: tap.clone() };
-        let mut worker = Worker::new(stepper, source, clock, outlets, controls.clone());
-        let (publisher, status) = watch::channel(Arc::new(worker.status(worker.published_at)));
+        let now = clock.now();
+        let mut worker = Worker {
+            stepper,
+            source,
+            clock,
+            telemetry,
+            frames: frames.clone(),
+            tap: tap.clone(),
+            controls: controls.clone(),
+            published_at: now,
+            last_frame_at: now,
+            camera_fault: None,
+            held_since: None,
+            window: LatencyWindow::default(),
+            lock: LockWatch::default(),
+            steps: 0,
+            telemetry_dropped: 0,
+            priority: Scheduling::Ordinary,
+        };
+        let (publisher, status) = watch::channel(Arc::new(worker.status(now)));
         let handle = ControlHandle { commands: commands_in, status, frames, camera: controls, tap };
 
         let stopping = stop.clone();
@@ -118,19 +135,15 @@ impl Drop for ControlLoop {
     }
 }
 
-/// The outputs of the loop. None of them makes it wait.
-struct Outlets {
-    telemetry: mpsc::Sender<StepRecord>,
-    frames: Arc<LatestSlot<ControlledFrame>>,
-    tap: Tap,
-}
-
 /// The state of the loop's thread.
 struct Worker {
     stepper: Stepper,
     source: FrameSource,
     clock: Arc<dyn Clock>,
-    outlets: Outlets,
+    // The loop's outputs. None of them makes it wait.
+    telemetry: mpsc::Sender<StepRecord>,
+    frames: Arc<LatestSlot<ControlledFrame>>,
+    tap: Tap,
     /// Read only for the status.
     controls: Option<Controls>,
     published_at: Moment,
@@ -148,32 +161,6 @@ struct Worker {
 }
 
 impl Worker {
-    fn new(
-        stepper: Stepper,
-        source: FrameSource,
-        clock: Arc<dyn Clock>,
-        outlets: Outlets,
-        controls: Option<Controls>,
-    ) -> Self {
-        let now = clock.now();
-        Self {
-            stepper,
-            source,
-            clock,
-            outlets,
-            controls,
-            published_at: now,
-            last_frame_at: now,
-            camera_fault: None,
-            held_since: None,
-            window: LatencyWindow::default(),
-            lock: LockWatch::default(),
-            steps: 0,
-            telemetry_dropped: 0,
-            priority: Scheduling::Ordinary,
-        }
-    }
-
     fn run(
         mut self,
         mut commands: mpsc::UnboundedReceiver<Command>,
@@ -192,10 +179,10 @@ impl Worker {
             }
         }
 
-        let Self { stepper, source, outlets, .. } = self;
+        let Self { stepper, source, frames, .. } = self;
         // First, because a camera that hangs must not keep the lens under current.
         drop(stepper);
-        outlets.frames.close();
+        frames.close();
         if !source.stop(FAREWELL) {
             tracing::warn!("the camera does not respond; its thread was abandoned");
         }
@@ -220,11 +207,11 @@ impl Worker {
                 let power = controlled.record.measured.unwrap_or(controlled.record.asked);
                 self.lock.see(controlled.belief.as_deref(), power, self.last_frame_at);
 
-                if self.outlets.telemetry.try_send(controlled.record.clone()).is_err() {
+                if self.telemetry.try_send(controlled.record.clone()).is_err() {
                     self.telemetry_dropped += 1;
                 }
-                self.outlets.tap.offer(&controlled);
-                self.outlets.frames.put(controlled);
+                self.tap.offer(&controlled);
+                self.frames.put(controlled);
             }
             Err(reason) => self.camera_fault = Some(reason),
         }
