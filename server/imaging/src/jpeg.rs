@@ -71,15 +71,13 @@ impl JpegEncoder {
     /// # Errors
     /// If the picture is empty, or libjpeg-turbo refuses it (a side over 65 500 pixels).
     pub fn encode_ycc(&mut self, ycc: &YccImage) -> Result<Bytes, JpegError> {
-        let width = ycc.width();
-        let height = ycc.height();
-        let pixels = ycc.planes();
-        if pixels.is_empty() {
+        let &YccImage { width, height, ref data } = ycc;
+        if data.is_empty() {
             return Err(JpegError::BadPicture { width, height, bytes: 0 });
         }
 
         self.buffer.resize(self.compressor.buf_len(width, height)?, 0);
-        let image = YuvImage { pixels, width, align: 1, height, subsamp: Subsamp::Sub2x2 };
+        let image = YuvImage { pixels: data.as_slice(), width, align: 1, height, subsamp: Subsamp::Sub2x2 };
         let mut output = OutputBuf::borrowed(&mut self.buffer);
         self.compressor.compress_yuv(image, &mut output)?;
 

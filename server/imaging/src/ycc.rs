@@ -4,10 +4,12 @@
 /// a chroma value covers two by two pixels. Width and height are even.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct YccImage {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    /// All luma, then all chroma of blue, then all chroma of red; row after row.
-    pub(super) data: Vec<u8>,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// All luma, then all chroma of blue, then all chroma of red; row after row without gaps.
+    pub data: Vec<u8>,
 }
 
 /// Weights of red, green and blue in luma.
@@ -19,24 +21,6 @@ pub(super) const CHROMA: [f32; 2] = [0.5 / (1.0 - LUMA[2]), 0.5 / (1.0 - LUMA[0]
 const PARTS: f32 = 16_384.0;
 
 impl YccImage {
-    /// Width in pixels.
-    #[must_use]
-    pub const fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Height in pixels.
-    #[must_use]
-    pub const fn height(&self) -> usize {
-        self.height
-    }
-
-    /// Luma, then blue's and red's chroma, each row after row without gaps.
-    #[must_use]
-    pub fn planes(&self) -> &[u8] {
-        &self.data
-    }
-
     /// Makes room for `width` x `height` pixels, both even.
     pub(super) fn resize(&mut self, width: usize, height: usize) {
         self.width = width;

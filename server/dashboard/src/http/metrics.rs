@@ -116,13 +116,13 @@ fn collect(app: &App) -> Registry {
 /// Registers the histograms of times.
 fn register_times(registry: &mut Registry, app: &App) {
     let counts = app.live.counts();
-    let latency = counts.latency().clone();
+    let latency = counts.latency.clone();
     registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
 
-    let steps = counts.steps().clone();
+    let steps = counts.steps.clone();
     registry.register_with_unit("step", "Time to compute a step's focal power", Unit::Seconds, steps);
 
-    let making = counts.making().clone();
+    let making = counts.making.clone();
     registry.register_with_unit("picture", "Time to develop and encode a picture", Unit::Seconds, making);
 
     let writes = app.store.writes().times().clone();

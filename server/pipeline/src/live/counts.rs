@@ -30,9 +30,12 @@ pub type MakingTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 #[derive(Debug)]
 pub struct Counts {
     sizes: [SizeCounts; Size::ALL.len()],
-    latency: Histogram,
-    steps: Histogram,
-    making: MakingTimes,
+    /// Time from exposure to lens command, seconds, of the frames that reached the imaging thread.
+    pub latency: Histogram,
+    /// Time that a policy took for its step, seconds.
+    pub steps: Histogram,
+    /// Time to develop and encode a picture, seconds, by size.
+    pub making: MakingTimes,
 }
 
 /// Counts of one size.
@@ -99,24 +102,6 @@ impl Counts {
             self.of(size).making.observe(took.as_secs_f64());
         }
     }
-
-    /// Time that a policy took for its step, seconds.
-    #[must_use]
-    pub const fn steps(&self) -> &Histogram {
-        &self.steps
-    }
-
-    /// Time to develop and encode a picture, seconds, by size.
-    #[must_use]
-    pub const fn making(&self) -> &MakingTimes {
-        &self.making
-    }
-
-    /// Time from exposure to lens command, seconds, of the frames that reached the imaging thread.
-    #[must_use]
-    pub const fn latency(&self) -> &Histogram {
-        &self.latency
-    }
 }
 
 fn seconds(micros: u32) -> f64 {
@@ -154,9 +139,9 @@ mod tests {
 
     fn counted(counts: &Counts) -> Vec<String> {
         let mut registry = Registry::default();
-        registry.register("latency", "Latency", counts.latency().clone());
-        registry.register("step", "Step", counts.steps().clone());
-        registry.register("picture", "Picture", counts.making().clone());
+        registry.register("latency", "Latency", counts.latency.clone());
+        registry.register("step", "Step", counts.steps.clone());
+        registry.register("picture", "Picture", counts.making.clone());
 
         let mut text = String::new();
         encode(&mut text, &registry).unwrap();

@@ -46,7 +46,7 @@ impl FrameEncoder {
         let (width, height, jpeg) = match (&frame.image, &self.picture) {
             (FrameImage::Rgb(rgb), _) => (rgb.width, rgb.height, self.encoder.encode(rgb)?),
             (FrameImage::Mosaic(_), Developed::Rgb(rgb)) => (rgb.width, rgb.height, self.encoder.encode(rgb)?),
-            (FrameImage::Mosaic(_), Developed::Ycc(ycc)) => (ycc.width(), ycc.height(), self.encoder.encode_ycc(ycc)?),
+            (FrameImage::Mosaic(_), Developed::Ycc(ycc)) => (ycc.width, ycc.height, self.encoder.encode_ycc(ycc)?),
         };
         let developed = matches!(frame.image, FrameImage::Mosaic(_));
 
