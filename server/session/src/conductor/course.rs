@@ -459,7 +459,7 @@ impl Course {
     /// restarts.
     fn replay(&mut self, events: Vec<(Timestamp, Event)>) {
         self.recorded = events.len();
-        self.state = self.state.replayed(&[]);
+        self.state = self.state.before_all_events();
         self.grace = Grace::new(self.protocol.grace).locked(self.study_locked);
         self.begin_at = None;
         self.by_hand = None;

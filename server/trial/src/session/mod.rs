@@ -162,16 +162,11 @@ impl SessionState {
         }
     }
 
-    /// The state after `events`, which are all events from the first on. Keeps the present answers and the consent.
+    /// The state before the first event, but with the present answers and the consent.
     #[must_use]
-    pub fn replayed(&self, events: &[Event]) -> Self {
-        let mut state = Self::new(self.plan.clone());
-        state.answers.clone_from(&self.answers);
-        state.consented.clone_from(&self.consented);
-        for event in events {
-            state.apply(event);
-        }
-        state
+    pub fn before_all_events(&self) -> Self {
+        let state = Self::new(self.plan.clone());
+        Self { answers: self.answers.clone(), consented: self.consented.clone(), ..state }
     }
 
     /// The session's plan.
