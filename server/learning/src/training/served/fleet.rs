@@ -4,12 +4,40 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::answer::{Answer, PATCH_BYTES, Shows};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use crate::training::environment::Environment;
 use parfocal_autofocus::STEP;
-use parfocal_imaging::Patch;
+use parfocal_base::FocalPower;
+use parfocal_imaging::{PATCH_SIDE, Patch, WIDER};
+
+/// Bytes of a patch: a gray level for each of its pixels.
+const PATCH_BYTES: usize = PATCH_SIDE * PATCH_SIDE;
+
+/// What an environment shows of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shows {
+    /// The patch.
+    Patch,
+    /// The patch, and those at coarser scales around it.
+    View,
+}
+
+impl Shows {
+    /// Patches of a frame.
+    #[must_use]
+    pub const fn patches(self) -> usize {
+        match self {
+            Self::Patch => 1,
+            Self::View => 1 + WIDER.len(),
+        }
+    }
+
+    /// Bytes of a frame.
+    const fn bytes(self) -> usize {
+        self.patches() * PATCH_BYTES
+    }
+}
 
 /// How an environment begins another scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,23 +141,20 @@ impl Fleet {
         }
     }
 
-    /// Writes what is seen now, and how each environment stands, into `answer`.
-    pub fn observe(&mut self, answer: &mut Answer) {
-        let (shows, frames) = (self.shows, self.frames);
-        let parts = answer.parts(self.slots.len(), shows);
-        let pictures = parts.pictures.par_chunks_exact_mut(shows.bytes());
+    /// Writes what is seen now, and how each environment stands, into `answer`: all patches, then all focal powers, all
+    /// optima, and whether each scan has ended.
+    pub fn observe(&mut self, answer: &mut Vec<u8>) {
+        let shows = self.shows;
+        answer.resize(self.slots.len() * shows.bytes(), 0);
 
         // A frame takes a few microseconds: too little to hand to another thread by itself.
+        let pictures = answer.par_chunks_exact_mut(shows.bytes());
         self.slots.par_iter_mut().zip(pictures).with_min_len(4).for_each(|(slot, bytes)| show(slot, shows, bytes));
 
-        for (index, slot) in self.slots.iter().enumerate() {
-            let place = 4 * index;
-            let power = slot.environment.focal_power().get() as f32;
-            let optimum = slot.environment.optimum().get() as f32;
-            parts.focal_powers[place..place + 4].copy_from_slice(&power.to_le_bytes());
-            parts.optima[place..place + 4].copy_from_slice(&optimum.to_le_bytes());
-            parts.ended[index] = u8::from(slot.frame >= frames);
-        }
+        let number = |power: FocalPower| (power.get() as f32).to_le_bytes();
+        answer.extend(self.slots.iter().flat_map(|slot| number(slot.environment.focal_power())));
+        answer.extend(self.slots.iter().flat_map(|slot| number(slot.environment.optimum())));
+        answer.extend(self.slots.iter().map(|slot| u8::from(slot.frame >= self.frames)));
     }
 }
 
@@ -167,9 +192,9 @@ mod tests {
     }
 
     fn seen(fleet: &mut Fleet) -> Vec<u8> {
-        let mut answer = Answer::default();
+        let mut answer = Vec::new();
         fleet.observe(&mut answer);
-        answer.bytes().to_vec()
+        answer
     }
 
     #[test]

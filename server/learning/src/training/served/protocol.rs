@@ -16,40 +16,19 @@ use std::io::{self, Read, Write};
 
 use serde::Serialize;
 
-use super::answer::Answer;
 use super::fleet::{Action, Begin, Fleet};
 use parfocal_imaging::PATCH_SIDE;
 
-/// Name of the protocol.
-pub const PROTOCOL: &str = "parfocal-environment";
-/// Its version.
-pub const VERSION: u32 = 1;
-
 /// What the environments say first.
 #[derive(Debug, Serialize)]
-pub struct Greeting {
+struct Greeting {
     protocol: &'static str,
     version: u32,
-    software: String,
+    software: &'static str,
     environments: usize,
     /// Patches of a frame, and values along each side of a patch.
     patches: usize,
     side: usize,
-}
-
-impl Greeting {
-    /// The greeting of `fleet`.
-    #[must_use]
-    pub fn of(fleet: &Fleet) -> Self {
-        Self {
-            protocol: PROTOCOL,
-            version: VERSION,
-            software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
-            environments: fleet.count(),
-            patches: fleet.shows().patches(),
-            side: PATCH_SIDE,
-        }
-    }
 }
 
 /// Why a conversation ended before the other program closed its pipe.
@@ -82,48 +61,50 @@ pub enum ProtocolError {
 /// # Errors
 /// If a pipe fails, or something comes that is no request.
 pub fn serve(fleet: &mut Fleet, mut requests: impl Read, mut answers: impl Write) -> Result<(), ProtocolError> {
-    let greeting = serde_json::to_string(&Greeting::of(fleet)).map_err(io::Error::from)?;
-    writeln!(answers, "{greeting}")?;
+    let greeting = Greeting {
+        protocol: "parfocal-environment",
+        version: 1,
+        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")),
+        environments: fleet.count(),
+        patches: fleet.shows().patches(),
+        side: PATCH_SIDE,
+    };
+    writeln!(answers, "{}", serde_json::to_string(&greeting).map_err(io::Error::from)?)?;
     answers.flush()?;
 
-    let mut answer = Answer::default();
+    let mut answer = Vec::new();
     let mut letter = [0];
     while requests.read(&mut letter)? == 1 {
         match letter[0] {
-            b'R' => {
-                let begins = begins(&mut requests, fleet.count())?;
-                fleet.reset(&begins);
-            }
-            b'M' => {
-                let actions = moves(&mut requests, fleet.count())?;
-                fleet.step(&actions);
-            }
-            b'T' => {
-                let actions = targets(&mut requests, fleet.count())?;
-                fleet.step(&actions);
-            }
+            b'R' => fleet.reset(&begins(&mut requests, fleet.count())?),
+            b'M' => fleet.step(&moves(&mut requests, fleet.count())?),
+            b'T' => fleet.step(&targets(&mut requests, fleet.count())?),
             other => return Err(ProtocolError::Request(other)),
         }
 
         fleet.observe(&mut answer);
-        answers.write_all(answer.bytes())?;
+        answers.write_all(&answer)?;
         answers.flush()?;
     }
 
     Ok(())
 }
 
-fn begins(requests: &mut impl Read, count: usize) -> Result<Vec<Begin>, ProtocolError> {
-    let mut kinds = vec![0; count];
-    requests.read_exact(&mut kinds)?;
-    let mut seeds = vec![0; 8 * count];
-    requests.read_exact(&mut seeds)?;
+/// A value of so many bytes for each of `count` environments.
+fn values<const BYTES: usize>(requests: &mut impl Read, count: usize) -> io::Result<Vec<[u8; BYTES]>> {
+    let mut values = vec![[0; BYTES]; count];
+    requests.read_exact(values.as_flattened_mut())?;
+    Ok(values)
+}
 
-    let seeds = seeds.as_chunks::<8>().0.iter().map(|&seed| u64::from_le_bytes(seed));
-    let begin = |(environment, (kind, seed)): (usize, (u8, u64))| match kind {
+fn begins(requests: &mut impl Read, count: usize) -> Result<Vec<Begin>, ProtocolError> {
+    let kinds = values::<1>(requests, count)?;
+    let seeds = values::<8>(requests, count)?;
+
+    let begin = |(environment, ([kind], seed)): (usize, ([u8; 1], [u8; 8]))| match kind {
         0 => Ok(Begin::Not),
         1 => Ok(Begin::Next),
-        2 => Ok(Begin::Seeded(seed)),
+        2 => Ok(Begin::Seeded(u64::from_le_bytes(seed))),
         _ => Err(ProtocolError::Value {
             value: kind.to_string(),
             what: "the beginning",
@@ -135,25 +116,19 @@ fn begins(requests: &mut impl Read, count: usize) -> Result<Vec<Begin>, Protocol
 }
 
 fn moves(requests: &mut impl Read, count: usize) -> Result<Vec<Action>, ProtocolError> {
-    let mut bytes = vec![0; count];
-    requests.read_exact(&mut bytes)?;
-
-    let action = |(environment, byte): (usize, u8)| {
-        let steps = byte.cast_signed();
+    let action = |(environment, byte): (usize, [u8; 1])| {
+        let steps = i8::from_le_bytes(byte);
         if (-1..=1).contains(&steps) {
             return Ok(Action::Steps(steps));
         }
         let value = steps.to_string();
         Err(ProtocolError::Value { value, what: "the steps", environment, expected: "-1, 0 or 1" })
     };
-    bytes.into_iter().enumerate().map(action).collect()
+    values(requests, count)?.into_iter().enumerate().map(action).collect()
 }
 
 fn targets(requests: &mut impl Read, count: usize) -> Result<Vec<Action>, ProtocolError> {
-    let mut bytes = vec![0; 8 * count];
-    requests.read_exact(&mut bytes)?;
-
-    let action = |(environment, &bytes): (usize, &[u8; 8])| {
+    let action = |(environment, bytes): (usize, [u8; 8])| {
         let target = f64::from_le_bytes(bytes);
         if (0.0..=1.0).contains(&target) {
             return Ok(Action::Target(target));
@@ -161,5 +136,5 @@ fn targets(requests: &mut impl Read, count: usize) -> Result<Vec<Action>, Protoc
         let value = target.to_string();
         Err(ProtocolError::Value { value, what: "the focal power", environment, expected: "from 0 to 1" })
     };
-    bytes.as_chunks::<8>().0.iter().enumerate().map(action).collect()
+    values(requests, count)?.into_iter().enumerate().map(action).collect()
 }
