@@ -1,8 +1,6 @@
 //! The paper's learned policies: a network gives action values for the latest eight frames, and the best action is
 //! taken.
 
-use std::collections::VecDeque;
-
 use tch::{Device, Tensor, nn};
 
 use super::networks::{ACTIONS, ENCODING, Encoder, HISTORY, ValueHead};
@@ -99,12 +97,35 @@ impl ValueNetwork {
     }
 }
 
-/// A learned policy with its memory of eight frames. Before it has seen eight, the first frame fills the places of
-/// those missing.
+/// The latest eight frames of a scan, oldest first. Before there are eight, the first fills the places of those missing.
+#[derive(Debug, Default)]
+pub struct History {
+    /// All frames' values, as many of each frame.
+    pub frames: Vec<f32>,
+    /// The focal power of each frame.
+    pub focal_powers: Vec<f32>,
+}
+
+impl History {
+    /// Remembers the values of another frame and its focal power, in place of the oldest.
+    pub fn push(&mut self, frame: &[f32], focal_power: f32) {
+        if self.focal_powers.is_empty() {
+            self.frames = frame.repeat(HISTORY);
+            self.focal_powers = vec![focal_power; HISTORY];
+            return;
+        }
+
+        self.frames.drain(..frame.len());
+        self.frames.extend_from_slice(frame);
+        self.focal_powers.remove(0);
+        self.focal_powers.push(focal_power);
+    }
+}
+
+/// A learned policy with its memory of eight frames.
 pub struct Learned {
     network: ValueNetwork,
-    encodings: VecDeque<Vec<f32>>,
-    focal_powers: VecDeque<f32>,
+    history: History,
     // Keeps alive the variables that the network's layers use.
     _store: nn::VarStore,
 }
@@ -118,7 +139,7 @@ impl Learned {
         let store = nn::VarStore::new(Device::Cpu);
         let network = ValueNetwork::new(&store.root(), input);
         weights::load(&store, bytes)?;
-        Ok(Self { network, encodings: VecDeque::new(), focal_powers: VecDeque::new(), _store: store })
+        Ok(Self { network, history: History::default(), _store: store })
     }
 
     fn encode(&self, patch: &Patch, metric: Option<f64>) -> Vec<f32> {
@@ -131,19 +152,6 @@ impl Learned {
         encoding.view([-1]).copy_data(&mut values, ENCODING);
         values
     }
-
-    fn remember(&mut self, encoding: &[f32], focal_power: f32) {
-        let missing = if self.encodings.is_empty() { HISTORY } else { 1 };
-        for _ in 0..missing {
-            self.encodings.push_back(encoding.to_vec());
-            self.focal_powers.push_back(focal_power);
-        }
-
-        while self.encodings.len() > HISTORY {
-            self.encodings.pop_front();
-            self.focal_powers.pop_front();
-        }
-    }
 }
 
 impl Policy for Learned {
@@ -155,14 +163,12 @@ impl Policy for Learned {
         tch::no_grad(|| {
             let metric = self.network.input.metric(&seen.view.patch);
             let encoding = self.encode(&seen.view.patch, metric);
-            self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
-
-            let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
-            let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();
+            self.history.push(&encoding, scaled_focal_power(seen.focal_power.get()));
 
             let row = |values: &[f32]| Tensor::from_slice(values).view([1, -1]);
             let mut values = [0.0f32; ACTIONS];
-            self.network.values(&row(&encodings), &row(&focal_powers)).view([-1]).copy_data(&mut values, ACTIONS);
+            let found = self.network.values(&row(&self.history.frames), &row(&self.history.focal_powers));
+            found.view([-1]).copy_data(&mut values, ACTIONS);
 
             let step = action_step(best_action(&values));
             Decision { target: seen.focal_power.moved(step).get(), metric, belief: None }
@@ -170,8 +176,7 @@ impl Policy for Learned {
     }
 
     fn forget(&mut self) {
-        self.encodings.clear();
-        self.focal_powers.clear();
+        self.history = History::default();
     }
 }
 

@@ -5,14 +5,13 @@
 //! actions, `[3]`: a step down, none, a step up. Before there are eight frames, the first fills the places of those
 //! missing. Each instance has its own module, in evaluation mode.
 
-use std::collections::VecDeque;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use tch::{CModule, Kind, Tensor};
 
-use super::learned::{action_step, best_action};
+use super::learned::{History, action_step, best_action};
 use super::networks::{ACTIONS, HISTORY};
 use super::{Decision, FieldOfView, Observation, Policy, Registry};
 use parfocal_base::PolicyName;
@@ -32,8 +31,7 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     match load(Path::new(path)) {
         Ok(bytes) => {
             let source = Arc::clone(&bytes);
-            let make = move || parse(&source).map(|module| Box::new(Scripted::new(module)) as Box<dyn Policy>);
-            registry.made_of_weights(name.as_str(), SUMMARY, make).weighing(name.as_str(), &bytes)
+            registry.made_of_weights(name.as_str(), SUMMARY, move || build(&source)).weighing(name.as_str(), &bytes)
         }
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }
@@ -84,30 +82,15 @@ fn first_line(message: &str) -> String {
     message.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("it gave no reason").to_owned()
 }
 
+/// A policy by the module in `bytes`.
+fn build(bytes: &[u8]) -> Result<Box<dyn Policy>, String> {
+    Ok(Box::new(Scripted { module: parse(bytes)?, history: History::default() }))
+}
+
 /// A module with its memory of eight frames.
 struct Scripted {
     module: CModule,
-    patches: VecDeque<f32>,
-    focal_powers: VecDeque<f32>,
-}
-
-impl Scripted {
-    const fn new(module: CModule) -> Self {
-        Self { module, patches: VecDeque::new(), focal_powers: VecDeque::new() }
-    }
-
-    fn remember(&mut self, seen: &Observation<'_>) {
-        let missing = if self.focal_powers.is_empty() { HISTORY } else { 1 };
-        for _ in 0..missing {
-            self.patches.extend(&seen.view.patch.0);
-            self.focal_powers.push_back(seen.focal_power.get() as f32);
-        }
-
-        if self.focal_powers.len() > HISTORY {
-            self.patches.drain(..PATCH_SIDE * PATCH_SIDE);
-            self.focal_powers.pop_front();
-        }
-    }
+    history: History,
 }
 
 impl Policy for Scripted {
@@ -116,8 +99,8 @@ impl Policy for Scripted {
     }
 
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
-        self.remember(seen);
-        match values(&self.module, self.patches.make_contiguous(), self.focal_powers.make_contiguous()) {
+        self.history.push(&seen.view.patch.0, seen.focal_power.get() as f32);
+        match values(&self.module, &self.history.frames, &self.history.focal_powers) {
             Ok(values) => {
                 let target = seen.focal_power.moved(action_step(best_action(&values))).get();
                 Decision { target, metric: None, belief: None }
@@ -129,8 +112,7 @@ impl Policy for Scripted {
     }
 
     fn forget(&mut self) {
-        self.patches.clear();
-        self.focal_powers.clear();
+        self.history = History::default();
     }
 }
 

@@ -22,8 +22,8 @@ use super::trainer::{Trainer, drawn_with};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
-use parfocal_autofocus::learned::{Input, action_step, best_action, scaled_focal_power};
-use parfocal_autofocus::networks::{ACTIONS, HISTORY};
+use parfocal_autofocus::learned::{History, Input, action_step, best_action, scaled_focal_power};
+use parfocal_autofocus::networks::ACTIONS;
 use parfocal_autofocus::weights::{self, WeightsError, floats};
 use replay::{CompactView, Frames, Replay, Transition};
 use values::Values;
@@ -43,14 +43,13 @@ pub struct DqnTrainer {
     frames: u64,
 }
 
-/// An environment, and the encodings and scaled focal powers of its latest eight frames, oldest first.
 struct Actor {
     environment: Environment,
     /// Frames since the scan's start.
     age: u16,
     frames_left: u16,
-    history: Vec<f32>,
-    focal_powers: Vec<f32>,
+    /// The encodings and scaled focal powers.
+    history: History,
 }
 
 impl DqnTrainer {
@@ -110,16 +109,17 @@ impl DqnTrainer {
         let encodings = self.online.encode(&frames);
         let count = self.actors.len() as i64;
         for (actor, encoding) in self.actors.iter_mut().zip(floats(&encodings).chunks_exact(input.width())) {
-            actor.remember(encoding);
+            actor.history.push(encoding, scaled_focal_power(actor.environment.focal_power().get()));
         }
 
         let device = self.device();
-        let gather = |part: fn(&Actor) -> &Vec<f32>| {
-            let all: Vec<f32> = self.actors.iter().flat_map(|actor| part(actor).iter().copied()).collect();
+        let gather = |part: fn(&History) -> &Vec<f32>| {
+            let all: Vec<f32> = self.actors.iter().flat_map(|actor| part(&actor.history)).copied().collect();
             Tensor::from_slice(&all).view([count, -1]).to_device(device)
         };
 
-        let values = self.online.network.values(&gather(|actor| &actor.history), &gather(|actor| &actor.focal_powers));
+        let values =
+            self.online.network.values(&gather(|history| &history.frames), &gather(|history| &history.focal_powers));
 
         let epsilon = self.recipe.epsilon(self.frames);
         for (index, values) in floats(&values).chunks_exact(ACTIONS).enumerate() {
@@ -267,25 +267,6 @@ impl Trainer for DqnTrainer {
 impl Actor {
     fn draw(recipe: &DqnRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
         let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
-        Self {
-            environment,
-            age: 0,
-            frames_left: recipe.frames_a_scan.max(1),
-            history: Vec::new(),
-            focal_powers: Vec::new(),
-        }
-    }
-
-    fn remember(&mut self, encoding: &[f32]) {
-        let focal_power = scaled_focal_power(self.environment.focal_power().get());
-        if self.focal_powers.is_empty() {
-            self.history = encoding.repeat(HISTORY);
-            self.focal_powers = vec![focal_power; HISTORY];
-        } else {
-            self.history.drain(..encoding.len());
-            self.history.extend_from_slice(encoding);
-            self.focal_powers.remove(0);
-            self.focal_powers.push(focal_power);
-        }
+        Self { environment, age: 0, frames_left: recipe.frames_a_scan.max(1), history: History::default() }
     }
 }
