@@ -63,19 +63,14 @@ pub struct Registry {
     blur: Option<BlurRate>,
 }
 
+/// A policy, and what builds it if it is available.
 #[derive(Clone)]
 struct Registered {
-    name: PolicyName,
-    summary: &'static str,
-    weights: Option<String>,
-    source: Source,
+    entry: PolicyEntry,
+    build: Option<Build>,
 }
 
-#[derive(Clone)]
-enum Source {
-    Constructor(Arc<dyn Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync>),
-    Missing(Arc<str>),
-}
+type Build = Arc<dyn Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync>;
 
 impl Registry {
     /// Adds policy `name`, made by `build`. Replaces a policy of that name, or appends it at the end.
@@ -112,18 +107,26 @@ impl Registry {
         summary: &'static str,
         build: impl Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync + 'static,
     ) -> Self {
-        self.put(name, summary, Source::Constructor(Arc::new(build)))
+        self.put(name, summary, Ok(Arc::new(build)))
     }
 
     /// Lists policy `name` as unavailable. `reason` says why and what to do.
     #[must_use]
     pub fn without(self, name: &str, summary: &'static str, reason: &str) -> Self {
-        self.put(name, summary, Source::Missing(reason.into()))
+        self.put(name, summary, Err(reason.to_owned()))
     }
 
-    fn put(mut self, name: &str, summary: &'static str, source: Source) -> Self {
-        let new = Registered { name: PolicyName::new(name), summary, weights: None, source };
-        match self.policies.iter_mut().find(|old| old.name == new.name) {
+    /// Adds policy `name`, with what builds it or why it cannot run.
+    fn put(mut self, name: &str, summary: &'static str, source: Result<Build, String>) -> Self {
+        let name = PolicyName::new(name);
+        let (build, reason) = match source {
+            Ok(build) => (Some(build), None),
+            Err(reason) => (None, Some(reason)),
+        };
+        let entry = PolicyEntry { name, summary, weights: None, available: build.is_some(), reason };
+        let new = Registered { entry, build };
+
+        match self.policies.iter_mut().find(|old| old.entry.name == new.entry.name) {
             Some(old) => *old = new,
             None => self.policies.push(new),
         }
@@ -139,8 +142,8 @@ impl Registry {
     /// Records `hash`, a SHA-256 in hexadecimal, as what identifies policy `name`.
     #[must_use]
     pub fn identified(mut self, name: &str, hash: Option<String>) -> Self {
-        if let Some(policy) = self.policies.iter_mut().find(|policy| policy.name.as_str() == name) {
-            policy.weights = hash;
+        if let Some(policy) = self.policies.iter_mut().find(|policy| policy.entry.name.as_str() == name) {
+            policy.entry.weights = hash;
         }
         self
     }
@@ -148,7 +151,7 @@ impl Registry {
     /// Whether there is a policy `name`, whether it can run or not.
     #[must_use]
     pub fn has(&self, name: &PolicyName) -> bool {
-        self.policies.iter().any(|policy| policy.name == *name)
+        self.policies.iter().any(|policy| policy.entry.name == *name)
     }
 
     /// Gives the blur rate of the optics, if known, to every policy that is built.
@@ -161,28 +164,14 @@ impl Registry {
     /// The SHA-256 of each learned policy's weights, and of the files of each that runs in another process.
     #[must_use]
     pub fn weights(&self) -> BTreeMap<PolicyName, String> {
-        self.policies.iter().filter_map(|policy| Some((policy.name.clone(), policy.weights.clone()?))).collect()
+        let entries = self.policies.iter().map(|policy| &policy.entry);
+        entries.filter_map(|entry| Some((entry.name.clone(), entry.weights.clone()?))).collect()
     }
 
     /// Every policy, in the order in which they were added.
     #[must_use]
     pub fn entries(&self) -> Vec<PolicyEntry> {
-        let entry = |policy: &Registered| {
-            let reason = match &policy.source {
-                Source::Constructor(_) => None,
-                Source::Missing(reason) => Some(reason.to_string()),
-            };
-
-            PolicyEntry {
-                name: policy.name.clone(),
-                summary: policy.summary,
-                weights: policy.weights.clone(),
-                available: reason.is_none(),
-                reason,
-            }
-        };
-
-        self.policies.iter().map(entry).collect()
+        self.policies.iter().map(|policy| policy.entry.clone()).collect()
     }
 
     /// Builds a new instance of policy `name`, with an empty memory.
@@ -190,24 +179,20 @@ impl Registry {
     /// # Errors
     /// If there is no such policy or it cannot run.
     pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
-        let policy = self.policies.iter().find(|policy| policy.name == *name);
+        let Some(Registered { entry, build }) = self.policies.iter().find(|policy| policy.entry.name == *name) else {
+            let known: Vec<_> = self.policies.iter().map(|policy| policy.entry.name.as_str()).collect();
+            return Err(PolicyError::Unknown { name: name.clone(), known: known.join(", ") });
+        };
+        let Some(build) = build else {
+            let reason = entry.reason.clone().unwrap_or_default();
+            return Err(PolicyError::Unavailable { name: name.clone(), reason });
+        };
 
-        match policy.map(|policy| &policy.source) {
-            Some(Source::Constructor(build)) => {
-                let mut policy = build()?;
-                if let Some(blur) = self.blur {
-                    policy.learn_of(blur);
-                }
-                Ok(policy)
-            }
-            Some(Source::Missing(reason)) => {
-                Err(PolicyError::Unavailable { name: name.clone(), reason: reason.to_string() })
-            }
-            None => {
-                let known: Vec<_> = self.policies.iter().map(|policy| policy.name.as_str()).collect();
-                Err(PolicyError::Unknown { name: name.clone(), known: known.join(", ") })
-            }
+        let mut policy = build()?;
+        if let Some(blur) = self.blur {
+            policy.learn_of(blur);
         }
+        Ok(policy)
     }
 }
 
