@@ -13,7 +13,8 @@ pub use settings::{ProcessSettings, Times};
 use std::sync::Arc;
 
 use self::command::Command;
-use self::pool::{Missing, Pool, Running, Shared};
+use self::pool::{Missing, Pool, Shared};
+use self::process::Process;
 use super::{Decision, Fault, FieldOfView, Observation, Policy, PolicyError, Registry};
 use parfocal_base::{BlurRate, PolicyName};
 
@@ -51,13 +52,13 @@ fn prepare(text: &str, settings: &ProcessSettings) -> Result<(Pool, Option<Strin
         Missing::Starting => format!("it was not ready within {} s", settings.start.as_secs()),
         Missing::Failed(reason) => reason,
     });
-    tried.map(|(running, shared)| shared.give_back(running, false))?;
+    tried.map(|(process, shared)| shared.give_back(process, false))?;
     Ok((pool, hash))
 }
 
 fn instance(pool: &Pool, name: &PolicyName) -> Result<External, PolicyError> {
     let built = pool.take_for_instance();
-    built.map(|(running, shared)| External::new(running, shared)).map_err(|missing| {
+    built.map(|(process, shared)| External::new(process, shared)).map_err(|missing| {
         let failed = match missing {
             Missing::Starting => None,
             Missing::Failed(reason) => Some(reason),
@@ -68,7 +69,7 @@ fn instance(pool: &Pool, name: &PolicyName) -> Result<External, PolicyError> {
 
 /// An instance: it borrows a process.
 struct External {
-    running: Option<Running>,
+    process: Option<Process>,
     shared: Arc<Shared>,
     wide: bool,
     blur: Option<BlurRate>,
@@ -79,9 +80,9 @@ struct External {
 }
 
 impl External {
-    fn new(running: Running, shared: Arc<Shared>) -> Self {
-        let wide = running.process.is_wide();
-        Self { running: Some(running), shared, wide, blur: None, frames: 0, anew: true, fault: None }
+    fn new(process: Process, shared: Arc<Shared>) -> Self {
+        let wide = process.is_wide();
+        Self { process: Some(process), shared, wide, blur: None, frames: 0, anew: true, fault: None }
     }
 
     fn time(&self) -> u64 {
@@ -93,7 +94,7 @@ impl External {
 
     fn ask(&mut self, seen: &Observation<'_>) -> Result<Decision, Fault> {
         let (time, blur, patience) = (self.time(), self.blur, self.shared.settings.answer);
-        let Some(Running { process, .. }) = &mut self.running else {
+        let Some(process) = &mut self.process else {
             return Err(self.fault.clone().unwrap_or(Fault::Late));
         };
 
@@ -116,8 +117,8 @@ impl Policy for External {
             Ok(decision) => decision,
             Err(fault) => {
                 self.fault = Some(fault);
-                if let Some(running) = self.running.take() {
-                    self.shared.give_back(running, true);
+                if let Some(process) = self.process.take() {
+                    self.shared.give_back(process, true);
                 }
                 Decision { target: f64::NAN, ..Decision::default() }
             }
@@ -139,8 +140,8 @@ impl Policy for External {
 
 impl Drop for External {
     fn drop(&mut self) {
-        if let Some(running) = self.running.take() {
-            self.shared.give_back(running, false);
+        if let Some(process) = self.process.take() {
+            self.shared.give_back(process, false);
         }
     }
 }

@@ -31,34 +31,21 @@ pub enum Missing {
     Failed(String),
 }
 
-/// A process, and since when it runs.
-pub struct Running {
-    /// The process.
-    pub process: Process,
-    since: Moment,
-}
-
 /// The processes. Dropping the pool ends those that nobody uses; the others end when they come back.
 pub struct Pool(Arc<Shared>);
 
 /// A borrower's way back to the pool.
-#[derive(Clone)]
 pub struct Shared {
     command: Command,
     /// How they run.
     pub settings: ProcessSettings,
-    inner: Arc<Inner>,
-}
-
-#[derive(Default)]
-struct Inner {
     state: Mutex<State>,
     changed: Condvar,
 }
 
 #[derive(Default)]
 struct State {
-    idle: VecDeque<Running>,
+    idle: VecDeque<Process>,
     /// Processes that instances use.
     used: usize,
     /// Instances that wait for a process.
@@ -72,20 +59,14 @@ struct State {
     closed: bool,
 }
 
-impl Inner {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 impl Pool {
     /// A pool without processes.
     ///
     /// # Errors
     /// If the system has no thread left.
     pub fn new(command: Command, settings: ProcessSettings) -> io::Result<Self> {
-        let shared = Arc::new(Shared { command, settings, inner: Arc::default() });
-        let keeper = Shared::clone(&shared);
+        let shared = Arc::new(Shared { command, settings, state: Mutex::default(), changed: Condvar::default() });
+        let keeper = Arc::clone(&shared);
         // The kernel ends a process with the thread that started it, so this one lasts as long as the pool.
         Builder::new().name("policy-keeper".into()).spawn(move || keeper.keep())?;
         Ok(Self(shared))
@@ -95,15 +76,15 @@ impl Pool {
     ///
     /// # Errors
     /// If there is none by then.
-    pub fn take(&self, longest: Duration, once: bool) -> Result<(Running, Arc<Shared>), Missing> {
-        self.0.take(longest, once).map(|running| (running, Arc::clone(&self.0)))
+    pub fn take(&self, longest: Duration, once: bool) -> Result<(Process, Arc<Shared>), Missing> {
+        self.0.take(longest, once).map(|process| (process, Arc::clone(&self.0)))
     }
 
     /// A process for a new instance.
     ///
     /// # Errors
     /// If there is none in the time that the settings leave.
-    pub fn take_for_instance(&self) -> Result<(Running, Arc<Shared>), Missing> {
+    pub fn take_for_instance(&self) -> Result<(Process, Arc<Shared>), Missing> {
         // Where many work, nobody drives a lens, and a failure ends the work.
         self.take(self.0.settings.build, self.0.settings.many)
     }
@@ -112,30 +93,34 @@ impl Pool {
 impl Drop for Pool {
     fn drop(&mut self) {
         let ended = {
-            let mut state = self.0.inner.lock();
+            let mut state = self.0.lock();
             state.closed = true;
             std::mem::take(&mut state.idle)
         };
-        self.0.inner.changed.notify_all();
+        self.0.changed.notify_all();
         // Outside the lock, because it takes a moment.
         drop(ended);
     }
 }
 
 impl Shared {
-    fn take(&self, longest: Duration, once: bool) -> Result<Running, Missing> {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn take(&self, longest: Duration, once: bool) -> Result<Process, Missing> {
         let clock = &self.settings.clock;
         let begun = clock.now();
-        let mut state = self.inner.lock();
+        let mut state = self.lock();
         state.waiting += 1;
 
         let outcome = loop {
-            if let Some(mut running) = state.idle.pop_front() {
-                if running.process.is_alive() {
+            if let Some(mut process) = state.idle.pop_front() {
+                if process.is_alive() {
                     state.used += 1;
-                    break Ok(running);
+                    break Ok(process);
                 }
-                state.failures = self.failures_after(&state, running.since);
+                state.failures = self.failures_after(&state, process.ready_since);
                 continue;
             }
 
@@ -149,10 +134,10 @@ impl Shared {
             let coming = !self.settings.many && state.used > 0 && waited < handover;
             if !coming && state.ordered < state.waiting {
                 state.ordered += 1;
-                self.inner.changed.notify_all();
+                self.changed.notify_all();
             }
             let rest = if coming { handover } else { longest }.saturating_sub(waited);
-            state = self.inner.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
+            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
 
             if let Some(reason) = state.refused.as_ref().filter(|_| once) {
                 break Err(Missing::Failed(reason.clone()));
@@ -163,23 +148,23 @@ impl Shared {
     }
 
     /// Gives a process back. One that failed is ended.
-    pub fn give_back(&self, running: Running, failed: bool) {
+    pub fn give_back(&self, process: Process, failed: bool) {
         let ended = {
-            let mut state = self.inner.lock();
+            let mut state = self.lock();
             state.used = state.used.saturating_sub(1);
             if failed {
-                state.failures = self.failures_after(&state, running.since);
+                state.failures = self.failures_after(&state, process.ready_since);
             }
 
             // One process is enough where one lens is driven.
             if failed || state.closed || (!self.settings.many && !state.idle.is_empty()) {
-                Some(running)
+                Some(process)
             } else {
-                state.idle.push_back(running);
+                state.idle.push_back(process);
                 None
             }
         };
-        self.inner.changed.notify_all();
+        self.changed.notify_all();
         drop(ended);
     }
 
@@ -195,10 +180,10 @@ impl Shared {
             priority::prefer();
         }
 
-        let mut state = self.inner.lock();
+        let mut state = self.lock();
         loop {
             while state.ordered == 0 && !state.closed {
-                state = self.inner.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
             if state.closed {
                 return;
@@ -206,28 +191,23 @@ impl Shared {
 
             let pause = backoff(state.failures);
             if !pause.is_zero() {
-                state = self
-                    .inner
-                    .changed
-                    .wait_timeout_while(state, pause, |state| !state.closed)
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .0;
+                let waited = self.changed.wait_timeout_while(state, pause, |state| !state.closed);
+                state = waited.unwrap_or_else(PoisonError::into_inner).0;
                 if state.closed {
                     return;
                 }
             }
 
             drop(state);
-            let started =
-                Process::start(&self.command, &self.settings).and_then(|process| process.tried(&self.settings));
-            state = self.inner.lock();
+            let started = Process::start(&self.command, &self.settings);
+            state = self.lock();
             state.ordered = state.ordered.saturating_sub(1);
             match started {
                 Ok(process) => {
                     state.refused = None;
                     // An earlier process may have come back meanwhile.
                     if !state.closed && (self.settings.many || state.idle.is_empty()) {
-                        state.idle.push_back(Running { process, since: self.settings.clock.now() });
+                        state.idle.push_back(process);
                     }
                 }
                 Err(reason) => {
@@ -235,7 +215,7 @@ impl Shared {
                     state.refused = Some(reason);
                 }
             }
-            self.inner.changed.notify_all();
+            self.changed.notify_all();
         }
     }
 }

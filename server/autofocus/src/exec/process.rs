@@ -23,6 +23,7 @@ use super::command::Command;
 use super::framing::{ANSWER_BYTES, Answer, BELIEF_AT, Kind, MEMORY_BYTES, Question, Saying};
 use super::settings::ProcessSettings;
 use crate::{Decision, Fault, Observation};
+use parfocal_base::clock::Moment;
 use parfocal_base::{BlurRate, FocalPower, priority};
 use parfocal_imaging::{PATCH_SIDE, Patch, View, WIDER};
 
@@ -43,13 +44,15 @@ pub struct Process {
     /// Pictures of a frame that it looks at.
     pictures: usize,
     sequence: u64,
+    /// When it became ready.
+    pub ready_since: Moment,
 }
 
 impl Process {
-    /// Starts `command` and waits until it is ready.
+    /// Starts `command`, waits until it is ready, and asks it about two test pictures.
     ///
     /// # Errors
-    /// If it cannot be started, ends, sends something else, or is not ready in time.
+    /// If it cannot be started, ends, sends something else, is not ready in time, or does not answer with focal powers.
     pub fn start(command: &Command, settings: &ProcessSettings) -> Result<Self, String> {
         let (socket, theirs) = Socket::pair(Domain::UNIX, Type::SEQPACKET, None).map_err(no_means)?;
         let memory = memory().map_err(no_means)?;
@@ -65,7 +68,8 @@ impl Process {
         drop(launch);
 
         let output = Output::listen(child.stdout.take(), settings.say).map_err(no_means)?;
-        let mut process = Self { child, socket, memory, output, pictures: 1, sequence: 0 };
+        let ready_since = settings.clock.now();
+        let mut process = Self { child, socket, memory, output, pictures: 1, sequence: 0, ready_since };
 
         match process.receive(settings.start) {
             Ok(Answer { saying: Saying::Ready(pictures), .. }) => process.pictures = pictures as usize,
@@ -76,34 +80,31 @@ impl Process {
             }
             Err(fault) => return Err(process.with_last_line(fault.to_string())),
         }
+        if let Err(fault) = process.answer_tests(settings) {
+            return Err(process.with_last_line(format!("it failed at a test picture: {fault}")));
+        }
+
+        process.ready_since = settings.clock.now();
         Ok(process)
     }
 
     /// Asks it about two test pictures. The first may take as long as its start, because some models load at their
     /// first use.
-    ///
-    /// # Errors
-    /// If it does not answer with focal powers.
-    pub fn tried(mut self, settings: &ProcessSettings) -> Result<Self, String> {
+    fn answer_tests(&mut self, settings: &ProcessSettings) -> Result<(), Fault> {
         let textured = |index: usize| f32::from((index * 7919 + index * index * 31) as u8);
         let tests: [(&dyn Fn(usize) -> f32, Duration); 2] =
             [(&|_| 128.0, settings.start), (&textured, settings.answer)];
 
-        let mut outcome = self.reset(0, None);
+        self.reset(0, None)?;
         for (levels, patience) in tests {
             let patch = Patch(std::array::from_fn(levels));
             let view = View { wider: [Some(patch); WIDER.len()], ..View::from(patch) };
             let seen = Observation { view: &view, focal_power: FocalPower::MIDDLE };
-            outcome = outcome.and_then(|()| {
-                let target = self.ask(&seen, 0, None, patience)?.target;
-                FocalPower::new(target).map(drop).map_err(|_| Fault::Nonsense(format!("{target} as a focal power")))
-            });
-        }
 
-        match outcome {
-            Ok(()) => Ok(self),
-            Err(fault) => Err(self.with_last_line(format!("it failed at a test picture: {fault}"))),
+            let target = self.ask(&seen, 0, None, patience)?.target;
+            FocalPower::new(target).map_err(|_| Fault::Nonsense(format!("{target} as a focal power")))?;
         }
+        Ok(())
     }
 
     /// Whether it looks at the wider patches, too.
