@@ -103,21 +103,20 @@ impl Answer {
     /// # Errors
     /// If it is not one. The error continues the words "it sent".
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let message = Fields(bytes);
         if bytes.len() != ANSWER_BYTES {
             return Err(format!("{} bytes where an answer has {ANSWER_BYTES}", bytes.len()));
         }
-        if message.at::<4>(0) != MAGIC {
+        if field(bytes, 0) != MAGIC {
             return Err("bytes that do not begin with PFPO".to_owned());
         }
-        let version = u16::from_le_bytes(message.at(4));
+        let version = u16::from_le_bytes(field(bytes, 4));
         if version != VERSION {
             return Err(format!("an answer of version {version}, not {VERSION}"));
         }
 
-        let value = f64::from_le_bytes(message.at(16));
-        let count = u32::from_le_bytes(message.at(32));
-        let saying = match u16::from_le_bytes(message.at(6)) {
+        let value = f64::from_le_bytes(field(bytes, 16));
+        let count = u32::from_le_bytes(field(bytes, 32));
+        let saying = match u16::from_le_bytes(field(bytes, 6)) {
             1 if count == PATCHES || count == VIEW => Saying::Ready(count),
             1 => return Err(format!("that it looks at {count} pictures, which must be {PATCHES} or {VIEW}")),
             2 => Saying::Target(value),
@@ -131,9 +130,9 @@ impl Answer {
         }
 
         Ok(Self {
-            sequence: u64::from_le_bytes(message.at(8)),
+            sequence: u64::from_le_bytes(field(bytes, 8)),
             saying,
-            metric: f64::from_le_bytes(message.at(24)),
+            metric: f64::from_le_bytes(field(bytes, 24)),
             belief,
         })
     }
@@ -151,14 +150,9 @@ impl Saying {
     }
 }
 
-/// Fields of a message.
-struct Fields<'a>(&'a [u8]);
-
-impl Fields<'_> {
-    /// The bytes at `place`; zeros past the end, which the check of the length excludes.
-    fn at<const N: usize>(&self, place: usize) -> [u8; N] {
-        self.0.get(place..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; N])
-    }
+/// The bytes of a message at `place`; zeros past the end, which the check of the length excludes.
+fn field<const N: usize>(bytes: &[u8], place: usize) -> [u8; N] {
+    bytes.get(place..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; N])
 }
 
 #[cfg(test)]
