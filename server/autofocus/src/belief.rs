@@ -266,15 +266,6 @@ pub fn best(belief: &[f32]) -> f64 {
 /// A belief that gives at least this probability to a place is sure of it.
 pub const SURE: f64 = 0.85;
 
-/// The probability, by `belief`, that the optimum is within [`IN_FOCUS`] of the focal power `place`. Value `i` of `n`
-/// stands for the focal power `i / (n - 1)`.
-#[must_use]
-pub fn probability_near(belief: &[f32], place: f64) -> f64 {
-    let last = belief.len().saturating_sub(1).max(1) as f64;
-    let is_near = |bin: usize| (bin as f64 / last - place).abs() < IN_FOCUS;
-    belief.iter().enumerate().filter(|(bin, _)| is_near(*bin)).map(|(_, share)| f64::from(*share)).sum()
-}
-
 /// How much of a belief lies below the depth of focus around a place, within it, and above it.
 #[derive(Debug, Clone, Copy)]
 pub struct Sides {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::scans::FocalTimeScan;
-use parfocal_autofocus::belief::{SURE, best, probability_near};
+use parfocal_autofocus::belief::{SURE, Sides, best};
 use parfocal_autofocus::networks::BINS;
 use parfocal_autofocus::{Fault, Observation, Policy, STEP, mgm};
 use parfocal_base::FocalPower;
@@ -44,7 +44,7 @@ impl Claim {
         }
 
         let place = best(belief);
-        Some(Self { place, probability: probability_near(belief, place) })
+        Some(Self { place, probability: Sides::of(belief, place).here })
     }
 }
 

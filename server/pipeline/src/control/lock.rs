@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use parfocal_autofocus::belief::{SURE, probability_near};
+use parfocal_autofocus::belief::{SURE, Sides};
 use parfocal_base::clock::Moment;
 use parfocal_base::{FocalPower, IN_FOCUS};
 
@@ -70,7 +70,7 @@ impl LockWatch {
         let Some(belief) = belief.filter(|belief| belief.len() > 1) else { return FocusLock::Nothing };
         let needed = if self.told == FocusLock::Held { LET_GO } else { SURE };
 
-        if probability_near(belief, focal_power) >= needed {
+        if Sides::of(belief, focal_power).here >= needed {
             FocusLock::Held
         } else if likeliest_range(belief) >= KNOWS {
             FocusLock::Searching
