@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::scans::FocalTimeScan;
 use parfocal_autofocus::belief::{SURE, Sides, best};
 use parfocal_autofocus::networks::BINS;
-use parfocal_autofocus::{Fault, Observation, Policy, STEP, mgm};
+use parfocal_autofocus::{Observation, Policy, STEP, mgm};
 use parfocal_base::FocalPower;
 use parfocal_base::IN_FOCUS;
 
@@ -142,26 +142,10 @@ impl Path {
     }
 }
 
-/// A policy's answer that is not a focal power.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NoTarget {
-    /// A number outside 0 to 1, or NaN.
-    #[error("at frame {frame} it returned {target}, which is not a focal power")]
-    Number {
-        /// The frame, from 1.
-        frame: usize,
-        /// The answer.
-        target: f64,
-    },
-    /// The policy knows why it gave none.
-    #[error("at frame {frame}, {fault}")]
-    Fault {
-        /// The frame, from 1.
-        frame: usize,
-        /// Why.
-        fault: Fault,
-    },
-}
+/// A policy's answer that is not a focal power: at which frame, and what it was.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NoTarget(String);
 
 /// The mean gradient magnitude of the patch at the optimum, for each of `frames` frames of `scan`.
 #[must_use]
@@ -199,8 +183,10 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest:
         course.claims.extend(decision.belief.as_deref().and_then(Claim::of));
         let target = decision.target;
         focal_power = FocalPower::new(target).map_err(|_| {
-            let fault = policy.fault();
-            fault.map_or(NoTarget::Number { frame, target }, |fault| NoTarget::Fault { frame, fault })
+            NoTarget(match policy.fault() {
+                Some(fault) => format!("at frame {frame}, {fault}"),
+                None => format!("at frame {frame} it returned {target}, which is not a focal power"),
+            })
         })?;
         scan.advance();
     }
