@@ -64,7 +64,7 @@ pub struct Stack {
     /// The focal power at which the patch is sharpest.
     pub optimum: FocalPower,
     /// One patch for each focal power, in rising order.
-    pub patches: Vec<Box<[u8; PIXELS]>>,
+    patches: Vec<[u8; PIXELS]>,
     /// The wider patches for each focal power; empty if only patches are known.
     wider: Vec<[Option<Coarse>; WIDER.len()]>,
     /// The surroundings for each focal power; empty if they are not kept.
@@ -84,13 +84,9 @@ impl Around {
         Self { levels, patch: surroundings.patch }
     }
 
-    fn surroundings(&self) -> Surroundings {
-        Surroundings { levels: self.levels.iter().copied().map(f32::from).collect(), patch: self.patch }
-    }
-
-    fn mixed(&self, high: &Self, part: f64) -> Surroundings {
+    fn mixed(&self, high: &Self, part: f32) -> Surroundings {
         let pairs = self.levels.iter().zip(&high.levels);
-        let levels = pairs.map(|(low, high)| mixed_level(*low, *high, part as f32)).collect();
+        let levels = pairs.map(|(low, high)| mixed_level(*low, *high, part)).collect();
         Surroundings { levels, patch: self.patch }
     }
 }
@@ -108,8 +104,7 @@ impl Coarse {
         Patch(self.0.map(|value| f32::from(value) / 256.0))
     }
 
-    fn mixed(&self, high: &Self, part: f64) -> Patch {
-        let part = part as f32;
+    fn mixed(&self, high: &Self, part: f32) -> Patch {
         let low = self.patch();
         let high = high.patch();
         Patch(std::array::from_fn(|i| low.0[i] + part * (high.0[i] - low.0[i])))
@@ -117,25 +112,23 @@ impl Coarse {
 }
 
 impl Stack {
-    /// A stack whose optimum is found by global search: the focal power whose patch has the greatest mean gradient
-    /// magnitude (Budd et al., MICCAI 2023).
-    #[must_use]
-    pub fn new(powers: &[FocalPower], patches: Vec<Box<[u8; PIXELS]>>) -> Self {
-        let metrics = powers.iter().zip(&patches).map(|(&power, patch)| (power, mgm(&as_patch(patch))));
-        let best = metrics.max_by(|a, b| a.1.total_cmp(&b.1));
-        let optimum = best.map_or(FocalPower::MIDDLE, |(power, _)| power);
-        Self { optimum, patches, wider: Vec::new(), surroundings: Vec::new() }
-    }
-
-    /// This stack with what `views`, one for each focal power, show beyond the patch.
-    fn with_rest_of(mut self, views: &[View], kept: Kept) -> Self {
+    /// A stack of what is `kept` of `views`, one for each focal power in rising order.
+    pub(super) fn of(views: &[View], optimum: FocalPower, kept: Kept) -> Self {
+        let patches = views.iter().map(|view| view.patch.0.map(|value| value.round() as u8)).collect();
         let coarse = |view: &View| view.wider.each_ref().map(|patch| patch.as_ref().map(Coarse::of));
-        self.wider = views.iter().map(coarse).collect();
-        if kept == Kept::Surroundings {
-            self.surroundings = views.iter().map(|view| view.surroundings.as_ref().map(Around::of)).collect();
-        }
-        self
+        let around = |view: &View| view.surroundings.as_ref().map(Around::of);
+        let surroundings = if kept == Kept::Surroundings { views.iter().map(around).collect() } else { Vec::new() };
+        Self { optimum, patches, wider: views.iter().map(coarse).collect(), surroundings }
     }
+}
+
+/// The optimum by global search: the focal power whose patch has the greatest mean gradient magnitude (Budd et al.,
+/// MICCAI 2023). `patches` holds one for each of `powers`.
+#[must_use]
+pub fn sharpest(powers: &[FocalPower], patches: impl Iterator<Item = Patch>) -> FocalPower {
+    let metrics = powers.iter().zip(patches).map(|(&power, patch)| (power, mgm(&patch)));
+    let best = metrics.max_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(FocalPower::MIDDLE, |(power, _)| power)
 }
 
 /// `count` focal powers evenly spread over the lens's range, at least 2.
@@ -178,10 +171,8 @@ impl RecordedScan {
             let area = pose.patch_area();
             let view = |image| folder.picture(&pose, image).map(|picture| gray_view(&picture, area));
             let views = images.iter().map(view).collect::<Result<Vec<_>, _>>()?;
-            let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
             progress();
-            let stack = Stack { optimum: pose.optimum, patches, wider: Vec::new(), surroundings: Vec::new() };
-            Ok(stack.with_rest_of(&views, kept))
+            Ok(Stack::of(&views, pose.optimum, kept))
         };
 
         let poses = poses.into_par_iter().map(read).collect::<Result<_, ScanError>>()?;
@@ -253,24 +244,20 @@ impl RecordedScan {
         let part = (low.distance(focal_power) / low.distance(high)).min(1.0);
         let nearest = if part < 0.5 { above - 1 } else { above };
 
-        let patch = match between {
-            Interpolation::Nearest => as_patch(&pose.patches[nearest]),
-            Interpolation::Interpolated => mixed(&pose.patches[above - 1], &pose.patches[above], part),
+        // The nearest picture alone is a mix of it with itself.
+        let (low, high, part) = match between {
+            Interpolation::Nearest => (nearest, nearest, 0.0),
+            Interpolation::Interpolated => (above - 1, above, part as f32),
         };
+
+        let pair = (&pose.patches[low], &pose.patches[high]);
+        let patch = Patch(std::array::from_fn(|i| mixed_level(pair.0[i], pair.1[i], part)));
 
         let coarse = |position: usize, index: usize| pose.wider.get(position)?[index].as_ref();
-        let wider = |index: usize| match between {
-            Interpolation::Nearest => Some(coarse(nearest, index)?.patch()),
-            Interpolation::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
-        };
+        let wider = |index: usize| Some(coarse(low, index)?.mixed(coarse(high, index)?, part));
 
         let around = |position: usize| pose.surroundings.get(position)?.as_ref();
-        let surroundings = match between {
-            Interpolation::Nearest => around(nearest).map(Around::surroundings),
-            Interpolation::Interpolated => {
-                around(above - 1).zip(around(above)).map(|(low, high)| low.mixed(high, part))
-            }
-        };
+        let surroundings = around(low).zip(around(high)).map(|(low, high)| low.mixed(high, part));
 
         View { patch, wider: std::array::from_fn(wider), surroundings }
     }
@@ -301,8 +288,7 @@ fn frozen(
         *samples = mosaic.into_samples();
     }
 
-    let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
-    Stack::new(powers, patches).with_rest_of(&views, kept)
+    Stack::of(&views, sharpest(powers, views.iter().map(|view| view.patch)), kept)
 }
 
 /// Writes `levels` into `square`, which must lie within `picture`.
@@ -313,39 +299,23 @@ pub(super) fn put_square(picture: &mut GrayImage, square: Square, levels: &[f32]
     }
 }
 
-/// The patch of a gray picture at `area`, rounded; black where `area` leaves the picture.
+/// The patch of a gray picture at `area`, in whole gray levels; black where `area` leaves the picture.
 #[must_use]
-pub fn levels_at(picture: &GrayImage, area: PatchArea) -> [u8; PIXELS] {
-    std::array::from_fn(|i| {
+pub fn patch_at(picture: &GrayImage, area: PatchArea) -> Patch {
+    Patch(std::array::from_fn(|i| {
         let x = area.x + i % PATCH_SIDE;
         let y = area.y + i / PATCH_SIDE;
         let value = if x < picture.width { picture.data.get(y * picture.width + x) } else { None };
-        value.map_or(0, |value| value.round() as u8)
-    })
+        value.map_or(0.0, |value| f32::from(value.round() as u8))
+    }))
 }
 
 /// What policies see of a gray picture with the patch at `area`: its patch has whole gray levels.
 fn gray_view(picture: &GrayImage, area: PatchArea) -> View {
-    let patch = as_patch(&levels_at(picture, area));
-    View::around(patch, (area.x, area.y), (picture.width, picture.height), |Square { x, y, side }| {
+    View::around(patch_at(picture, area), (area.x, area.y), (picture.width, picture.height), |Square { x, y, side }| {
         let lines = picture.data.chunks_exact(picture.width).skip(y).take(side);
         lines.flat_map(|line| line[x..x + side].iter().copied()).collect()
     })
-}
-
-/// Gray levels as a patch.
-#[must_use]
-pub fn as_patch(levels: &[u8; PIXELS]) -> Patch {
-    Patch(levels.map(f32::from))
-}
-
-/// Rounds the values and clips them to 0..=255.
-fn as_levels(patch: &Patch) -> [u8; PIXELS] {
-    patch.0.map(|value| value.round() as u8)
-}
-
-fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
-    Patch(std::array::from_fn(|i| mixed_level(low[i], high[i], part as f32)))
 }
 
 fn mixed_level(low: u8, high: u8, part: f32) -> f32 {
@@ -408,8 +378,8 @@ mod tests {
 
     /// One pose at focal powers 0, 0.5 and 1 whose patches are even: 0, 100 and 200.
     fn ramp() -> RecordedScan {
-        let patches = [0, 100, 200].map(|level| Box::new([level; PIXELS])).to_vec();
-        RecordedScan::new(evenly_spread(3), vec![Stack::new(&evenly_spread(3), patches)])
+        let views = [0.0, 100.0, 200.0].map(|level| View::from(Patch([level; PIXELS])));
+        RecordedScan::new(evenly_spread(3), vec![Stack::of(&views, FocalPower::MIDDLE, Kept::Patches)])
     }
 
     #[test]
@@ -434,8 +404,7 @@ mod tests {
         let picture = |seed| texture(seed, 128);
         let area = PatchArea { x: 48, y: 48, width: 32, height: 32 };
         let views = [1, 2].map(|seed| gray_view(&picture(seed), area));
-        let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
-        let stack = Stack::new(&evenly_spread(2), patches).with_rest_of(&views, Kept::Surroundings);
+        let stack = Stack::of(&views, FocalPower::MIDDLE, Kept::Surroundings);
         let scan = RecordedScan::new(evenly_spread(2), vec![stack]);
 
         let expected = [1, 2].map(|seed| {
@@ -464,9 +433,9 @@ mod tests {
 
     #[test]
     fn the_optimum_is_where_the_gradient_is_greatest() {
-        let stripes = |contrast: u8| Box::new(std::array::from_fn(|i| if i % 4 < 2 { 100 } else { 100 + contrast }));
-        let stack = Stack::new(&evenly_spread(5), [10, 30, 90, 60, 20].map(stripes).to_vec());
-        assert_eq!(stack.optimum, FocalPower::MIDDLE);
+        let stripes = |contrast: f32| Patch(std::array::from_fn(|i| if i % 4 < 2 { 100.0 } else { 100.0 + contrast }));
+        let patches = [10.0, 30.0, 90.0, 60.0, 20.0].map(stripes);
+        assert_eq!(sharpest(&evenly_spread(5), patches.into_iter()), FocalPower::MIDDLE);
     }
 
     #[test]

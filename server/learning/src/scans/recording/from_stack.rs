@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{PosePictures, shot};
-use crate::scans::recorded::{as_patch, evenly_spread, levels_at};
+use crate::scans::recorded::{evenly_spread, patch_at};
 use crate::scans::stack::FocalStack;
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use parfocal_autofocus::mgm;
@@ -164,7 +164,7 @@ fn middle(size: usize) -> PatchArea {
 fn sharpest(stack: &FocalStack, corner: (usize, usize), size: usize) -> usize {
     let area = middle(size);
     let area = PatchArea { x: corner.0 + area.x, y: corner.1 + area.y, ..area };
-    let metric = |index: &usize| mgm(&as_patch(&levels_at(&stack.planes()[*index].picture, area)));
+    let metric = |index: &usize| mgm(&patch_at(&stack.planes()[*index].picture, area));
     (0..stack.planes().len()).max_by(|a, b| metric(a).total_cmp(&metric(b))).unwrap_or(0)
 }
 

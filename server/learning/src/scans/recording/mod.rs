@@ -12,7 +12,7 @@ pub use import::{Imported, import};
 pub use import_error::ImportError;
 pub use phantom::PhantomPoses;
 
-use super::recorded::{Stack as PatchStack, capture_order, levels_at};
+use super::recorded::{capture_order, patch_at, sharpest};
 use parfocal_base::FocalPower;
 use parfocal_devices::camera::CameraError;
 use parfocal_devices::camera::recorded::LEAST_SIDE;
@@ -102,7 +102,6 @@ pub fn record(
 /// A pose as it is stored. Its optimum is searched in the stack, as the evaluation does.
 fn shot(pose: usize, in_order: &[FocalPower], taken: PosePictures) -> TakenPose {
     let PosePictures { pictures, patch, truth } = taken;
-    let patches = pictures.iter().map(|picture| Box::new(levels_at(picture, patch))).collect();
-    let optimum = PatchStack::new(in_order, patches).optimum;
+    let optimum = sharpest(in_order, pictures.iter().map(|picture| patch_at(picture, patch)));
     TakenPose { pose, images: in_order.iter().copied().zip(pictures).collect(), patch, optimum, truth }
 }

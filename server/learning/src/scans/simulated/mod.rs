@@ -162,7 +162,7 @@ mod tests {
 
     use crate::scans::clip::Clip;
     use crate::scans::reach::whole;
-    use crate::scans::recorded::Stack;
+    use crate::scans::recorded::{Kept, Stack};
     use crate::scans::relief::{Distance, StackScene};
     use crate::scans::variety::Variety;
     use parfocal_devices::simulation::blur::gaussian_blur;
@@ -252,10 +252,10 @@ mod tests {
 
     #[test]
     fn a_recorded_scan_is_shown_as_it_was_recorded_to_and_fro() {
-        let level = |pose: u8, power: u8| Box::new([10 * pose + power; PATCH_SIDE * PATCH_SIDE]);
+        let level = |pose: u8, power: u8| View::from(Patch([f32::from(10 * pose + power); PATCH_SIDE * PATCH_SIDE]));
+        let pose = |pose| Stack::of(&[0, 1, 2].map(|power| level(pose, power)), FocalPower::MIDDLE, Kept::Patches);
         let powers = crate::scans::recorded::evenly_spread(3);
-        let pose = |pose| Stack::new(&powers, (0..3).map(|power| level(pose, power)).collect());
-        let recorded = Arc::new(RecordedScan::new(powers.clone(), (1..4).map(pose).collect()));
+        let recorded = Arc::new(RecordedScan::new(powers, (1..4).map(pose).collect()));
 
         let scene = Scene::Recorded(recorded);
         let mut scan = Scan::over(scene.clone(), ScanSettings::fitting(&scene), 3);

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::FocalStack;
 use super::check::shift;
-use crate::scans::recorded::{as_patch, levels_at};
+use crate::scans::recorded::patch_at;
 use parfocal_autofocus::mgm;
 use parfocal_devices::simulation::blur::gaussian_blur;
 use parfocal_imaging::{GrayImage, PATCH_SIDE, PatchArea};
@@ -98,12 +98,8 @@ impl StackOptics {
     }
 }
 
-fn area(x: usize, y: usize) -> PatchArea {
-    PatchArea { x, y, width: PATCH_SIDE, height: PATCH_SIDE }
-}
-
 fn metric(picture: &GrayImage, x: usize, y: usize) -> f64 {
-    mgm(&as_patch(&levels_at(picture, area(x, y))))
+    mgm(&patch_at(picture, PatchArea { x, y, width: PATCH_SIDE, height: PATCH_SIDE }))
 }
 
 /// The focus curve at a place, and the index of its sharpest picture.
