@@ -6,12 +6,12 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{PosePictures, shot};
+use super::{PosePictures, header, shot};
 use crate::scans::recorded::{evenly_spread, patch_at};
 use crate::scans::stack::FocalStack;
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use parfocal_autofocus::mgm;
-use parfocal_devices::camera::recorded::{FORMAT, Header, LEAST_SIDE, PictureOrder, ScanError, ScanRecording, VERSION};
+use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanError, ScanRecording};
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::Walk;
 use parfocal_imaging::{GrayImage, PATCH_SIDE, PatchArea};
@@ -121,24 +121,9 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
     let windows = windows(stack, cut)?;
     let powers = evenly_spread(cut.planes);
 
-    let header = Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
-        camera: format!(
-            "focal stack {}, windows of {2}x{2} pixels over {1} planes",
-            cut.name,
-            stack.planes().len(),
-            cut.size
-        ),
-        lens: None,
-        simulated: false,
-        calibration: None,
-        seed: cut.seed,
-        order: PictureOrder::Unknown,
-        poses: cut.poses,
-        focal_powers: powers.clone(),
-    };
+    let camera =
+        format!("focal stack {}, windows of {2}x{2} pixels over {1} planes", cut.name, stack.planes().len(), cut.size);
+    let header = header(camera, cut.seed, cut.poses, powers.clone());
 
     let patch = middle(cut.size);
     let mut recording = ScanRecording::open(out, &header)?;

@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::import_error::ImportError;
-use super::{PosePictures, shot};
+use super::{PosePictures, header, shot};
 use crate::scans::mosaics::RawMosaics;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
-use parfocal_devices::camera::recorded::{
-    FORMAT, Header, LEAST_SIDE, MOST_POSES, PictureOrder, ScanError, ScanFolder, ScanRecording, VERSION,
-};
+use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording};
 use parfocal_imaging::{
     GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
 };
@@ -123,19 +121,7 @@ impl Imported {
 /// # Errors
 /// If a picture cannot be used, `out` holds another scan, or it cannot be written.
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
-    let header = Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
-        camera: camera.to_owned(),
-        lens: None,
-        simulated: false,
-        calibration: None,
-        seed: 0,
-        order: PictureOrder::Unknown,
-        poses: imported.len(),
-        focal_powers: imported.powers(),
-    };
+    let header = header(camera.to_owned(), 0, imported.len(), imported.powers());
 
     let mosaics = RawMosaics::new(imported.raw);
     let mut reader =
