@@ -8,13 +8,13 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{PosePictures, header, shot};
 use crate::scans::recorded::{evenly_spread, patch_at};
-use crate::scans::stack::FocalStack;
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
+use crate::scans::stack::{FocalStack, cropped};
 use parfocal_autofocus::mgm;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanError, ScanRecording};
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::Walk;
-use parfocal_imaging::{GrayImage, PATCH_SIDE, PatchArea};
+use parfocal_imaging::{PATCH_SIDE, PatchArea};
 
 /// How a scan is cut out of a stack.
 #[derive(Debug, Clone)]
@@ -131,7 +131,10 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
     for (pose, window) in (1..).zip(windows) {
         if !recording.folder().poses().contains_key(&pose) {
             let planes = &stack.planes()[window.plane..window.plane + cut.planes];
-            let pictures = planes.iter().map(|plane| cropped(&plane.picture, window, cut.size)).collect();
+            let pictures = planes
+                .iter()
+                .map(|plane| cropped(&plane.picture, (window.left, window.top), (cut.size, cut.size)))
+                .collect();
             recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
         }
         progress();
@@ -151,12 +154,6 @@ fn sharpest(stack: &FocalStack, corner: (usize, usize), size: usize) -> usize {
     let area = PatchArea { x: corner.0 + area.x, y: corner.1 + area.y, ..area };
     let metric = |index: &usize| mgm(&patch_at(&stack.planes()[*index].picture, area));
     (0..stack.planes().len()).max_by(|a, b| metric(a).total_cmp(&metric(b))).unwrap_or(0)
-}
-
-fn cropped(picture: &GrayImage, window: Window, size: usize) -> GrayImage {
-    let rows = picture.data.chunks_exact(picture.width).skip(window.top).take(size);
-    let data = rows.flat_map(|row| row[window.left..window.left + size].iter().copied()).collect();
-    GrayImage { width: size, height: size, data }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Checks from the pictures alone whether they are a focal stack of one still scene.
 
 use super::{FocalStack, Plane, StackError};
-
+use parfocal_base::statistics::mean;
 use parfocal_imaging::{GrayImage, reduced};
 
 /// Side in pixels of the places whose sharpness is followed through the stack. In smaller pictures, an eighth of their
@@ -42,10 +42,6 @@ pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
     Ok(notes)
 }
 
-fn unfit(text: String) -> StackError {
-    StackError::Unfit(text)
-}
-
 fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError> {
     let saturated = |plane: &Plane| {
         let bright = plane.picture.data.iter().filter(|&&level| level >= 254.0).count();
@@ -57,7 +53,9 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
 
     let note = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
-        return Err(unfit(format!("{note}, where focus cannot be judged; shorten the exposure and take it again")));
+        return Err(StackError::Unfit(format!(
+            "{note}, where focus cannot be judged; shorten the exposure and take it again"
+        )));
     }
 
     if share > 0.05 {
@@ -82,7 +80,7 @@ fn block_side(stack: &FocalStack) -> usize {
 /// How far each block's change in brightness from one picture to the next is from the median change.
 fn changes(pair: &[GrayImage]) -> Vec<f64> {
     let steps: Vec<f64> = pair[0].data.iter().zip(&pair[1].data).map(|(a, b)| f64::from(b - a)).collect();
-    let usual = median(&steps);
+    let usual = median(steps.clone()).unwrap_or_default();
     steps.into_iter().map(|step| (step - usual).abs()).collect()
 }
 
@@ -97,7 +95,7 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
         let levels = |picture: &GrayImage| steady.iter().map(|&index| picture.data[index]).collect::<Vec<_>>();
 
         if correlation(&levels(&pair[0]), &levels(&pair[1])).is_some_and(|alike| alike < LEAST_ALIKE) {
-            return Err(unfit(format!(
+            return Err(StackError::Unfit(format!(
                 "{} and {} show different scenes; a focal stack is of one still scene",
                 planes[0].name, planes[1].name
             )));
@@ -110,11 +108,11 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
 fn motion(stack: &FocalStack, blocks: &[GrayImage], broken: &[bool], notes: &mut Vec<String>) {
     let largest = |pair: &[GrayImage]| {
         let changes = changes(pair);
-        let index = (0..changes.len()).max_by(|&a, &b| changes[a].total_cmp(&changes[b])).unwrap_or(0);
+        let index = best(&changes);
         (index, changes.get(index).copied().unwrap_or_default())
     };
     let largest: Vec<(usize, f64)> = blocks.windows(2).map(largest).collect();
-    let usual = median(&largest.iter().map(|change| change.1).collect::<Vec<_>>());
+    let usual = median(largest.iter().map(|change| change.1).collect()).unwrap_or_default();
     let side = block_side(stack);
 
     for ((&(index, change), planes), broken) in largest.iter().zip(stack.planes().windows(2)).zip(broken) {
@@ -131,7 +129,7 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let ratio = |curve: &&Vec<f64>| least_and_most(curve).1 / least_and_most(curve).0.max(0.1);
     let peaked: Vec<&Vec<f64>> = curves.iter().filter(|curve| ratio(curve) >= LEAST_PEAK).collect();
     if peaked.len() * 10 < curves.len().max(1) {
-        return Err(unfit(format!(
+        return Err(StackError::Unfit(format!(
             "the focus curve has no peak: sharpness changes by a fifth or more in only {} of {} places; \
              take a scene with texture over a wider range of focus",
             peaked.len(),
@@ -142,7 +140,7 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let count = stack.planes().len();
     let peaks = mean(&peaked.iter().map(|curve| peaks(curve) as f64).collect::<Vec<_>>());
     if peaks >= if count < 10 { 2.0 } else { 3.0 } {
-        return Err(unfit(format!(
+        return Err(StackError::Unfit(format!(
             "sharpness rises and falls {peaks:.1} times from the first picture to the last: they are not \
              in order of focus, or not of one scene; name them so that a number gives the order, or give a --list"
         )));
@@ -151,7 +149,7 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let at_end = |curve: &&&Vec<f64>| [0, count - 1].contains(&best(curve));
     let share = peaked.iter().filter(at_end).count() as f64 / peaked.len() as f64;
     if share > 0.7 {
-        return Err(unfit(format!(
+        return Err(StackError::Unfit(format!(
             "the focus curve has no peak inside the stack: {:.0} % of the places are sharpest in its first \
              or last picture; take pictures beyond that",
             100.0 * share
@@ -303,11 +301,13 @@ fn sharpness(stack: &FocalStack) -> Vec<Vec<f64>> {
     curves
 }
 
-fn least_and_most(curve: &[f64]) -> (f64, f64) {
+/// The least and the greatest value of a curve.
+pub(super) fn least_and_most(curve: &[f64]) -> (f64, f64) {
     curve.iter().fold((f64::INFINITY, 0.0), |(least, most), &value| (f64::min(least, value), f64::max(most, value)))
 }
 
-fn best(curve: &[f64]) -> usize {
+/// Where a curve is greatest.
+pub(super) fn best(curve: &[f64]) -> usize {
     (0..curve.len()).max_by(|&a, &b| curve[a].total_cmp(&curve[b])).unwrap_or(0)
 }
 
@@ -337,10 +337,10 @@ fn peaks(curve: &[f64]) -> usize {
     count + usize::from(rising)
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+/// The median; `None` if there are no values.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Correlation of two pictures; `None` if one hardly varies.
@@ -359,11 +359,6 @@ fn correlation(a: &[f32], b: &[f32]) -> Option<f64> {
 
 fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     mean(&values.map(|value| value.powi(2)).collect::<Vec<_>>()).sqrt()
-}
-
-/// The mean of `values`; 0 if there are none.
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 #[cfg(test)]

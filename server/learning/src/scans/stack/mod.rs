@@ -202,6 +202,14 @@ fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
     }
 }
 
+/// The part of `picture` of `size` (width and height) with its upper left corner at `(left, top)`.
+pub(super) fn cropped(picture: &GrayImage, (left, top): (usize, usize), size: (usize, usize)) -> GrayImage {
+    let (width, height) = size;
+    let rows = picture.data.chunks_exact(picture.width).skip(top).take(height);
+    let data = rows.flat_map(|row| row[left..left + width].iter().copied()).collect();
+    GrayImage { width, height, data }
+}
+
 /// The pictures in a folder, or if it has none, or `raw` are wanted, its raw mosaics.
 fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, StackError> {
     let mosaics = mosaics_in(folder);

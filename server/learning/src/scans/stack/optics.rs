@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use super::FocalStack;
-use super::check::shift;
+use super::check::{best, least_and_most, median, shift};
+use super::{FocalStack, cropped};
 use crate::scans::recorded::patch_at;
 use parfocal_autofocus::mgm;
 use parfocal_devices::simulation::blur::gaussian_blur;
@@ -71,10 +71,7 @@ impl StackOptics {
         let mut softnesses = Vec::new();
         for (x, y) in corners {
             let (place, best) = curve(stack, x, y);
-            let (least, most) = place
-                .sharpness
-                .iter()
-                .fold((f64::INFINITY, 0.0), |(low, high), &value| (f64::min(low, value), f64::max(high, value)));
+            let (least, most) = least_and_most(&place.sharpness);
             if least < LEAST_FALL * most {
                 rates.extend(rate(stack, &place, best));
                 softnesses.extend(softness(&stack.planes()[best].picture, x, y));
@@ -105,7 +102,7 @@ fn metric(picture: &GrayImage, x: usize, y: usize) -> f64 {
 /// The focus curve at a place, and the index of its sharpest picture.
 fn curve(stack: &FocalStack, x: usize, y: usize) -> (FocusCurve, usize) {
     let sharpness: Vec<f64> = stack.planes().iter().map(|plane| metric(&plane.picture, x, y)).collect();
-    let best = (0..sharpness.len()).max_by(|&a, &b| sharpness[a].total_cmp(&sharpness[b])).unwrap_or(0);
+    let best = best(&sharpness);
     (FocusCurve { x, y, best: stack.planes()[best].position, sharpness }, best)
 }
 
@@ -136,9 +133,7 @@ fn surroundings(picture: &GrayImage, x: usize, y: usize) -> (GrayImage, usize, u
     let right = (x + PATCH_SIDE + MARGIN).min(picture.width);
     let bottom = (y + PATCH_SIDE + MARGIN).min(picture.height);
 
-    let rows = picture.data.chunks_exact(picture.width).skip(top).take(bottom - top);
-    let data = rows.flat_map(|row| row[left..right].iter().copied()).collect();
-    (GrayImage { width: right - left, height: bottom - top, data }, x - left, y - top)
+    (cropped(picture, (left, top), (right - left, bottom - top)), x - left, y - top)
 }
 
 /// How soft the edges at a place are, from the ratio of their gradients before and after blurring them again (Zhuo and
@@ -179,16 +174,11 @@ fn magnification(stack: &FocalStack) -> Option<f64> {
         return None;
     }
 
-    let part = |picture: &GrayImage, left: usize, top: usize, size: (usize, usize)| {
-        let rows = picture.data.chunks_exact(picture.width).skip(top).take(size.1);
-        let data = rows.flat_map(|row| row[left..left + size.0].iter().copied()).collect();
-        GrayImage { width: size.0, height: size.1, data }
-    };
-
     let mut growth = 1.0;
     for pair in stack.planes().windows(2) {
         let moved = |left: usize, top: usize, size: (usize, usize)| {
-            shift(&part(&pair[0].picture, left, top, size), &part(&pair[1].picture, left, top, size), FARTHEST)
+            let [before, after] = [&pair[0], &pair[1]].map(|plane| cropped(&plane.picture, (left, top), size));
+            shift(&before, &after, FARTHEST)
         };
         let third = width / 3;
         let two_thirds = width - width / 3;
@@ -201,11 +191,6 @@ fn magnification(stack: &FocalStack) -> Option<f64> {
         growth *= 1.0 + 0.5 * (across / two_thirds as f64 + down / high as f64);
     }
     Some(growth - 1.0)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]
