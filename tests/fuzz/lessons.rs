@@ -99,7 +99,7 @@ pub fn import(bytes: &[u8]) {
     IMPORTED.with(|pictures| {
         pictures.with(bytes, |folder| {
             let out = tempfile::tempdir().unwrap();
-            let imported = Imported::look(folder).unwrap();
+            let imported = Imported::look(folder, None, None).unwrap();
             let _ = recording::import(&imported, "a test's", &out.path().join("scan"), &|| {});
         });
     });

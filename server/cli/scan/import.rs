@@ -33,12 +33,12 @@ pub struct Arguments {
 /// # Errors
 /// If the pictures are not a scan, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let imported = Imported::look(&arguments.folder)?.of_bits(arguments.bits).of_raw(arguments.raw);
-    let progress = bar(imported.len(), 0);
+    let imported = Imported::look(&arguments.folder, arguments.bits, arguments.raw)?;
+    let progress = bar(imported.count(), 0);
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy().into_owned();
     let camera = arguments.camera.clone().unwrap_or(folder);
     import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();
     let out = arguments.out.display();
-    print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(imported.len())))
+    print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(imported.count())))
 }

@@ -28,9 +28,12 @@ pub struct Imported {
 impl Imported {
     /// Searches `folder` and the folders directly in it. Reads and compares names, but does not open pictures yet.
     ///
+    /// The samples of 16-bit files are numbers of so many `bits`; if it is `None`, of the fewest that hold the largest
+    /// sample of all pictures. Raw mosaics are in the format `raw`; if it is `None`, in the one of their length.
+    ///
     /// # Errors
     /// If names make no sense, or poses or focal powers are missing.
-    pub fn look(folder: &Path) -> Result<Self, ImportError> {
+    pub fn look(folder: &Path, bits: Option<u8>, raw: Option<PixelFormat>) -> Result<Self, ImportError> {
         let mut poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>> = BTreeMap::new();
         for path in files(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -62,7 +65,7 @@ impl Imported {
             return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
         }
 
-        let imported = Self { poses, bits: None, raw: None };
+        let imported = Self { poses, bits, raw };
         imported.check_powers()?;
         Ok(imported)
     }
@@ -89,29 +92,10 @@ impl Imported {
         powers
     }
 
-    /// Takes the samples of 16-bit files as numbers of so many bits. If it is `None`, the fewest bits that hold the
-    /// largest sample of all pictures.
-    #[must_use]
-    pub fn of_bits(self, bits: Option<u8>) -> Self {
-        Self { bits, ..self }
-    }
-
-    /// Reads raw mosaics in this format. If it is `None`, in the one of their length.
-    #[must_use]
-    pub fn of_raw(self, raw: Option<PixelFormat>) -> Self {
-        Self { raw, ..self }
-    }
-
     /// Number of poses.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.poses.len()
-    }
-
-    /// Whether there is no pose.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.poses.is_empty()
     }
 }
 
@@ -121,7 +105,7 @@ impl Imported {
 /// # Errors
 /// If a picture cannot be used, `out` holds another scan, or it cannot be written.
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
-    let header = header(camera.to_owned(), 0, imported.len(), imported.powers());
+    let header = header(camera.to_owned(), 0, imported.count(), imported.powers());
 
     let mosaics = RawMosaics::new(imported.raw);
     let mut reader =
