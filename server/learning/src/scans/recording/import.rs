@@ -1,6 +1,7 @@
 //! Imports a scan: a folder of pictures named by pose and focal power, recorded by any program.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::import_error::ImportError;
@@ -12,7 +13,7 @@ use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording};
 use parfocal_imaging::{
-    GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
+    DecodeError, GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
 };
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
@@ -39,7 +40,7 @@ impl Imported {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match parse(&name) {
                 None => {}
-                Some(Err(reason)) => return Err(ImportError::Name { path, reason }),
+                Some(Err(reason)) => return Err(ImportError::File { path, reason }),
                 Some(Ok((pose, power))) => poses.entry(pose).or_default().push((power, path)),
             }
         }
@@ -48,7 +49,7 @@ impl Imported {
             stack.sort_by(|a, b| a.0.get().total_cmp(&b.0.get()));
             if let Some(pair) = stack.windows(2).find(|pair| pair[0].0 == pair[1].0) {
                 let reason = format!("{} is of the same pose and focal power", pair[0].1.display());
-                return Err(ImportError::Name { path: pair[1].1.clone(), reason });
+                return Err(ImportError::File { path: pair[1].1.clone(), reason });
             }
         }
 
@@ -172,22 +173,20 @@ impl Reader {
     /// Compares a picture's size with the first one's. Reads only the beginning of the file, except of one with 16-bit
     /// samples, whose largest counts, and of a raw mosaic.
     fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
-        let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
         if is_raw(path) {
             self.read(path)?;
             return self.check(path, SENSOR_SIZE);
         }
 
-        let head = picture_head(path).map_err(unreadable)?;
+        let head = picture_head(path).map_err(unreadable(path))?;
         let size = PictureFile::open(&head).and_then(|file| file.single()?.size(0));
-        let picture = |error| ImportError::Picture { path: path.to_owned(), error };
-        let size = size.map_err(picture)?;
+        let size = size.map_err(unusable(path))?;
         self.check(path, size)?;
 
         // A mosaic's counts have the scale of its calibration.
-        if size != SENSOR_SIZE && PictureFile::open(&head).map_err(picture)?.is_wide() {
-            let bytes = std::fs::read(path).map_err(unreadable)?;
-            let sample = PictureFile::open(&bytes).and_then(|file| file.largest_sample(0)).map_err(picture)?;
+        if size != SENSOR_SIZE && PictureFile::open(&head).map_err(unusable(path))?.is_wide() {
+            let bytes = std::fs::read(path).map_err(unreadable(path))?;
+            let sample = PictureFile::open(&bytes).and_then(|file| file.largest_sample(0)).map_err(unusable(path))?;
             if self.largest.as_ref().is_none_or(|(largest, _)| sample > *largest) {
                 self.largest = Some((sample, path.to_owned()));
             }
@@ -233,18 +232,15 @@ impl Reader {
     }
 
     fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
-        let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
-        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let bytes = std::fs::read(path).map_err(unreadable(path))?;
         if is_raw(path) {
-            let frame = self.mosaics.read(path, &bytes);
-            let frame = frame.map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+            let frame = self.mosaics.read(path, &bytes).map_err(unusable(path))?;
             return Ok(Picture::Mosaic(frame).into_gray(&mut self.reconstructor));
         }
 
         let opened = PictureFile::open(&bytes).and_then(PictureFile::single);
         let wide = opened.as_ref().is_ok_and(PictureFile::is_wide);
-        let picture = opened.and_then(|file| file.read(0, false));
-        let picture = picture.map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+        let picture = opened.and_then(|file| file.read(0, false)).map_err(unusable(path))?;
 
         // A mosaic's counts have the scale of its calibration.
         let scaled = wide && !matches!(picture, Picture::Mosaic(_));
@@ -256,12 +252,19 @@ impl Reader {
     }
 }
 
+fn unreadable(path: &Path) -> impl Fn(io::Error) -> ImportError {
+    |error| ImportError::Unreadable { path: path.to_owned(), error }
+}
+
+fn unusable(path: &Path) -> impl Fn(DecodeError) -> ImportError {
+    |error| ImportError::File { path: path.to_owned(), reason: error.to_string() }
+}
+
 /// The files in `folder` and in the folders directly in it, sorted.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     let entries = |folder: &Path| -> Result<Vec<PathBuf>, ImportError> {
-        let unreadable = |error| ImportError::Unreadable { path: folder.to_owned(), error };
-        let entries = std::fs::read_dir(folder).map_err(unreadable)?;
-        entries.map(|entry| entry.map(|entry| entry.path()).map_err(unreadable)).collect()
+        let entries = std::fs::read_dir(folder).map_err(unreadable(folder))?;
+        entries.map(|entry| entry.map(|entry| entry.path()).map_err(unreadable(folder))).collect()
     };
 
     let (folders, mut files): (Vec<_>, Vec<_>) = entries(folder)?.into_iter().partition(|path| path.is_dir());

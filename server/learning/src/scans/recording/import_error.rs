@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use super::RecordError;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES, ScanError, poses};
-use parfocal_imaging::DecodeError;
 
 /// Why a folder cannot be imported.
 #[derive(Debug, thiserror::Error)]
@@ -21,12 +20,12 @@ pub enum ImportError {
     /// It holds no pictures of a scan.
     #[error("there is no picture named like pose0001_f0.350.png in {}", .0.display())]
     Empty(PathBuf),
-    /// A file name that makes no sense.
+    /// A file whose name makes no sense, or that is not a picture.
     #[error("{}: {reason}", path.display())]
-    Name {
+    File {
         /// Path of the file.
         path: PathBuf,
-        /// What is wrong with its name.
+        /// What is wrong with it.
         reason: String,
     },
     /// Poses without any picture.
@@ -78,14 +77,6 @@ pub enum ImportError {
         path: PathBuf,
         /// Its width and height in pixels.
         size: (usize, usize),
-    },
-    /// A file that is not a picture.
-    #[error("{}: {error}", path.display())]
-    Picture {
-        /// Path of the file.
-        path: PathBuf,
-        /// Why it cannot be decoded.
-        error: DecodeError,
     },
     /// A sample larger than its bits allow.
     #[error("{} holds a sample of {largest}, which is more than {bits} bit; give --bits {needed} or more",

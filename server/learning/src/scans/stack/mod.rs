@@ -90,7 +90,8 @@ impl FocalStack {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
             let picture =
                 if is_raw(&path) { mosaics.read(&path, &bytes).map(Picture::Mosaic) } else { decode(&bytes, false) };
-            let picture = picture.map_err(|source| StackError::Picture { path: path.clone(), source })?;
+            let picture =
+                picture.map_err(|error| StackError::Unusable { path: path.clone(), reason: error.to_string() })?;
             let gray = picture.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };

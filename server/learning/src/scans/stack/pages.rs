@@ -26,13 +26,12 @@ struct Depth {
 /// If a page or the list cannot be read, or the pages vary in more than focus.
 pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, StackError> {
     let bytes = std::fs::read(path).map_err(|source| StackError::File { path: path.to_owned(), source })?;
-    let unread = |source| StackError::Picture { path: path.to_owned(), source };
-    let file = PictureFile::open(&bytes).map_err(unread)?;
+    let unusable = |reason: String| StackError::Unusable { path: path.to_owned(), reason };
+    let file = PictureFile::open(&bytes).map_err(|error| unusable(error.to_string()))?;
 
     let depth = match list {
         Some(list) => of_list(list, file.pages())?,
-        None => depth(&file.description().unwrap_or_default(), file.pages())
-            .map_err(|reason| StackError::Pages { path: path.to_owned(), reason })?,
+        None => depth(&file.description().unwrap_or_default(), file.pages()).map_err(unusable)?,
     };
     tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
 
@@ -41,7 +40,8 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
     let placed = depth.pages.iter().zip(&depth.positions);
     placed
         .map(|(&page, &position)| {
-            let gray = file.read(page, false).map_err(unread)?.into_gray(&mut reconstructor);
+            let picture = file.read(page, false).map_err(|error| unusable(error.to_string()))?;
+            let gray = picture.into_gray(&mut reconstructor);
             let name = format!("page {} of {name}", page + 1);
             Ok(Plane { name, position, picture: in_blocks(&gray, scale) })
         })
@@ -49,7 +49,7 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
 }
 
 fn of_list(list: &Path, count: usize) -> Result<Depth, StackError> {
-    let wrong = |reason: String| StackError::List { path: list.to_owned(), reason };
+    let wrong = |reason: String| StackError::Unusable { path: list.to_owned(), reason };
     let mut pages = Vec::new();
     let mut positions = Vec::new();
     for (name, position) in listed(list)? {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use parfocal_devices::camera::footage;
-use parfocal_imaging::{DecodeError, GrayImage};
+use parfocal_imaging::GrayImage;
 
 /// Least number of pictures in which a peak and an order can be recognised.
 pub const LEAST_PLANES: usize = 5;
@@ -33,33 +33,17 @@ pub enum StackError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A file is not a picture.
-    #[error("{}: {source}", path.display())]
-    Picture {
-        /// Path of the file.
-        path: PathBuf,
-        /// Why it cannot be decoded.
-        source: DecodeError,
-    },
-    /// One raw mosaic.
-    #[error("{} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}", .0.display())]
-    OneMosaic(PathBuf),
-    /// The pages of a file are not a stack.
+    /// A file is not a picture, its pages are not a stack, or the list of positions makes no sense.
     #[error("{}: {reason}", path.display())]
-    Pages {
+    Unusable {
         /// Path of the file.
-        path: PathBuf,
-        /// What is wrong with them.
-        reason: String,
-    },
-    /// The list of positions makes no sense.
-    #[error("{}: {reason}", path.display())]
-    List {
-        /// Path of the list.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
     },
+    /// One raw mosaic.
+    #[error("{} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}", .0.display())]
+    OneMosaic(PathBuf),
     /// Too few pictures.
     #[error(
         "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {0}; \

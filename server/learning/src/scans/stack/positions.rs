@@ -12,7 +12,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// Names and positions from a list of `name,position`; a first line without a number is a heading.
 pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
-    let wrong = |reason: String| StackError::List { path: list.to_owned(), reason };
+    let wrong = |reason: String| StackError::Unusable { path: list.to_owned(), reason };
     let text = std::fs::read_to_string(list).map_err(|error| wrong(format!("cannot read the list: {error}")))?;
     let mut placed = Vec::new();
 
