@@ -1,9 +1,9 @@
 //! A bench of real devices: a camera, a lens, and a person or a command that moves the camera to the next pose.
 
+use std::io;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
-use std::{fmt, io};
 
 use super::{PosePictures, PoseSource, RecordError};
 use parfocal_base::FocalPower;
@@ -47,15 +47,6 @@ pub enum StepperError {
         /// Exit status of the command.
         status: ExitStatus,
     },
-}
-
-impl fmt::Debug for Stepper {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Asked(_) => f.write_str("Asked"),
-            Self::Command(command) => f.debug_tuple("Command").field(command).finish(),
-        }
-    }
 }
 
 impl Stepper {
