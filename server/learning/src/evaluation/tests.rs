@@ -79,7 +79,7 @@ fn a_policy_that_gives_up_has_no_figures() {
 fn the_first_scans_of_a_partly_varied_set_are_the_references() {
     let same = Benchmark::reference(4).unwrap();
     let varied = Benchmark { conditions: Conditions::VariedFrom(2), ..same.clone() };
-    let seen = |set: &Benchmark, index| Benchmark::scan(set, index).observe(FocalPower::MIDDLE);
+    let seen = |set: &Benchmark, index| set.scan(index).0.observe(FocalPower::MIDDLE);
     let alike: Vec<bool> = (0..4).map(|index| seen(&same, index) == seen(&varied, index)).collect();
     assert_eq!(alike, [true, true, false, false]);
 }

@@ -67,10 +67,14 @@ impl Benchmark {
             relief::deep_scenes(Split::Test, count.min(RELIEFS) as u64)?.into_iter().map(Scene::Stack).collect();
         Ok(Self { scenes, conditions: Conditions::Fitting, seed: SEED, count, frames: FRAMES })
     }
+}
 
-    /// Scan `index`, at its beginning.
-    #[must_use]
-    pub fn scan(&self, index: usize) -> Scan {
+impl ScanSet for Benchmark {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
         let scene = self.scenes[index % self.scenes.len()].clone();
         // Distinct streams for neighbouring seeds: the golden-ratio increment of SplitMix64.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
@@ -82,16 +86,6 @@ impl Benchmark {
             Conditions::VariedFrom(_) => Variety { share: 1.0 }.draw(&scene, &mut ChaCha8Rng::seed_from_u64(!seed)),
         };
 
-        Scan::over(scene, settings, seed)
-    }
-}
-
-impl ScanSet for Benchmark {
-    fn count(&self) -> usize {
-        self.count
-    }
-
-    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
-        (Box::new(Self::scan(self, index)), self.frames)
+        (Box::new(Scan::over(scene, settings, seed)), self.frames)
     }
 }

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
+use crate::scans::FocalTimeScan;
 use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scan;
 use crate::scans::variety::Variety;
@@ -75,7 +76,7 @@ impl Environment {
 
     /// The patch of this frame.
     pub fn observe(&mut self) -> Patch {
-        self.scan.observe(self.shown())
+        self.scan.patch(self.shown())
     }
 
     /// The patch of this frame and the wider ones around it; without surroundings.
@@ -85,7 +86,7 @@ impl Environment {
 
     /// The view of this frame, with surroundings.
     pub fn view(&mut self) -> View {
-        self.scan.view(self.shown())
+        self.scan.observe(self.shown())
     }
 
     /// The focal power at which the picture is made: the reported one, rounded to the grid if there is one.

@@ -10,7 +10,6 @@ mod stacked;
 use std::sync::Arc;
 
 use super::FocalTimeScan;
-use super::clip::Clip;
 use super::recorded::{Interpolation, RecordedScan};
 use course::Course;
 use flat::FlatLook;
@@ -37,12 +36,6 @@ enum Look {
 }
 
 impl Scan {
-    /// A scan over `clip` whose course is drawn from `seed`.
-    #[must_use]
-    pub fn new(clip: Arc<Clip>, settings: ScanSettings, seed: u64) -> Self {
-        Self::over(Scene::Flat(clip), settings, seed)
-    }
-
     /// A scan over `scene` whose course is drawn from `seed`. Over a focal stack, blur, spot,
     /// tremor, veil and unrest of `settings` are ignored: the stack has its own.
     #[must_use]
@@ -57,16 +50,6 @@ impl Scan {
         Self { course, look, sensor: Sensor::new(&settings, seed) }
     }
 
-    /// The optimal focal power at this frame.
-    #[must_use]
-    pub fn optimum(&self) -> FocalPower {
-        match &self.look {
-            Look::Flat(_) => FocalPower::nearest(self.course.focus.position()),
-            Look::Stack(stack) => stack.optimum(&self.course),
-            Look::Recorded(scan) => scan.optimum(scan.pose_at(self.course.time)),
-        }
-    }
-
     /// How fast blur grows. `None` for photographs, of which it is not known.
     #[must_use]
     pub fn blur(&self) -> Option<BlurRate> {
@@ -77,34 +60,14 @@ impl Scan {
         }
     }
 
-    /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
-    pub fn observe(&mut self, focal_power: FocalPower) -> Patch {
-        let mut patch = match &mut self.look {
-            Look::Flat(flat) => flat.light(&self.course, focal_power),
-            Look::Stack(stack) => stack.light(&self.course, focal_power),
-            Look::Recorded(scan) => look_at_recorded(scan, self.course.time, focal_power).patch,
-        };
-        self.sensor.record(&mut patch, self.course.contrast);
-        patch
-    }
-
-    /// The patch of [`Scan::observe`], and the wider ones around it; without surroundings.
+    /// What [`FocalTimeScan::patch`] shows, and the wider patches around it; without surroundings.
     pub fn wide_view(&mut self, focal_power: FocalPower) -> View {
         View { surroundings: None, ..self.view_of_light(focal_power) }
     }
 
-    /// As [`Scan::wide_view`], with surroundings. They cost as much again, mostly for their noise.
-    pub fn view(&mut self, focal_power: FocalPower) -> View {
-        let mut view = self.view_of_light(focal_power);
-        if let Some(light) = view.surroundings.take() {
-            view.surroundings = Some(self.sensor.record_surroundings(&light, &view.patch, self.course.contrast));
-        }
-        view
-    }
-
-    /// [`Scan::view`] with the surroundings as the light has them: without exposure, noise and rounding.
+    /// [`FocalTimeScan::observe`] with the surroundings as the light has them: without exposure, noise and rounding.
     fn view_of_light(&mut self, focal_power: FocalPower) -> View {
-        let patch = self.observe(focal_power);
+        let patch = self.patch(focal_power);
         let around = match &mut self.look {
             Look::Flat(flat) => flat.light_around(&self.course, &patch, focal_power),
             Look::Stack(stack) => stack.light_around(&self.course, focal_power),
@@ -119,17 +82,6 @@ impl Scan {
         }
         view
     }
-
-    /// Advances to the next frame.
-    pub fn advance(&mut self) {
-        self.course.advance();
-        self.sensor.advance();
-        match &mut self.look {
-            Look::Flat(flat) => flat.advance(),
-            Look::Stack(stack) => stack.advance(&self.course),
-            Look::Recorded(_) => {}
-        }
-    }
 }
 
 fn look_at_recorded(scan: &RecordedScan, time: usize, focal_power: FocalPower) -> View {
@@ -137,20 +89,41 @@ fn look_at_recorded(scan: &RecordedScan, time: usize, focal_power: FocalPower) -
 }
 
 impl FocalTimeScan for Scan {
+    /// As [`Scan::wide_view`], with surroundings. They cost as much again, mostly for their noise.
     fn observe(&mut self, focal_power: FocalPower) -> View {
-        self.view(focal_power)
+        let mut view = self.view_of_light(focal_power);
+        if let Some(light) = view.surroundings.take() {
+            view.surroundings = Some(self.sensor.record_surroundings(&light, &view.patch, self.course.contrast));
+        }
+        view
     }
 
     fn patch(&mut self, focal_power: FocalPower) -> Patch {
-        Self::observe(self, focal_power)
+        let mut patch = match &mut self.look {
+            Look::Flat(flat) => flat.light(&self.course, focal_power),
+            Look::Stack(stack) => stack.light(&self.course, focal_power),
+            Look::Recorded(scan) => look_at_recorded(scan, self.course.time, focal_power).patch,
+        };
+        self.sensor.record(&mut patch, self.course.contrast);
+        patch
     }
 
     fn optimum(&self) -> FocalPower {
-        Self::optimum(self)
+        match &self.look {
+            Look::Flat(_) => FocalPower::nearest(self.course.focus.position()),
+            Look::Stack(stack) => stack.optimum(&self.course),
+            Look::Recorded(scan) => scan.optimum(scan.pose_at(self.course.time)),
+        }
     }
 
     fn advance(&mut self) {
-        Self::advance(self);
+        self.course.advance();
+        self.sensor.advance();
+        match &mut self.look {
+            Look::Flat(flat) => flat.advance(),
+            Look::Stack(stack) => stack.advance(&self.course),
+            Look::Recorded(_) => {}
+        }
     }
 }
 
@@ -168,10 +141,14 @@ mod tests {
     use parfocal_devices::simulation::blur::gaussian_blur;
     use parfocal_devices::simulation::normal::cheap_normal;
     use parfocal_devices::simulation::texture::texture;
-    use parfocal_imaging::{PATCH_SIDE, Square, WIDER, block_means};
+    use parfocal_imaging::{GrayImage, PATCH_SIDE, Square, WIDER, block_means};
+
+    fn flat(picture: GrayImage) -> Scene {
+        Scene::Flat(Arc::new(Clip::still(picture).unwrap()))
+    }
 
     fn scan(seed: u64) -> Scan {
-        Scan::new(Arc::new(Clip::still(texture(1, 256)).unwrap()), ScanSettings::default(), seed)
+        Scan::over(flat(texture(1, 256)), ScanSettings::default(), seed)
     }
 
     #[test]
@@ -180,27 +157,26 @@ mod tests {
         let mut left_alone = scan(5);
 
         for _ in 0..50 {
-            looked_at.observe(FocalPower::MIN);
+            looked_at.patch(FocalPower::MIN);
             looked_at.advance();
             left_alone.advance();
         }
 
         assert_eq!(looked_at.optimum(), left_alone.optimum());
-        assert_eq!(looked_at.observe(FocalPower::MIDDLE), left_alone.observe(FocalPower::MIDDLE));
+        assert_eq!(looked_at.patch(FocalPower::MIDDLE), left_alone.patch(FocalPower::MIDDLE));
     }
 
     #[test]
     fn the_patch_is_the_same_whether_wider_ones_are_looked_at_or_not() {
-        let clip = Arc::new(Clip::still(texture(1, 256)).unwrap());
         let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
         let mut rng = ChaCha8Rng::seed_from_u64(9);
 
-        for scene in [Scene::Flat(clip), Scene::Stack(stack)] {
+        for scene in [flat(texture(1, 256)), Scene::Stack(stack)] {
             for seed in 0..10 {
                 let settings = Variety { share: 1.0 }.draw(&scene, &mut rng);
                 let (mut one, mut other) = [(); 2].map(|()| Scan::over(scene.clone(), settings, seed)).into();
                 for _ in 0..10 {
-                    assert_eq!(one.view(FocalPower::MIDDLE).patch, other.observe(FocalPower::MIDDLE));
+                    assert_eq!(one.observe(FocalPower::MIDDLE).patch, other.patch(FocalPower::MIDDLE));
                     one.advance();
                     other.advance();
                 }
@@ -211,13 +187,13 @@ mod tests {
     #[test]
     fn wider_patches_show_the_same_blur_as_the_patch() {
         let picture = texture(1, 256);
-        let mut scan = Scan::new(Arc::new(Clip::still(picture.clone()).unwrap()), ScanSettings::default(), 5);
+        let mut scan = Scan::over(flat(picture.clone()), ScanSettings::default(), 5);
 
         for step in [0.0, 0.2, -0.4] {
             let focal_power = scan.optimum().moved(step);
             let sigma = scan.blur().unwrap().get() * focal_power.distance(scan.optimum());
             let blurred = gaussian_blur(&picture, sigma);
-            let seen = scan.view(focal_power);
+            let seen = scan.observe(focal_power);
             for (patch, scale) in seen.wider.iter().zip(WIDER) {
                 let square = Square::around(whole(scan.course.corner()), scale, (256, 256)).unwrap();
                 let expected = block_means(&blurred.data[square.y * 256 + square.x..], 256, scale);
@@ -236,13 +212,13 @@ mod tests {
         for seed in 0..20 {
             let mut scan = Scan::over(Scene::Stack(Arc::clone(&stack)), ScanSettings::reference(), seed);
             let best = scan.optimum();
-            let sharp = parfocal_autofocus::mgm(&scan.observe(best));
+            let sharp = parfocal_autofocus::mgm(&scan.patch(best));
 
             for step in [-0.5, 0.5] {
                 let elsewhere = best.moved(step);
                 if elsewhere.distance(best) > 0.3 {
                     seen += 1;
-                    sharper += usize::from(parfocal_autofocus::mgm(&scan.observe(elsewhere)) < sharp);
+                    sharper += usize::from(parfocal_autofocus::mgm(&scan.patch(elsewhere)) < sharp);
                 }
             }
         }
@@ -261,7 +237,7 @@ mod tests {
         let mut scan = Scan::over(scene.clone(), ScanSettings::fitting(&scene), 3);
         let mut shown = Vec::new();
         for _ in 0..8 {
-            shown.push(scan.observe(FocalPower::MAX).0[0] as u8);
+            shown.push(scan.patch(FocalPower::MAX).0[0] as u8);
             scan.advance();
         }
 
@@ -286,7 +262,7 @@ mod tests {
         for seed in 0..20 {
             let mut scan = Scan::over(followed.clone(), ScanSettings::reference(), seed);
             for _ in 0..10 {
-                let curve = powers.iter().map(|&power| (power, parfocal_autofocus::mgm(&scan.observe(power))));
+                let curve = powers.iter().map(|&power| (power, parfocal_autofocus::mgm(&scan.patch(power))));
                 let (sharpest, _) = curve.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
                 frames += 1;
                 near += usize::from(sharpest.distance(scan.optimum()) < 0.15);
@@ -299,12 +275,12 @@ mod tests {
     #[test]
     fn the_patch_is_sharpest_at_the_optimum() {
         let mut scan = scan(6);
-        let sharp = parfocal_autofocus::mgm(&scan.observe(scan.optimum()));
+        let sharp = parfocal_autofocus::mgm(&scan.patch(scan.optimum()));
 
         for step in [-0.4, -0.2, 0.2, 0.4] {
             let elsewhere = scan.optimum().moved(step);
             if elsewhere.distance(scan.optimum()) > 0.1 {
-                assert!(parfocal_autofocus::mgm(&scan.observe(elsewhere)) < sharp);
+                assert!(parfocal_autofocus::mgm(&scan.patch(elsewhere)) < sharp);
             }
         }
     }
