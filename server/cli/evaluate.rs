@@ -362,8 +362,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
             return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
         }
         let count = arguments.count.unwrap_or(1);
-        let scans =
-            part.scans(count).into_iter().map(|index| phantom(arguments.seed().wrapping_add(index as u64), kept));
+        let scans = part.scans(count).map(|index| phantom(arguments.seed().wrapping_add(index as u64), kept));
         return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed(), count, between });
     }
 

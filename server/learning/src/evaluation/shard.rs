@@ -34,13 +34,8 @@ impl Part {
 
     /// Indices of its scans among `count`, from 0.
     #[must_use]
-    pub fn scans(self, count: usize) -> Vec<usize> {
-        (self.index.saturating_sub(1)..count).step_by(self.of.max(1)).collect()
-    }
-
-    /// Number of its scans among `count`.
-    fn size(self, count: usize) -> usize {
-        count.saturating_sub(self.index.saturating_sub(1)).div_ceil(self.of.max(1))
+    pub fn scans(self, count: usize) -> impl ExactSizeIterator<Item = usize> {
+        (self.index.saturating_sub(1)..count).step_by(self.of.max(1))
     }
 
     /// Name of the file with its results.
@@ -77,7 +72,7 @@ pub struct PartOf<S> {
 impl<S: ScanSet> PartOf<S> {
     /// The scans of `set` that belong to `part`.
     pub fn new(set: S, part: Part) -> Self {
-        let scans = part.scans(set.count());
+        let scans = part.scans(set.count()).collect();
         Self { set, scans }
     }
 }
@@ -155,7 +150,7 @@ impl Shard {
     /// Whether it holds a plausible path for each policy and each of its scans. It may come from another machine and
     /// may be damaged, so this is checked before anything in it is used.
     fn is_whole(&self) -> bool {
-        let scans = self.part.size(self.subject.count);
+        let scans = self.part.scans(self.subject.count).len();
         let Part { index, of } = self.part;
         let is_whole = |outcome: &Outcome| {
             outcome.paths.len() == scans
@@ -241,7 +236,7 @@ fn together(shards: &[Shard], index: usize) -> Outcome {
     let mut paths = vec![Path::default(); count];
 
     for shard in shards {
-        for (scan, path) in shard.part.scans(count).into_iter().zip(&shard.outcomes[index].paths) {
+        for (scan, path) in shard.part.scans(count).zip(&shard.outcomes[index].paths) {
             paths[scan] = path.clone();
         }
     }
@@ -259,10 +254,10 @@ mod tests {
 
     #[test]
     fn parts_hold_every_scan_once() {
-        let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).scans(7));
+        let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).scans(7).collect::<Vec<_>>());
         assert_eq!(parts, [vec![0, 3, 6], vec![1, 4], vec![2, 5]]);
-        assert_eq!(["1/3", "2/3", "3/3"].map(|text| part(text).size(7)), [3, 2, 2]);
-        assert_eq!(part("5/5").size(3), 0);
+        assert_eq!(["1/3", "2/3", "3/3"].map(|text| part(text).scans(7).len()), [3, 2, 2]);
+        assert_eq!(part("5/5").scans(3).len(), 0);
 
         for wrong in ["0/3", "4/3", "1", "1/0", "a/b", ""] {
             assert!(wrong.parse::<Part>().is_err(), "{wrong}");
