@@ -1,4 +1,4 @@
-//! Checks the numbers in a recipe before a training begins. An invalid one is rejected with its key and range.
+//! Parses a recipe and checks its numbers before a training begins. An invalid one is rejected with its key and range.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -12,11 +12,27 @@ use parfocal_autofocus::networks::HISTORY;
 /// Largest number of updates of a training.
 pub const MAX_UPDATES: u64 = 1_000_000_000;
 
-/// Checks all numbers of `recipe`.
-///
-/// # Errors
-/// If a number is outside its range: names the key, range and value of the first one.
-pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
+impl Recipe {
+    /// Parses the recipe in `text` (TOML).
+    ///
+    /// # Errors
+    /// If a key is unknown, missing or of the wrong type (with its line), or a number is outside its range.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let recipe: Self = toml::from_str(text).map_err(|error| sentence(&error, text))?;
+        check(&recipe)?;
+        Ok(recipe)
+    }
+}
+
+/// The error in `text` as one sentence with its line. TOML's own message has several lines.
+fn sentence(error: &toml::de::Error, text: &str) -> String {
+    let what = error.message().trim().replace('\n', ", ");
+    let before = error.span().and_then(|span| text.get(..span.start));
+    before.map_or(what.clone(), |before| format!("line {}: {what}", before.matches('\n').count() + 1))
+}
+
+/// Checks all numbers of `recipe`: names the key, range and value of the first one outside its range.
+fn check(recipe: &Recipe) -> Result<(), String> {
     within("pictures", recipe.pictures, 1..=100_000)?;
     within("validate_every", recipe.validate_every, LEG..=MAX_UPDATES)?;
     if !recipe.validate_every.is_multiple_of(LEG) {

@@ -3,7 +3,6 @@
 pub mod belief;
 mod check;
 pub mod dqn;
-mod parse;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,6 @@
 //! One training from beginning to end, in a run folder: legs of updates, validations, checkpoints, and the best weights
 //! so far.
 
-mod begin;
 pub mod checkpoint;
 pub mod comparison;
 mod curves;
@@ -16,6 +15,8 @@ use std::path::Path;
 
 use tch::Device;
 
+use super::belief::BeliefTrainer;
+use super::dqn::DqnTrainer;
 use super::error::TrainError;
 use super::recipe::{LEG, Recipe};
 use super::trainer::Trainer;
@@ -23,8 +24,8 @@ use crate::evaluation::{Outcome, Row, evaluate};
 use crate::scans::benchmark::{Benchmark, Conditions, FRAMES};
 use crate::scans::pictures::{Split, varied};
 use crate::scans::relief;
+use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scene;
-use begin::trainer;
 use checkpoint::Checkpoint;
 use comparison::{BENCHMARK, BenchmarkFigures};
 use curves::Point;
@@ -338,6 +339,21 @@ impl Run {
         self.material.note(&mut checkpoint);
         self.folder.save(&checkpoint)
     }
+}
+
+/// A trainer, with random weights, of a policy of `design` as `recipe` says, with its networks on `device`.
+fn trainer(
+    design: Design,
+    recipe: &Recipe,
+    scenery: Scenery,
+    seed: u64,
+    device: Device,
+) -> Result<Box<dyn Trainer>, TrainError> {
+    Ok(match (design, &recipe.dqn, &recipe.belief) {
+        (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
+        (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
+        _ => return Err(recipe.has_the_wrong_section()),
+    })
 }
 
 /// The scans that decide which weights are best:
