@@ -15,7 +15,6 @@ use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use parfocal_autofocus::belief::{Trace, spread_over_bins};
 use parfocal_autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
-use parfocal_autofocus::weights::{self, WeightsError};
 use parfocal_base::BlurRate;
 use parfocal_devices::simulation::normal::standard_normal;
 use parfocal_imaging::{View, WIDER};
@@ -151,10 +150,6 @@ impl Trainer for BeliefTrainer {
 
         self.actors = (0..self.recipe.scans).map(&mut draw).collect();
         self.memory = self.network.blank(self.recipe.scans, self.store.device());
-    }
-
-    fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
-        weights::load(&self.store, bytes)
     }
 
     fn update(&mut self) -> f64 {

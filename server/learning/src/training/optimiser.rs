@@ -126,7 +126,25 @@ impl Optimiser {
 
             self.steps += 1;
             let [squared, averaged] = &mut self.state;
-            apply(self.rule, self.steps, scale, &mut self.flat.values, &gradient, squared, averaged);
+            let variables = &mut self.flat.values;
+
+            match self.rule {
+                Rule::RmsProp { learning_rate, momentum } => {
+                    let _ = squared.lerp_(&gradient.square(), 0.01);
+                    let _ = averaged.g_mul_scalar_(momentum).addcmul_(&gradient, &inverse_root(squared, 1e-8));
+                    let _ = variables.g_sub_(&(&*averaged * (learning_rate * scale)));
+                }
+                Rule::Adam { learning_rate } => {
+                    let _ = squared.lerp_(&gradient.square(), 0.001);
+                    let _ = averaged.lerp_(&gradient, 0.1);
+                    let first = 1.0 - 0.9f64.powi(self.steps);
+                    let second = 1.0 - 0.999f64.powi(self.steps);
+
+                    // The step is averaged / first / sqrt(squared / second + epsilon²), with its factors combined.
+                    let rate = learning_rate * scale * second.sqrt() / first;
+                    let _ = variables.addcmul_(&(&*averaged * -rate), &inverse_root(squared, 1e-8 * second.sqrt()));
+                }
+            }
         });
     }
 
@@ -154,34 +172,6 @@ impl Optimiser {
         let [squared, averaged] = self.state.each_ref().map(|values| parts(values, &self.flat.variables));
         let both = squared.into_iter().zip(averaged).flat_map(<[Tensor; 2]>::from);
         both.enumerate().map(|(index, tensor)| (format!("optimiser.{index}"), tensor)).collect()
-    }
-}
-
-fn apply(
-    rule: Rule,
-    steps: i32,
-    scale: f64,
-    variables: &mut Tensor,
-    gradient: &Tensor,
-    squared: &mut Tensor,
-    averaged: &mut Tensor,
-) {
-    match rule {
-        Rule::RmsProp { learning_rate, momentum } => {
-            let _ = squared.lerp_(&gradient.square(), 0.01);
-            let _ = averaged.g_mul_scalar_(momentum).addcmul_(gradient, &inverse_root(squared, 1e-8));
-            let _ = variables.g_sub_(&(&*averaged * (learning_rate * scale)));
-        }
-        Rule::Adam { learning_rate } => {
-            let _ = squared.lerp_(&gradient.square(), 0.001);
-            let _ = averaged.lerp_(gradient, 0.1);
-            let first = 1.0 - 0.9f64.powi(steps);
-            let second = 1.0 - 0.999f64.powi(steps);
-
-            // The step is averaged / first / sqrt(squared / second + epsilon²), with its factors combined.
-            let rate = learning_rate * scale * second.sqrt() / first;
-            let _ = variables.addcmul_(&(&*averaged * -rate), &inverse_root(squared, 1e-8 * second.sqrt()));
-        }
     }
 }
 
