@@ -3,6 +3,7 @@
 use tch::{Device, Tensor};
 
 use super::replay::{Frames, Transition};
+use crate::training::recipe::dqn::{Bellman, Lookahead};
 use parfocal_autofocus::STEP;
 use parfocal_autofocus::learned::{action_step, scaled_focal_power};
 use parfocal_autofocus::networks::{ACTIONS, HISTORY};
@@ -51,16 +52,9 @@ fn reach(transition: &Transition) -> usize {
     usize::from(transition.age).min(HISTORY - 1)
 }
 
-/// Rewards for moving at all: the fields of [`crate::training::recipe::dqn::Target::Lookahead`].
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bonus {
-    pub restless: f64,
-    pub turning: f64,
-}
-
 /// What each action would gain over standing still at the frame after the last of `transitions`, in steps. Well out of
 /// focus, moving earns `bonus` besides: only a policy that moves finds out where to go.
-pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] {
+pub(super) fn gains(transitions: &[Transition], bonus: Lookahead) -> [f32; ACTIONS] {
     let Some(transition) = transitions.last() else { return [0.0; ACTIONS] };
     let stands = FocalPower::nearest(f64::from(transition.focal_power));
     let best = f64::from(transition.next_optimum);
@@ -92,16 +86,7 @@ fn heading(transitions: &[Transition]) -> f64 {
     changes.find(|change| change.abs() > 1e-6).unwrap_or(0.0)
 }
 
-/// How Bellman's equation is applied: the fields of [`crate::training::recipe::dqn::Target::Bellman`] that define the
-/// rewards.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Returns {
-    pub discount: f64,
-    pub steps: usize,
-    pub regret: bool,
-}
-
-impl Returns {
+impl Bellman {
     /// The discounted return of the frames from `at` to the state `steps` later, whose value is `next_value`.
     fn of(&self, transitions: &[Transition], at: usize, next_value: f64) -> f64 {
         let end = at + self.steps;
@@ -143,13 +128,13 @@ impl Returns {
 pub(super) type Targets = Vec<[Option<f32>; ACTIONS]>;
 
 /// The lookahead's targets: for each state the [`gains`] of all actions.
-pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Targets {
+pub(super) fn lookahead(batch: &Batch, bonus: Lookahead) -> Targets {
     batch.states.iter().map(|&at| gains(&batch.transitions[..=at], bonus).map(Some)).collect()
 }
 
 /// Bellman's targets: the value of the action taken, for each state whose successor `returns.steps` later is in the
 /// same scan and window. `next_values` holds the value of each state, by row.
-pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Targets {
+pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Bellman, window: usize) -> Targets {
     let mut row_of = vec![None; batch.transitions.len()];
     for (row, &at) in batch.states.iter().enumerate() {
         row_of[at] = Some(row);
@@ -202,7 +187,7 @@ mod tests {
 
     /// [`gains`] in thousandths of a step.
     fn gained(focal_powers: &[f32], next_optimum: f32, restless: f64, turning: f64) -> [i32; ACTIONS] {
-        gains(&transitions(focal_powers, next_optimum), Bonus { restless, turning })
+        gains(&transitions(focal_powers, next_optimum), Lookahead { restless, turning })
             .map(|gain| (1000.0 * gain).round() as i32)
     }
 
@@ -236,13 +221,13 @@ mod tests {
         let mut transitions = transitions(&[0.5, 0.55, 0.6], 0.6);
         transitions[0].next_optimum = 0.62;
         transitions[1].next_optimum = 0.5;
-        let plain = Returns { discount: 0.5, steps: 2, regret: false };
+        let plain = Bellman { discount: 0.5, steps: 2, double: false, regret: false };
         // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), plus a quarter of the last state's value.
         assert_eq!(rounded(plain.of(&transitions, 0, 4.0)), 8800);
 
         // An oracle that begins at 0.5 is 0.07, then 0.02 away from 0.62, and at the end 0. The result is in steps,
         // over the horizon of two frames.
-        let regret = Returns { regret: true, ..plain };
+        let regret = Bellman { regret: true, ..plain };
         assert_eq!(rounded(regret.of(&transitions, 0, 4.0)), 6000);
     }
 
@@ -261,7 +246,8 @@ mod tests {
         assert_eq!(batch.states, [0, 1, 2, 3, 4, 5, 6, 7]);
 
         let values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
-        let targets = bellman(&batch, &values, Returns { discount: 0.5, steps: 1, regret: false }, 4);
+        let returns = Bellman { discount: 0.5, steps: 1, double: false, regret: false };
+        let targets = bellman(&batch, &values, returns, 4);
         let told: Vec<_> = targets
             .iter()
             .map(|row| row.iter().enumerate().find_map(|(action, value)| value.map(|v| (action, rounded(v.into())))))

@@ -21,7 +21,7 @@ use super::run::checkpoint::{Checkpoint, CheckpointError};
 use super::trainer::{Trainer, drawn_with};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
-use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
+use batch::{Batch, Targets, bellman, lookahead, smooth_l1};
 use parfocal_autofocus::learned::{History, Input, action_step, best_action, scaled_focal_power};
 use parfocal_autofocus::networks::ACTIONS;
 use parfocal_autofocus::weights::{self, WeightsError, floats};
@@ -170,18 +170,18 @@ impl DqnTrainer {
     /// The targets for the batch's states. `values` (`[S, 3]`, row by row) are the online network's.
     fn targets(&self, batch: &Batch, values: &[f32]) -> Targets {
         match self.recipe.target {
-            Target::Lookahead { restless, turning } => lookahead(batch, Bonus { restless, turning }),
-            Target::Bellman { discount, steps, double, regret } => {
+            Target::Lookahead(bonus) => lookahead(batch, bonus),
+            Target::Bellman(returns) => {
                 let encodings = tch::no_grad(|| self.target.encode(&batch.frames));
                 let later = floats(&self.target.pass(batch, &encodings).values);
                 let later = later.as_chunks::<ACTIONS>().0;
                 let pickers = values.as_chunks::<ACTIONS>().0;
 
                 let next = |(row, values): (usize, &[f32; ACTIONS])| {
-                    values[best_action(if double { &pickers[row] } else { values })]
+                    values[best_action(if returns.double { &pickers[row] } else { values })]
                 };
                 let next: Vec<f32> = later.iter().enumerate().map(next).collect();
-                bellman(batch, &next, Returns { discount, steps, regret }, self.recipe.window)
+                bellman(batch, &next, returns, self.recipe.window)
             }
         }
     }
@@ -226,7 +226,7 @@ impl Trainer for DqnTrainer {
 
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
-        if matches!(self.recipe.target, Target::Bellman { .. }) {
+        if matches!(self.recipe.target, Target::Bellman(_)) {
             self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
         }
 

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use super::belief::BeliefRecipe;
-use super::dqn::{DqnRecipe, Target};
+use super::dqn::{Bellman, DqnRecipe, Lookahead, Target};
 use super::{LEG, Recipe};
 use crate::training::optimiser::Rule;
 use parfocal_autofocus::networks::HISTORY;
@@ -78,7 +78,7 @@ fn check_dqn(dqn: &DqnRecipe) -> Result<(), String> {
 
 fn check_target(dqn: &DqnRecipe) -> Result<(), String> {
     match dqn.target {
-        Target::Bellman { discount, steps, .. } => {
+        Target::Bellman(Bellman { discount, steps, .. }) => {
             // With a discount of 1, or almost 1, the values are not bounded by the rewards.
             within("dqn.target.discount", discount, 0.0..=0.9999)?;
 
@@ -93,7 +93,7 @@ fn check_target(dqn: &DqnRecipe) -> Result<(), String> {
             }
             within("dqn.target.steps", steps, 1..=most)
         }
-        Target::Lookahead { restless, turning } => {
+        Target::Lookahead(Lookahead { restless, turning }) => {
             within("dqn.target.restless", restless, 0.0..=1000.0)?;
             within("dqn.target.turning", turning, 0.0..=1.0)
         }

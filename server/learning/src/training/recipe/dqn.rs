@@ -6,35 +6,44 @@ use crate::training::optimiser::Rule;
 
 /// What the action values are fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Target {
-    /// Bellman's equation for the action taken: the rewards of `steps` frames plus the target network's value after
-    /// them.
-    Bellman {
-        /// Discount per frame.
-        discount: f64,
-        /// Frames whose rewards are summed.
-        steps: usize,
-        /// Double DQN: whether the online network chooses the next action that the target network values.
-        double: bool,
-        /// Whether rewards are measured in steps per frame, relative to what an oracle would get from the same place.
-        /// This is shaping by a potential (Ng, Harada, Russell 1999), so the best policy stays the same. Without it,
-        /// the distance to the optimum, which no policy can know, hides the small difference that an action makes.
-        #[serde(default)]
-        regret: bool,
-    },
+    /// Bellman's equation for the action taken: the rewards of some frames plus the target network's value after them.
+    Bellman(Bellman),
     /// What each of the three actions would have gained over standing still at the next frame, in steps. The simulation
     /// knows it for all three, not only for the action taken.
-    Lookahead {
-        /// Reward for moving at all while the picture is well out of focus, in steps. A policy that stands still does
-        /// not see on which side the optimum lies.
-        #[serde(default)]
-        restless: f64,
-        /// Share of that reward for a move that reverses the last one. Below 1, a policy that searches for the optimum
-        /// sweeps instead of trembling.
-        #[serde(default = "whole")]
-        turning: f64,
-    },
+    Lookahead(Lookahead),
+}
+
+/// How Bellman's equation is applied.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bellman {
+    /// Discount per frame.
+    pub discount: f64,
+    /// Frames whose rewards are summed.
+    pub steps: usize,
+    /// Double DQN: whether the online network chooses the next action that the target network values.
+    pub double: bool,
+    /// Whether rewards are measured in steps per frame, relative to what an oracle would get from the same place. This
+    /// is shaping by a potential (Ng, Harada, Russell 1999), so the best policy stays the same. Without it, the distance
+    /// to the optimum, which no policy can know, hides the small difference that an action makes.
+    #[serde(default)]
+    pub regret: bool,
+}
+
+/// Rewards for moving at all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lookahead {
+    /// Reward for moving at all while the picture is well out of focus, in steps. A policy that stands still does not
+    /// see on which side the optimum lies.
+    #[serde(default)]
+    pub restless: f64,
+    /// Share of that reward for a move that reverses the last one. Below 1, a policy that searches for the optimum
+    /// sweeps instead of trembling.
+    #[serde(default = "whole")]
+    pub turning: f64,
 }
 
 const fn whole() -> f64 {
