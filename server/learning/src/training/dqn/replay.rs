@@ -41,7 +41,7 @@ impl CompactView {
 }
 
 /// What was seen of many frames, in compact form: patches of 1024 bytes each, or scaled metrics. One list is empty.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Frames {
     /// All frames' patches.
     pub patches: Vec<u8>,
@@ -69,8 +69,7 @@ pub struct Replay {
 #[derive(Debug, Default)]
 struct Ring {
     transitions: Vec<Transition>,
-    patches: Vec<u8>,
-    metrics: Vec<f32>,
+    frames: Frames,
     /// Index of the oldest frame. Once the ring is full, the next frame replaces it.
     head: usize,
 }
@@ -87,10 +86,10 @@ impl Ring {
     /// filled costs no memory.
     fn reserve(&mut self, more: usize) {
         self.transitions.reserve_exact(more);
-        if self.metrics.is_empty() {
-            self.patches.reserve_exact(more * PIXELS);
+        if self.frames.metrics.is_empty() {
+            self.frames.patches.reserve_exact(more * PIXELS);
         } else {
-            self.metrics.reserve_exact(more);
+            self.frames.metrics.reserve_exact(more);
         }
     }
 }
@@ -120,10 +119,7 @@ impl Replay {
         let ring = &mut self.actors[actor];
         if ring.transitions.len() < capacity {
             ring.transitions.push(transition);
-            match seen {
-                CompactView::Patch(bytes) => ring.patches.extend_from_slice(bytes),
-                CompactView::Metric(metric) => ring.metrics.push(*metric),
-            }
+            ring.frames.push(seen);
             if ring.transitions.len() == 1 {
                 ring.reserve(capacity - 1);
             }
@@ -134,8 +130,8 @@ impl Replay {
         let at = ring.head;
         ring.transitions[at] = transition;
         match seen {
-            CompactView::Patch(bytes) => ring.patches[at * bytes.len()..(at + 1) * bytes.len()].copy_from_slice(bytes),
-            CompactView::Metric(metric) => ring.metrics[at] = *metric,
+            CompactView::Patch(bytes) => ring.frames.patches[at * PIXELS..][..PIXELS].copy_from_slice(bytes),
+            CompactView::Metric(metric) => ring.frames.metrics[at] = *metric,
         }
         ring.head = (at + 1) % capacity;
     }
@@ -154,8 +150,8 @@ impl Replay {
                 &name("age"),
                 transitions().flat_map(|transition| transition.age.to_le_bytes()).collect::<Vec<u8>>(),
             );
-            checkpoint.put_bytes(&name("patches"), &ring.patches);
-            checkpoint.put_floats(&name("metrics"), ring.metrics.iter().copied());
+            checkpoint.put_bytes(&name("patches"), &ring.frames.patches);
+            checkpoint.put_floats(&name("metrics"), ring.frames.metrics.iter().copied());
             checkpoint.notes.insert(name("head"), ring.head.to_string());
         }
     }
@@ -198,7 +194,7 @@ impl Replay {
                 },
             );
 
-            *ring = Ring { transitions: transitions.collect(), patches, metrics, head };
+            *ring = Ring { transitions: transitions.collect(), frames: Frames { patches, metrics }, head };
             if count > 0 {
                 ring.reserve(capacity - count);
             }
@@ -216,12 +212,12 @@ impl Replay {
     /// Appends the frames and transitions of `window` to the given lists.
     pub fn read(&self, window: Window, length: usize, frames: &mut Frames, transitions: &mut Vec<Transition>) {
         let ring = &self.actors[window.actor];
-        let patch = ring.patches.len() / ring.transitions.len().max(1);
+        let patch = ring.frames.patches.len() / ring.transitions.len().max(1);
         for offset in 0..length {
             let at = (ring.head + window.start + offset) % ring.transitions.len();
             transitions.push(ring.transitions[at]);
-            frames.patches.extend_from_slice(&ring.patches[at * patch..(at + 1) * patch]);
-            frames.metrics.extend(ring.metrics.get(at));
+            frames.patches.extend_from_slice(&ring.frames.patches[at * patch..][..patch]);
+            frames.metrics.extend(ring.frames.metrics.get(at));
         }
     }
 }
@@ -267,7 +263,7 @@ mod tests {
         let mut checkpoint = Checkpoint::default();
         replay.save(&mut checkpoint);
         // The checkpoint borrows the patches instead of copying them.
-        assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.actors[0].patches.as_ptr());
+        assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.actors[0].frames.patches.as_ptr());
         checkpoint.write(&folder.path().join("a")).unwrap();
         (replay, folder)
     }
@@ -296,9 +292,9 @@ mod tests {
 
             for (one, other) in replay.actors.iter().zip(&back.actors) {
                 assert_eq!((&one.transitions, one.head), (&other.transitions, other.head));
-                assert!(one.patches == other.patches && one.metrics == other.metrics);
+                assert_eq!(one.frames, other.frames);
             }
-            assert!(!patches || back.actors[1].patches.capacity() == 10 * PIXELS);
+            assert!(!patches || back.actors[1].frames.patches.capacity() == 10 * PIXELS);
         }
     }
 
