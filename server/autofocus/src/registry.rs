@@ -84,19 +84,22 @@ impl Registry {
         self.trying(name, summary, move || Ok(build()))
     }
 
-    /// Adds policy `name`, which `build` makes of weights that were checked before. While that fails nevertheless, for
-    /// example for want of memory, the policy is unavailable.
+    /// Adds policy `name`, which `build` makes of the `weights`, which were checked before. While that fails nevertheless,
+    /// for example for want of memory, the policy is unavailable.
     #[must_use]
     pub fn made_of_weights<E: Display>(
         self,
         name: &str,
         summary: &'static str,
-        build: impl Fn() -> Result<Box<dyn Policy>, E> + Send + Sync + 'static,
+        weights: Arc<[u8]>,
+        build: impl Fn(&[u8]) -> Result<Box<dyn Policy>, E> + Send + Sync + 'static,
     ) -> Self {
+        let hash = hex::encode(Sha256::digest(&weights));
         let of = PolicyName::new(name);
-        self.trying(name, summary, move || {
-            build().map_err(|error| PolicyError::Unavailable { name: of.clone(), reason: error.to_string() })
-        })
+        let made = move || {
+            build(&weights).map_err(|error| PolicyError::Unavailable { name: of.clone(), reason: error.to_string() })
+        };
+        self.trying(name, summary, made).identified(name, Some(hash))
     }
 
     /// Adds policy `name`, made by `build`, which may fail now and succeed later.
@@ -131,12 +134,6 @@ impl Registry {
             None => self.policies.push(new),
         }
         self
-    }
-
-    /// Records the hash of `bytes` as that of the weights of policy `name`.
-    #[must_use]
-    pub fn weighing(self, name: &str, bytes: &[u8]) -> Self {
-        self.identified(name, Some(hex::encode(Sha256::digest(bytes))))
     }
 
     /// Records `hash`, a SHA-256 in hexadecimal, as what identifies policy `name`.

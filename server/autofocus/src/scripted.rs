@@ -7,7 +7,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 use tch::{CModule, Kind, Tensor};
 
@@ -29,16 +28,13 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };
 
     match load(Path::new(path)) {
-        Ok(bytes) => {
-            let source = Arc::clone(&bytes);
-            registry.made_of_weights(name.as_str(), SUMMARY, move || build(&source)).weighing(name.as_str(), &bytes)
-        }
+        Ok(bytes) => registry.made_of_weights(name.as_str(), SUMMARY, bytes.into(), build),
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }
 }
 
 /// Reads the file, and tries the module on flat patches and on textured ones.
-fn load(path: &Path) -> Result<Arc<[u8]>, String> {
+fn load(path: &Path) -> Result<Vec<u8>, String> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let module = parse(&bytes).map_err(|reason| format!("{} is not TorchScript: {reason}", path.display()))?;
 
@@ -54,7 +50,7 @@ fn load(path: &Path) -> Result<Arc<[u8]>, String> {
         })?;
     }
 
-    Ok(bytes.into())
+    Ok(bytes)
 }
 
 /// Loads the module in `bytes` in evaluation mode. In training mode, layers such as dropout would act randomly.

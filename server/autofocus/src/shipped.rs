@@ -1,7 +1,6 @@
 //! The policies that ship with the program, and the use of weights that people trained themselves.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use super::belief::BeliefTracker;
 use super::learned::{Input, Learned};
@@ -80,9 +79,9 @@ pub fn design(name: &str) -> Option<Design> {
 #[must_use]
 pub fn with_shipped(registry: Registry) -> Registry {
     SHIPPED.iter().fold(registry, |registry, shipped| {
-        let Shipped { name, summary, design, weights } = shipped;
-        match build(*design, weights) {
-            Ok(_) => put(registry, name, summary, *design, Arc::from(*weights)),
+        let &Shipped { name, summary, design, weights } = shipped;
+        match build(design, weights) {
+            Ok(_) => registry.made_of_weights(name, summary, weights.into(), move |bytes| build(design, bytes)),
             Err(error) => registry.without(name, summary, &format!("{error}; replace them with undamaged weights")),
         }
     })
@@ -122,19 +121,13 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
         return Err(FolderError::Empty { folder: folder.to_owned(), names: names.join(", ") });
     }
 
-    there.into_iter().try_fold(registry, |registry, Shipped { name, summary, design, .. }| {
+    there.into_iter().try_fold(registry, |registry, &Shipped { name, summary, design, .. }| {
         let file = file_of(name);
         let unfit = |reason: String| FolderError::Unfit { file: file.clone(), reason };
         let bytes = std::fs::read(&file).map_err(|error| unfit(error.to_string()))?;
-        build(*design, &bytes).map_err(|error| unfit(error.to_string()))?;
-        Ok(put(registry, name, summary, *design, bytes.into()))
+        build(design, &bytes).map_err(|error| unfit(error.to_string()))?;
+        Ok(registry.made_of_weights(name, summary, bytes.into(), move |bytes| build(design, bytes)))
     })
-}
-
-/// Adds a policy whose weights were checked a moment ago.
-fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
-    let weights = Arc::clone(&bytes);
-    registry.made_of_weights(name, summary, move || build(design, &bytes)).weighing(name, &weights)
 }
 
 /// A policy of `design` with the weights in `bytes` (safetensors).

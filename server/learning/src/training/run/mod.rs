@@ -303,8 +303,8 @@ impl Run {
         let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
         let design = self.design;
         let name = PolicyName::new(&self.recipe.policy);
-        let registry =
-            Registry::default().made_of_weights(name.as_str(), "in training", move || shipped::build(design, &bytes));
+        let build = move |bytes: &[u8]| shipped::build(design, bytes);
+        let registry = Registry::default().made_of_weights(name.as_str(), "in training", bytes.into(), build);
 
         let outcomes = evaluate(&registry, &[name], scans, &|_| ()).map_err(|error| diverged(&error))?;
         outcomes.last().map(Outcome::row).ok_or_else(|| diverged(&"nothing was evaluated"))
