@@ -13,7 +13,7 @@ pub use settings::{ProcessSettings, Times};
 use std::sync::Arc;
 
 use self::command::Command;
-use self::pool::{Missing, Pool, Shared};
+use self::pool::{Pool, Shared};
 use self::process::Process;
 use super::{Decision, Fault, FieldOfView, Observation, Policy, PolicyError, Registry};
 use parfocal_base::{BlurRate, PolicyName};
@@ -48,23 +48,17 @@ fn prepare(text: &str, settings: &ProcessSettings) -> Result<(Pool, Option<Strin
     let pool = Pool::new(command, settings.clone()).map_err(|error| format!("no thread is left for it: {error}"))?;
 
     // It comes back at once: what counts is that there is one.
-    let tried = pool.take(settings.start, true).map_err(|missing| match missing {
-        Missing::Starting => format!("it was not ready within {} s", settings.start.as_secs()),
-        Missing::Failed(reason) => reason,
-    });
-    tried.map(|(process, shared)| shared.give_back(process, false))?;
+    let late = || format!("it was not ready within {} s", settings.start.as_secs());
+    let (process, shared) = pool.take(settings.start, true).map_err(|failed| failed.unwrap_or_else(late))?;
+    shared.give_back(process, false);
     Ok((pool, hash))
 }
 
 fn instance(pool: &Pool, name: &PolicyName) -> Result<External, PolicyError> {
-    let built = pool.take_for_instance();
-    built.map(|(process, shared)| External::new(process, shared)).map_err(|missing| {
-        let failed = match missing {
-            Missing::Starting => None,
-            Missing::Failed(reason) => Some(reason),
-        };
-        PolicyError::Starting { name: name.clone(), failed }
-    })
+    let starting = |failed| PolicyError::Starting { name: name.clone(), failed };
+    let (process, shared) = pool.take_for_instance().map_err(starting)?;
+    let wide = process.is_wide();
+    Ok(External { process: Some(process), shared, wide, blur: None, frames: 0, anew: true, fault: None })
 }
 
 /// An instance: it borrows a process.
@@ -80,11 +74,6 @@ struct External {
 }
 
 impl External {
-    fn new(process: Process, shared: Arc<Shared>) -> Self {
-        let wide = process.is_wide();
-        Self { process: Some(process), shared, wide, blur: None, frames: 0, anew: true, fault: None }
-    }
-
     fn time(&self) -> u64 {
         match self.shared.settings.times {
             Times::Clock => self.shared.settings.clock.now().as_nanos(),

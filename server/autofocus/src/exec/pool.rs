@@ -22,14 +22,9 @@ const LONGEST_BACKOFF: Duration = Duration::from_secs(10);
 /// A process that ran so long did not fail at its start.
 const SETTLED: Duration = Duration::from_secs(10);
 
-/// Why there is no process now.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Missing {
-    /// It is being started.
-    Starting,
-    /// The last start failed; another one follows.
-    Failed(String),
-}
+/// Why there is no process now: why the last start failed, after which another one follows; `None` if one is being
+/// started.
+pub type Missing = Option<String>;
 
 /// The processes. Dropping the pool ends those that nobody uses; the others end when they come back.
 pub struct Pool(Arc<Shared>);
@@ -126,7 +121,7 @@ impl Shared {
 
             let waited = clock.now().since(begun);
             if waited >= longest {
-                break Err(state.refused.clone().map_or(Missing::Starting, Missing::Failed));
+                break Err(state.refused.clone());
             }
 
             // The process of the instance before may be on its way back.
@@ -139,8 +134,8 @@ impl Shared {
             let rest = if coming { handover } else { longest }.saturating_sub(waited);
             state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
 
-            if let Some(reason) = state.refused.as_ref().filter(|_| once) {
-                break Err(Missing::Failed(reason.clone()));
+            if once && state.refused.is_some() {
+                break Err(state.refused.clone());
             }
         };
         state.waiting -= 1;

@@ -291,7 +291,8 @@ impl Output {
             let _printing: std::sync::mpsc::Sender<()> = printing;
             priority::lower();
             let Some(stdout) = stdout else { return };
-            for line in Lines(BufReader::new(stdout)) {
+            let mut stdout = BufReader::new(stdout);
+            while let Some(line) = next_line(&mut stdout) {
                 say(&line);
                 if !line.trim().is_empty() {
                     line.trim().clone_into(&mut kept.lock().unwrap_or_else(PoisonError::into_inner));
@@ -309,17 +310,11 @@ impl Output {
     }
 }
 
-/// Lines of text that need not be text, and need not end.
-struct Lines(BufReader<ChildStdout>);
-
-impl Iterator for Lines {
-    type Item = String;
-
-    fn next(&mut self) -> Option<String> {
-        let mut line = Vec::new();
-        match (&mut self.0).take(LONGEST_LINE).read_until(b'\n', &mut line) {
-            Ok(0) | Err(_) => None,
-            Ok(_) => Some(String::from_utf8_lossy(&line).trim_end_matches(['\n', '\r']).to_owned()),
-        }
+/// The next line of what need not be text, and need not end; `None` at the end.
+fn next_line(stdout: &mut BufReader<ChildStdout>) -> Option<String> {
+    let mut line = Vec::new();
+    match stdout.take(LONGEST_LINE).read_until(b'\n', &mut line) {
+        Ok(0) | Err(_) => None,
+        Ok(_) => Some(String::from_utf8_lossy(&line).trim_end_matches(['\n', '\r']).to_owned()),
     }
 }
