@@ -154,9 +154,8 @@ impl Trace {
     /// Takes in a frame with `view`, seen at `focal_power`, and returns the network's input for it.
     pub fn input(&mut self, view: &View, focal_power: f64) -> [f32; BELIEF_INPUT] {
         let focal_power = focal_power as f32;
-        let look = |patch: &Patch| Look::at(patch);
-        let wider = view.wider.each_ref().map(|patch| patch.as_ref().map(look));
-        let now = Box::new(Frame { near: look(&view.patch), wider, focal_power });
+        let wider = view.wider.each_ref().map(|patch| patch.as_ref().map(Look::at));
+        let now = Box::new(Frame { near: Look::at(&view.patch), wider, focal_power });
 
         let before = self.last.as_ref().unwrap_or(&now);
         let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;

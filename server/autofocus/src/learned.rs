@@ -9,8 +9,7 @@ use super::{Decision, FieldOfView, Observation, Policy, STEP, mgm, mlr};
 use parfocal_imaging::Patch;
 
 /// What a learned policy sees of each frame besides the focal power.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
     /// The mean gradient magnitude.
     Mgm,
