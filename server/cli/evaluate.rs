@@ -1,7 +1,6 @@
 //! `parfocal evaluate`: runs policies on the same focal-time scans, and shows the paper's table beside ours.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::ArgGroup;
@@ -13,16 +12,16 @@ use super::output::{Failure, bar, print};
 use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{FieldOfView, Registry, exec, scripted, shipped};
+use parfocal_base::PolicyName;
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
-use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::recorded::ScanFolder;
 use parfocal_devices::simulation::phantom::Trajectory;
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::evaluation::evaluate;
 use parfocal_learning::evaluation::report::EvaluatedScans;
 use parfocal_learning::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use parfocal_learning::evaluation::stacks::{BlurKnowledge, FIRST_SEED, SEEDS, evaluate_stacks};
+use parfocal_learning::evaluation::stacks::{Blur, FIRST_SEED, SEEDS, evaluate_stacks};
 use parfocal_learning::scans::ScanSet;
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
 use parfocal_learning::scans::detail::{warning, without_detail};
@@ -135,23 +134,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn unwritable(folder: &Path, error: &std::io::Error) -> String {
     format!("cannot write the results to {}: {error}", folder.display())
-}
-
-/// The blur rate that the policies are given.
-#[derive(Debug, Clone, Copy)]
-enum Blur {
-    /// The same rate for all scans.
-    Rate(BlurRate),
-    /// The rate measured on each focal stack.
-    Measured,
-}
-
-impl FromStr for Blur {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        if text == "measured" { Ok(Self::Measured) } else { text.parse().map(Self::Rate) }
-    }
 }
 
 /// The requested policies, each of which can run, and the registry that builds them.
@@ -280,14 +262,9 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let sources: Vec<StackSource> = named.map(|text| StackSource::parse(text, arguments.raw)).collect();
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
-    let knowledge = match arguments.blur {
-        None => BlurKnowledge::Nothing,
-        Some(Blur::Rate(rate)) => BlurKnowledge::Rate(rate),
-        Some(Blur::Measured) => BlurKnowledge::Measured,
-    };
 
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
-    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, knowledge, &|name| {
+    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, arguments.blur, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;

@@ -76,9 +76,9 @@ pub struct Reliance {
 impl Reliance {
     /// The reliance of several paths together; `None` if they have no claims.
     #[must_use]
-    pub fn of(paths: &[Path]) -> Option<Self> {
+    pub fn of<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<Self> {
         let mut all = Sureness::default();
-        for Sureness { claims, sure, right } in paths.iter().map(Path::sureness) {
+        for Sureness { claims, sure, right } in paths.into_iter().map(Path::sureness) {
             all.claims += claims;
             all.sure += sure;
             all.right += right;

@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -39,28 +40,34 @@ struct Item {
     blur: Option<BlurRate>,
 }
 
-/// Which blur rate of the optic the policies get.
+/// The blur rate of the optic that the policies are told.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum BlurKnowledge {
-    /// No rate.
-    Nothing,
-    /// This rate, for every stack.
+pub enum Blur {
+    /// The same rate for all scans.
     Rate(BlurRate),
-    /// The rate measured on each stack.
+    /// The rate measured on each focal stack.
     Measured,
 }
 
+impl FromStr for Blur {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "measured" { Ok(Self::Measured) } else { text.parse().map(Self::Rate) }
+    }
+}
+
 /// Makes [`SEEDS`] courses over `source` at each scale.
-fn items(source: &StackSource, first_seed: u64, knowledge: BlurKnowledge) -> Result<Vec<Item>, UnfitStack> {
+fn items(source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
-        let blur = match knowledge {
-            BlurKnowledge::Nothing => None,
-            BlurKnowledge::Rate(rate) => Some(rate),
-            BlurKnowledge::Measured => scaled.blur_rate(),
+        let blur = match blur {
+            None => None,
+            Some(Blur::Rate(rate)) => Some(rate),
+            Some(Blur::Measured) => scaled.blur_rate(),
         };
         Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur })
     };
@@ -136,7 +143,7 @@ pub fn evaluate_stacks(
     policies: &[PolicyName],
     sources: &[StackSource],
     seed: u64,
-    knowledge: BlurKnowledge,
+    blur: Option<Blur>,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
@@ -146,8 +153,7 @@ pub fn evaluate_stacks(
         }
     }
 
-    let items: Vec<Vec<Item>> =
-        sources.par_iter().map(|source| items(source, seed, knowledge)).collect::<Result<_, _>>()?;
+    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, blur)).collect::<Result<_, _>>()?;
     let mut stacks = Vec::new();
     let mut all = Vec::new();
 
@@ -178,11 +184,12 @@ pub enum StackReportError {
 
 /// The standing of `policy` over `stacks`, with each stack's `outcomes`; `None` if a row is missing.
 fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> Option<OverallRow> {
-    let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
-    let rows = |name| stacks.iter().map(|result| row(result, name)).collect::<Option<Vec<Row>>>();
+    let rows = |name: &str| -> Option<Vec<&Row>> {
+        stacks.iter().map(|result| result.rows.iter().find(|row| row.policy == name)).collect()
+    };
     let own = rows(policy)?;
     let strong = rows(STRONG_BASELINE)?;
-    let pairs: Vec<(Row, Row)> = own.iter().cloned().zip(rows(BASELINE)?).collect();
+    let pairs: Vec<(&Row, &Row)> = own.iter().copied().zip(rows(BASELINE)?).collect();
 
     let logs: Vec<f64> = pairs.iter().map(|(own, base)| (own.mae / base.mae).ln()).collect();
     let count = logs.len().max(1) as f64;
@@ -195,10 +202,9 @@ fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> 
         (logs.sum::<f64>() / count).exp()
     };
     let paths = outcomes.iter().flatten().filter(|outcome| outcome.policy == policy);
-    let paths: Vec<_> = paths.flat_map(|outcome| outcome.paths.iter().cloned()).collect();
 
     let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
-    let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
+    let turns = |which: fn(&(&Row, &Row)) -> f64| pairs.iter().map(which).sum::<f64>();
 
     Some(OverallRow {
         policy: policy.to_owned(),
@@ -211,7 +217,7 @@ fn standing(policy: &str, stacks: &[StackResult], outcomes: &[Vec<Outcome>]) -> 
         beside_bisection: (beside_strong / count).exp(),
         sharpness_kept: own.iter().map(|row| row.sharpness_kept).sum::<f64>() / count,
         delay: delay_of(ratio, late_ratio),
-        belief: Reliance::of(&paths),
+        belief: Reliance::of(paths.flat_map(|outcome| &outcome.paths)),
     })
 }
 
