@@ -140,9 +140,6 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
 
     if !folders.is_empty() {
         let bench = BenchScenes::read(&folders, arguments.raw)?;
-        for doubt in &bench.doubts {
-            tell(format_args!("note: {doubt}"));
-        }
         groups.push(if arguments.split == Purpose::Training { bench.training } else { bench.validation });
     }
 

@@ -10,6 +10,7 @@ use super::recorded::{Kept, RecordedScan};
 use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
 use super::stack::source::{StackSource, UnfitStack};
+use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{HEADER, ScanError, ScanFolder};
 use parfocal_imaging::PixelFormat;
 
@@ -30,8 +31,6 @@ pub struct BenchScenes {
     pub validation: Vec<Scene>,
     /// Folders kept for validation, as the caller named them.
     pub kept: Vec<String>,
-    /// Warnings about the pictures, as text for people.
-    pub doubts: Vec<String>,
     /// SHA-256 of all pictures as they are used, in hexadecimal.
     pub sha256: String,
 }
@@ -56,7 +55,7 @@ pub enum BenchError {
 impl BenchScenes {
     /// Reads the recordings in `folders`. Each is a recorded scan or a focal stack. For a stack, `DIR:PLANES` says how
     /// many planes make the range 0..=1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of
-    /// their length.
+    /// their length. Notes on standard error tell what is doubtful about the pictures.
     ///
     /// # Errors
     /// If a folder is missing, or what is in it cannot be used.
@@ -77,7 +76,10 @@ impl BenchScenes {
             folders.iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, folder)| folder.clone()).collect();
         let validation = if kept.is_empty() { training.clone() } else { scenes(true) };
 
-        Ok(Self { training, validation, kept, doubts, sha256: hex::encode(hash.finalize()) })
+        for doubt in doubts {
+            tell(format_args!("note: {doubt}"));
+        }
+        Ok(Self { training, validation, kept, sha256: hex::encode(hash.finalize()) })
     }
 }
 

@@ -269,10 +269,6 @@ fn bench(folders: &[String], raw: Option<PixelFormat>) -> Result<Option<(BenchSc
     }
 
     let scenes = BenchScenes::read(folders, raw)?;
-    for doubt in &scenes.doubts {
-        tell(format_args!("note: {doubt}"));
-    }
-
     match &scenes.kept[..] {
         [] => tell(format_args!(
             "note: validation uses the recordings that are trained on; with five or more, every fifth is kept for it"
