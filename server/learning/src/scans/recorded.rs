@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
 use crate::scans::clip::to_and_fro;
+use crate::scans::stack::cropped;
 use parfocal_autofocus::mgm;
 use parfocal_base::FocalPower;
 use parfocal_devices::camera::recorded::{Pose, ScanError, ScanFolder};
@@ -313,8 +314,7 @@ pub fn patch_at(picture: &GrayImage, area: PatchArea) -> Patch {
 /// What policies see of a gray picture with the patch at `area`: its patch has whole gray levels.
 fn gray_view(picture: &GrayImage, area: PatchArea) -> View {
     View::around(patch_at(picture, area), (area.x, area.y), (picture.width, picture.height), |Square { x, y, side }| {
-        let lines = picture.data.chunks_exact(picture.width).skip(y).take(side);
-        lines.flat_map(|line| line[x..x + side].iter().copied()).collect()
+        cropped(picture, (x, y), (side, side)).data
     })
 }
 
