@@ -21,9 +21,9 @@ use time::OffsetDateTime;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 
-use super::error::TlsError;
 use super::facts::{Facts, Permitted};
 use super::names::Names;
+use super::{TlsError, unreadable};
 use parfocal_base::files::{make_private, replace, replace_private};
 
 /// Name of the authority's folder in the data folder.
@@ -95,7 +95,12 @@ impl Authority {
     pub(super) fn load_or_create(data_dir: &Path, now: Timestamp) -> Result<Self, TlsError> {
         let folder = data_dir.join(FOLDER);
         let path = folder.join(FILE);
-        let unwritable = |source| TlsError::Unwritable { path: path.clone(), source };
+        let unwritable = |error| {
+            let path = path.display();
+            TlsError::File(format!(
+                "cannot keep the local authority in {path}: {error}; check the folder's permissions and free space"
+            ))
+        };
 
         let pem = match fs::read_to_string(&path) {
             Ok(pem) => {
@@ -110,7 +115,7 @@ impl Authority {
                 tracing::info!("made a local authority in {}", path.display());
                 pem
             }
-            Err(source) => return Err(TlsError::Unreadable { path, source }),
+            Err(error) => return Err(unreadable(&path, &error)),
         };
 
         let authority = Self::parse(&pem, &path)?;
@@ -120,7 +125,13 @@ impl Authority {
     }
 
     fn parse(pem: &str, path: &Path) -> Result<Self, TlsError> {
-        let damaged = |reason| TlsError::DamagedAuthority { path: path.to_owned(), reason };
+        let damaged = |reason: &str| {
+            TlsError::File(format!(
+                "the local authority in {} is damaged ({reason}); restore the file, or delete it to make a new authority, \
+                 which every tablet and laptop must then trust anew",
+                path.display()
+            ))
+        };
         let certificate =
             CertificateDer::from_pem_slice(pem.as_bytes()).map_err(|_| damaged("it holds no certificate"))?;
         let key = PrivateKeyDer::from_pem_slice(pem.as_bytes()).map_err(|_| damaged("it holds no private key"))?;
@@ -159,7 +170,12 @@ impl Authority {
     fn check(&self, now: Timestamp) -> Result<(), TlsError> {
         let Facts { from, until, .. } = self.facts;
         if now < from || now >= until {
-            return Err(TlsError::AuthorityNotValid { path: self.path.clone(), from, until, now });
+            return Err(TlsError::File(format!(
+                "the local authority in {} is valid from {from} to {until}, and this machine's clock says {now}; set the \
+                 clock if it is wrong, else delete the file to make a new authority, which every tablet and laptop must \
+                 then trust anew",
+                self.path.display()
+            )));
         }
         Ok(())
     }

@@ -15,8 +15,8 @@ use tokio_rustls::rustls::crypto::{CryptoProvider, ring};
 use tokio_rustls::rustls::server::{ClientHello, ResolvesServerCert};
 use tokio_rustls::rustls::sign::CertifiedKey;
 
+use super::TlsError;
 use super::authority::{Authority, PublicAuthority};
-use super::error::TlsError;
 use super::facts::Facts;
 use super::given::{Contents, Files};
 use super::names::Names;

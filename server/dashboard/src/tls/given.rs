@@ -10,9 +10,8 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::sign::CertifiedKey;
 use tokio_rustls::rustls::{Error as RustlsError, InconsistentKeys};
 
-use super::error::TlsError;
 use super::facts::Facts;
-use super::fitness;
+use super::{TlsError, fitness, unreadable};
 
 /// The two files of a given certificate.
 #[derive(Debug, Clone)]
@@ -43,33 +42,51 @@ impl Files {
         provider: &CryptoProvider,
         now: Timestamp,
     ) -> Result<(Arc<CertifiedKey>, Facts), TlsError> {
-        let path = || self.certificate.clone();
+        let file = self.certificate.display();
         check_marks(&self.certificate, &contents.certificate)?;
         check_marks(&self.key, &contents.key)?;
-        let chain: Vec<_> = CertificateDer::pem_slice_iter(&contents.certificate)
-            .collect::<Result<_, _>>()
-            .map_err(|_| TlsError::NoCertificate { path: path() })?;
-        let first = chain.first().ok_or_else(|| TlsError::NoCertificate { path: path() })?;
 
-        let unreadable = || TlsError::Unusable { path: path(), reason: "it cannot be read".into() };
-        let facts = Facts::read(first).ok_or_else(unreadable)?;
+        let none = || {
+            TlsError::File(format!(
+                "{file} holds no certificate; it must be in PEM form and begin with -----BEGIN CERTIFICATE-----"
+            ))
+        };
+        let chain: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&contents.certificate).collect();
+        let chain = chain.map_err(|_| none())?;
+        let first = chain.first().ok_or_else(none)?;
+
+        let facts = Facts::read(first).ok_or_else(|| self.unusable("it cannot be read"))?;
         let private = self.private_key(&contents.key)?;
         self.check_order(&chain, &private, provider)?;
 
         if let Some(reason) = fitness::unusable_key(first) {
-            return Err(TlsError::Unusable { path: path(), reason });
+            return Err(self.unusable(&reason));
         }
         if !fitness::is_for_servers(first) {
-            return Err(TlsError::NotForServers { path: path() });
+            return Err(TlsError::File(format!(
+                "the certificate in {file} is for clients or other purposes, so every browser refuses it; ask for one \
+                 whose extended key usage has server authentication"
+            )));
         }
-        if now >= facts.until {
-            return Err(TlsError::Expired { path: path(), until: facts.until });
+
+        let Facts { from, until, names } = &facts;
+        if now >= *until {
+            return Err(TlsError::File(format!(
+                "the certificate in {file} ended on {until}; renew it, or leave out --tls-certificate and --tls-key to \
+                 use a local authority"
+            )));
         }
-        if now < facts.from {
-            return Err(TlsError::NotYetValid { path: path(), from: facts.from, now });
+        if now < *from {
+            return Err(TlsError::File(format!(
+                "the certificate in {file} begins on {from}, and this machine's clock says {now}; set the clock, or wait"
+            )));
         }
-        if facts.names.hosts.is_empty() && facts.names.addresses.is_empty() {
-            return Err(TlsError::NoNames { path: path() });
+        // Browsers check no other names.
+        if names.hosts.is_empty() && names.addresses.is_empty() {
+            return Err(TlsError::File(format!(
+                "the certificate in {file} names no host in its subject alternative names, so every browser refuses it; \
+                 ask for one that names this machine"
+            )));
         }
 
         let key = CertifiedKey::from_der(chain, private, provider);
@@ -87,33 +104,56 @@ impl Files {
         let belongs = |certificate: &CertificateDer<'static>| {
             CertifiedKey::from_der(vec![certificate.clone()], private.clone_key(), provider).is_ok()
         };
-        let wrong = |problem: String| TlsError::WrongOrder { path: self.certificate.clone(), problem };
 
         // If the key belongs to none, or cannot be used, a later check reports it. That check also reports the key of
         // an authority beside a chain that is in order.
         let Some(place) = fitness::out_of_order(chain) else { return Ok(()) };
-        Err(wrong(match chain.iter().position(belongs) {
+        let problem = match chain.iter().position(belongs) {
             Some(own) if own > 0 => format!("the server's own, to which the key belongs, is number {}", own + 1),
             _ => format!("number {place} did not sign number {}", place - 1),
-        }))
+        };
+        Err(TlsError::File(format!(
+            "the certificates in {} are in the wrong order: {problem}; put the server's certificate first, then each \
+             one that signed the one before it",
+            self.certificate.display()
+        )))
     }
 
     fn private_key(&self, pem: &[u8]) -> Result<PrivateKeyDer<'static>, TlsError> {
+        let file = self.key.display();
         let text = String::from_utf8_lossy(pem);
         // The two forms of an encrypted key: PKCS #8, and OpenSSL's older form.
         if text.contains("BEGIN ENCRYPTED PRIVATE KEY") || text.contains("Proc-Type: 4,ENCRYPTED") {
-            return Err(TlsError::KeyNeedsPassphrase { path: self.key.clone() });
+            return Err(TlsError::File(format!(
+                "the private key in {file} is protected by a passphrase, which nobody could enter at a restart; remove \
+                 it with `openssl pkey -in FILE -out NEW`, and let only the server's account read the new file"
+            )));
         }
-        PrivateKeyDer::from_pem_slice(pem).map_err(|_| TlsError::NoKey { path: self.key.clone() })
+        PrivateKeyDer::from_pem_slice(pem).map_err(|_| {
+            TlsError::File(format!(
+                "{file} holds no private key; it must be in PEM form and begin with -----BEGIN PRIVATE KEY-----"
+            ))
+        })
     }
 
     fn not_usable(&self, error: &RustlsError) -> TlsError {
         match error {
-            RustlsError::InconsistentKeys(InconsistentKeys::KeyMismatch) => {
-                TlsError::OtherKey { key: self.key.clone(), certificate: self.certificate.clone() }
-            }
-            error => TlsError::Unusable { path: self.certificate.clone(), reason: error.to_string() },
+            RustlsError::InconsistentKeys(InconsistentKeys::KeyMismatch) => TlsError::File(format!(
+                "the private key in {} does not belong to the certificate in {}; give the key that the certificate was \
+                 requested with",
+                self.key.display(),
+                self.certificate.display()
+            )),
+            error => self.unusable(&error.to_string()),
         }
+    }
+
+    fn unusable(&self, reason: &str) -> TlsError {
+        TlsError::File(format!(
+            "the certificate in {} cannot be used: {reason}; ask for one with an RSA key of 2048 to 8192 bits, an ECDSA \
+             key on P-256 or P-384, or an Ed25519 key",
+            self.certificate.display()
+        ))
     }
 }
 
@@ -124,9 +164,12 @@ fn check_marks(path: &Path, contents: &[u8]) -> Result<(), TlsError> {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the byte order mark (BOM) of UTF-16",
         _ => return Ok(()),
     };
-    Err(TlsError::Marked { path: path.to_owned(), mark })
+    Err(TlsError::File(format!(
+        "{} begins with {mark}, and so cannot be read; save it again as plain text without it",
+        path.display()
+    )))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, TlsError> {
-    std::fs::read(path).map_err(|source| TlsError::Unreadable { path: path.to_owned(), source })
+    std::fs::read(path).map_err(|error| unreadable(path, &error))
 }

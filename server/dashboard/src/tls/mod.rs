@@ -7,13 +7,35 @@
 
 mod authority;
 mod certificates;
-mod error;
 mod facts;
 mod fitness;
 mod given;
 mod names;
 
+use std::path::Path;
+
 pub use authority::{FOLDER, PublicAuthority};
 pub use certificates::{Certificates, keep_current};
-pub use error::TlsError;
 pub use names::Names;
+
+/// Why the server has no certificate to show.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// A file cannot be used, or is not valid now: a sentence that says what to do.
+    #[error("{0}")]
+    File(String),
+    /// A certificate could not be made.
+    #[error("a certificate could not be made: {0}")]
+    Making(#[from] rcgen::Error),
+    /// TLS could not be set up.
+    #[error("TLS could not be set up: {0}")]
+    SettingUp(#[from] tokio_rustls::rustls::Error),
+}
+
+/// The error of a file that could not be read.
+fn unreadable(path: &Path, error: &std::io::Error) -> TlsError {
+    TlsError::File(format!(
+        "cannot read {}: {error}; check the path, and that the account of the server may read the file",
+        path.display()
+    ))
+}
