@@ -20,7 +20,6 @@ use tokio::time::timeout;
 use tower::ServiceExt;
 
 use super::permits::Permits;
-use super::shutdown::ended;
 use super::transport::Transport;
 
 /// Bytes that one connection may buffer in this process: about half a frame, so that a stream gets a new frame only
@@ -66,6 +65,11 @@ pub(super) async fn serve(listener: TcpListener, transport: Transport, mut shutd
             }
         }
     }
+}
+
+/// Waits until the server is asked to shut down.
+pub(super) async fn ended(shutdown: &mut watch::Receiver<bool>) {
+    let _ = shutdown.wait_for(|end| *end).await;
 }
 
 async fn serve_one(

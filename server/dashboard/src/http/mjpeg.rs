@@ -3,29 +3,23 @@
 //! The headers of the next part are sent directly after each frame. A browser shows a part only when it sees the end of
 //! it, so it would otherwise be a frame late.
 
-use std::time::Duration;
-
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt, stream};
-use tokio::time::sleep;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::admission::over;
+use super::connections::ended;
 use super::credentials::Pass;
 use super::error::Error;
 use super::people::SignedIn;
 use super::roles::Roles;
-use super::shutdown::ended;
-use super::tablets;
 use parfocal_imaging::Size;
 use parfocal_records::accounts::Token;
-
-/// Time between two looks at whether a sign-in has ended, as for a page.
-const SIGN_IN_CHECK: Duration = Duration::from_secs(5);
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
@@ -49,23 +43,9 @@ async fn mjpeg(
     Ok(([(CONTENT_TYPE, KIND)], Body::from_stream(parts)))
 }
 
-/// Waits until the sign-in with `token` has ended.
-async fn signed_out(app: &AppState, token: &Token) {
-    while !matches!(app.accounts.has_ended(token).await, Ok(true)) {
-        sleep(SIGN_IN_CHECK).await;
-    }
-}
-
 fn parts(app: AppState, pass: Option<Pass>, token: Option<Token>) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
-    let guard = AppState::clone(&app);
-    let over = async move {
-        match (pass, token) {
-            (Some(pass), _) => drop(tablets::no_longer_admitted(&guard, pass).await),
-            (None, Some(token)) => signed_out(&guard, &token).await,
-            (None, None) => std::future::pending().await,
-        }
-    };
+    let over = over(AppState::clone(&app), pass, token);
     let viewer = app.live.viewer(Size::Cell, false);
 
     let frames = stream::unfold((app, viewer), async |(app, mut viewer)| {

@@ -14,11 +14,11 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::admission::admit;
 use super::credentials::{Pass, cookie_name, holds, pass, set_cookie};
 use super::error::{Error, role_name};
 use super::keys::ROLES;
 use super::people::{Acting, Person};
-use super::tablets::admit;
 use super::{App, AppState};
 use parfocal_records::store::Access;
 use parfocal_trial::account::Account;

@@ -7,7 +7,6 @@
 //! `pace.rs` and `pictures.rs`), and what is sent next is the latest at that time. So no queue forms anywhere, however
 //! slow the link. A page that says it is hidden gets no frames.
 
-mod admission;
 mod audience;
 mod heartbeat;
 mod link;
@@ -30,6 +29,7 @@ use axum::extract::{Query, State};
 use axum::http::HeaderMap;
 use axum::http::header::USER_AGENT;
 use axum::response::Response;
+use futures_util::future::BoxFuture;
 use serde::Deserialize;
 use tokio::sync::watch;
 use tokio::time::timeout;
@@ -37,12 +37,12 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::admission::{Over, admit, over};
+use super::connections::ended;
 use super::credentials::Pass;
 use super::error::Error;
 use super::people::SignedIn;
 use super::roles::Roles;
-use super::shutdown::ended;
-use admission::Admission;
 use audience::{Audience, Journey};
 use heartbeat::Heartbeat;
 use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis, whole_tens};
@@ -96,10 +96,12 @@ async fn live(
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
     let browser = headers.get(USER_AGENT).and_then(|name| name.to_str().ok()).unwrap_or_default().to_owned();
     Ok(upgrade.on_upgrade(async move |socket| match role {
-        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, PageConnection::new(app, None, token)).await,
+        Role::Operator | Role::Researcher => {
+            attend::<ForOperator>(socket, PageConnection::new(app, pass, token, None)).await;
+        }
         Role::Surgeon | Role::System => {
             let tablet = app.tablets.enter(&browser, app.clock.now());
-            attend::<ForSurgeon>(socket, PageConnection::new(app, pass, None).of_tablet(tablet)).await;
+            attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(tablet))).await;
         }
     }))
 }
@@ -122,7 +124,10 @@ struct PageConnection<A: Audience> {
     app: AppState,
     pictures: Pictures,
     heartbeat: Heartbeat,
-    admission: Admission,
+    /// The link of a surgeon's page.
+    pass: Option<Pass>,
+    /// Resolves when the page may no longer stay.
+    over: BoxFuture<'static, Over>,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
     /// The depth maps, while the page wants them.
@@ -137,7 +142,7 @@ struct PageConnection<A: Audience> {
 }
 
 impl<A: Audience> PageConnection<A> {
-    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Self {
+    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>, tablet: Option<OpenTablet>) -> Self {
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
 
@@ -147,22 +152,17 @@ impl<A: Audience> PageConnection<A> {
         Self {
             pictures: Pictures::new(&app.live, A::LEADS, &app.clock),
             heartbeat: Heartbeat::new(app.clock.now()),
-            admission: Admission::new(&app, pass, token),
+            pass,
+            over: Box::pin(over(AppState::clone(&app), pass, token)),
             sessions,
             statuses,
             depth_maps: None,
             sent_status: None,
             shutdown: app.shutdown.clone(),
-            tablet: None,
+            tablet,
             next: None,
             app,
         }
-    }
-
-    /// The same desk, for a surgeon's tablet.
-    fn of_tablet(mut self, tablet: OpenTablet) -> Self {
-        self.tablet = Some(tablet);
-        self
     }
 
     /// Waits for the next message for the page. Never returns `Ok(None)`.
@@ -173,7 +173,10 @@ impl<A: Audience> PageConnection<A> {
 
         loop {
             let message = tokio::select! {
-                _ = &mut self.admission.over => Some(close(LINK_OVER, "the link is no longer valid")),
+                over = &mut self.over => Some(match over {
+                    Over::Link => close(LINK_OVER, "the link is no longer valid"),
+                    Over::SignIn => close(close_code::POLICY, "the sign-in has ended"),
+                }),
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
                 heard = socket.recv() => match heard {
                     Some(Ok(message)) => {
@@ -186,7 +189,7 @@ impl<A: Audience> PageConnection<A> {
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
                 // The first ping goes before the first picture: it then tells the round trip of an empty link.
-                _ = self.heartbeat.due.tick() => self.ping().await?,
+                _ = self.heartbeat.due.tick() => self.ping()?,
                 frame = self.pictures.next(), if self.heartbeat.has_begun() && self.pictures.may_send() => {
                     frame.and_then(|frame| self.picture(&frame))
                 }
@@ -242,7 +245,8 @@ impl<A: Audience> PageConnection<A> {
     }
 
     fn session(&mut self) -> Option<Message> {
-        if !self.admission.may_see_session(&self.app) {
+        // A page that may not see the session is about to be closed.
+        if self.pass.is_some_and(|pass| admit(&self.app, pass).is_err()) {
             return None;
         }
 
@@ -281,14 +285,9 @@ impl<A: Audience> PageConnection<A> {
         Some(Message::Binary(message))
     }
 
-    async fn ping(&mut self) -> Result<Option<Message>, PageGone> {
+    fn ping(&mut self) -> Result<Option<Message>, PageGone> {
         let (ping, beats) = self.heartbeat.ping(self.app.clock.now()).ok_or(PageGone)?;
         if beats {
-            if let Some(token) = &self.admission.token
-                && self.app.accounts.has_ended(token).await.unwrap_or(false)
-            {
-                return Ok(Some(close(close_code::POLICY, "the sign-in has ended")));
-            }
             self.next = tell(&ServerMessage::<&A::Session, &A::Status>::Beat);
         }
         Ok(Some(ping))
