@@ -87,7 +87,7 @@ async fn serve_one(
     let permit = Arc::new(permit);
 
     let opened = tokio::select! {
-        opened = timeout(HANDSHAKE_WITHIN, transport.open(stream, Arc::clone(&permit), BUFFER)) => opened,
+        opened = timeout(HANDSHAKE_WITHIN, transport.open(stream, BUFFER)) => opened,
         _ = &mut give_way => return,
         () = ended(&mut shutdown) => return,
     };

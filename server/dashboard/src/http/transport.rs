@@ -4,16 +4,11 @@
 //! browser that does not encrypt, which is redirected to the encrypted page on the same port.
 
 use std::io;
-use std::pin::Pin;
-use std::sync::Arc;
-use std::task::{Context, Poll};
 
 use axum::Router;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 use tokio_rustls::TlsAcceptor;
-
-use super::permits::Permit;
 
 /// The first byte of a TLS handshake (RFC 8446, 5.1); no method of HTTP begins with it.
 const HANDSHAKE: u8 = 22;
@@ -42,32 +37,20 @@ pub(super) struct ReadyConnection {
 impl Transport {
     /// Finds out which protocol `stream` speaks, and does the handshake. There is no time limit here. Encryption
     /// buffers at most `buffer` bytes.
-    pub(super) async fn open(
-        self,
-        stream: TcpStream,
-        permit: Arc<Permit>,
-        buffer: usize,
-    ) -> io::Result<ReadyConnection> {
+    pub(super) async fn open(self, stream: TcpStream, buffer: usize) -> io::Result<ReadyConnection> {
         let (tls, pages, plain) = match self {
-            Self::Plain { pages } => {
-                return Ok(ReadyConnection {
-                    line: Box::new(PermittedConnection { stream, _permit: permit }),
-                    http2: false,
-                    pages,
-                });
-            }
+            Self::Plain { pages } => return Ok(ReadyConnection { line: Box::new(stream), http2: false, pages }),
             Self::Encrypted { tls, pages, plain } => (tls, pages, plain),
         };
 
         let mut first = [0];
         let is_handshake = stream.peek(&mut first).await? == 1 && first[0] == HANDSHAKE;
-        let permitted = PermittedConnection { stream, _permit: permit };
         if !is_handshake {
-            return Ok(ReadyConnection { line: Box::new(permitted), http2: false, pages: plain });
+            return Ok(ReadyConnection { line: Box::new(stream), http2: false, pages: plain });
         }
 
         // A picture that waits in this buffer would be seen late.
-        let stream = tls.accept_with(permitted, |connection| connection.set_buffer_limit(Some(buffer))).await?;
+        let stream = tls.accept_with(stream, |connection| connection.set_buffer_limit(Some(buffer))).await?;
         let http2 = stream.get_ref().1.alpn_protocol() == Some(HTTP2);
         Ok(ReadyConnection { line: Box::new(stream), http2, pages })
     }
@@ -77,47 +60,3 @@ impl Transport {
 pub(super) trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
 
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
-
-/// A connection with its permit. It keeps the permit when it becomes a WebSocket.
-struct PermittedConnection {
-    stream: TcpStream,
-    _permit: Arc<Permit>,
-}
-
-impl PermittedConnection {
-    fn stream(self: Pin<&mut Self>) -> Pin<&mut TcpStream> {
-        Pin::new(&mut self.get_mut().stream)
-    }
-}
-
-impl AsyncRead for PermittedConnection {
-    fn poll_read(self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
-        self.stream().poll_read(cx, buffer)
-    }
-}
-
-impl AsyncWrite for PermittedConnection {
-    fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        self.stream().poll_write(cx, bytes)
-    }
-
-    fn poll_write_vectored(
-        self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        parts: &[io::IoSlice<'_>],
-    ) -> Poll<io::Result<usize>> {
-        self.stream().poll_write_vectored(cx, parts)
-    }
-
-    fn is_write_vectored(&self) -> bool {
-        self.stream.is_write_vectored()
-    }
-
-    fn poll_flush(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.stream().poll_flush(cx)
-    }
-
-    fn poll_shutdown(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.stream().poll_shutdown(cx)
-    }
-}

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, close_code};
-use axum::extract::{Query, State};
+use axum::extract::{Extension, Query, State};
 use axum::http::HeaderMap;
 use axum::http::header::USER_AGENT;
 use axum::response::Response;
@@ -42,6 +42,7 @@ use super::connections::ended;
 use super::credentials::Pass;
 use super::error::Error;
 use super::people::SignedIn;
+use super::permits::Permit;
 use super::roles::Roles;
 use audience::{Audience, Journey};
 use heartbeat::Heartbeat;
@@ -88,6 +89,7 @@ async fn live(
     SignedIn(person): SignedIn,
     Query(query): Query<LiveQuery>,
     headers: HeaderMap,
+    permit: Option<Extension<Arc<Permit>>>,
     upgrade: WebSocketUpgrade,
 ) -> Result<Response, Error> {
     let role = roles.choose(query.role)?;
@@ -95,13 +97,17 @@ async fn live(
     let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
     let browser = headers.get(USER_AGENT).and_then(|name| name.to_str().ok()).unwrap_or_default().to_owned();
-    Ok(upgrade.on_upgrade(async move |socket| match role {
-        Role::Operator | Role::Researcher => {
-            attend::<ForOperator>(socket, PageConnection::new(app, pass, token, None)).await;
-        }
-        Role::Surgeon | Role::System => {
-            let tablet = app.tablets.enter(&browser, app.clock.now());
-            attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(tablet))).await;
+    Ok(upgrade.on_upgrade(async move |socket| {
+        // It counts as a connection until the page has left.
+        let _permit = permit;
+        match role {
+            Role::Operator | Role::Researcher => {
+                attend::<ForOperator>(socket, PageConnection::new(app, pass, token, None)).await;
+            }
+            Role::Surgeon | Role::System => {
+                let tablet = app.tablets.enter(&browser, app.clock.now());
+                attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(tablet))).await;
+            }
         }
     }))
 }
