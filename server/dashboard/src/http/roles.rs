@@ -105,30 +105,32 @@ impl FromRequestParts<AppState> for SurgeonsTablet {
     }
 }
 
-/// The account of a request, if somebody is signed in whose account may make it as `role`.
-fn account_as(parts: &Parts, role: Role) -> Option<Account> {
-    let changes = !parts.method.is_safe();
+/// The account of a request, if somebody is signed in whose account may act as `role` and, if the request `changes`
+/// records, may change them.
+fn account_as(parts: &Parts, role: Role, changes: bool) -> Option<Account> {
     let person = parts.extensions.get::<Person>()?;
     person.account.role.may_act_as(role, changes).then(|| person.account.clone())
 }
 
+/// The proof that a request holds a role, by an account that may act as that role or by the role's key. `$changes`: an
+/// account must be one that may change records, if the request's method does.
 macro_rules! proof {
-    ($proof:ident) => {
+    ($proof:ident, $role:expr, $changes:literal) => {
         impl FromRequestParts<AppState> for $proof {
             type Rejection = Error;
 
             async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-                let account = account_as(parts, Role::$proof);
-                if account.is_some() || holds(&parts.headers, &app.keys, Role::$proof) {
+                let account = account_as(parts, $role, $changes && !parts.method.is_safe());
+                if account.is_some() || holds(&parts.headers, &app.keys, $role) {
                     Ok(Self(account))
                 } else {
-                    Err(Error::NeedsRole(Role::$proof))
+                    Err(Error::NeedsRole($role))
                 }
             }
         }
 
         impl Acting for $proof {
-            const ROLE: Role = Role::$proof;
+            const ROLE: Role = $role;
 
             fn account(&self) -> Option<&Account> {
                 self.0.as_ref()
@@ -137,31 +139,9 @@ macro_rules! proof {
     };
 }
 
-proof!(Operator);
-proof!(Researcher);
-
-impl FromRequestParts<AppState> for ResearchReader {
-    type Rejection = Error;
-
-    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-        let person = parts.extensions.get::<Person>();
-        let reads = |person: &&Person| person.account.role.may_act_as(Role::Researcher, false);
-        let account = person.filter(reads).map(|person| person.account.clone());
-        if account.is_some() || holds(&parts.headers, &app.keys, Role::Researcher) {
-            Ok(Self(account))
-        } else {
-            Err(Error::NeedsRole(Role::Researcher))
-        }
-    }
-}
-
-impl Acting for ResearchReader {
-    const ROLE: Role = Role::Researcher;
-
-    fn account(&self) -> Option<&Account> {
-        self.0.as_ref()
-    }
-}
+proof!(Operator, Role::Operator, true);
+proof!(Researcher, Role::Researcher, true);
+proof!(ResearchReader, Role::Researcher, false);
 
 impl FromRequestParts<AppState> for Roles {
     type Rejection = Error;
@@ -171,7 +151,9 @@ impl FromRequestParts<AppState> for Roles {
         let admitted = pass.map_or(Err(Error::NoRole), |pass| admit(app, pass));
         let shown = |role: &Role| match role {
             Role::Surgeon => admitted.is_ok(),
-            role => holds(&parts.headers, &app.keys, *role) || account_as(parts, *role).is_some(),
+            role => {
+                holds(&parts.headers, &app.keys, *role) || account_as(parts, *role, !parts.method.is_safe()).is_some()
+            }
         };
         let held: Vec<_> = ROLES.into_iter().filter(shown).collect();
         match admitted {
