@@ -17,10 +17,9 @@ use super::people::{PeerAddress, SignedIn, confirmed_lead, lead};
 use super::researcher::local;
 use super::roles::Researcher;
 use super::security::Nonce;
-use parfocal_records::accounts::{AccountError, Passphrase};
+use parfocal_records::accounts::Passphrase;
 use parfocal_records::store::AccountLine;
 use parfocal_trial::account::{Account, AccountChange, AccountName, AccountRole};
-use parfocal_trial::refusal::Refusal;
 
 #[derive(Template)]
 #[template(path = "accounts.html")]
@@ -108,8 +107,8 @@ async fn make(
     JsonBody(new): JsonBody<NewAccount>,
 ) -> Result<Json<Account>, Error> {
     let lead = confirmed_lead(&app, &by, Some(&new.passphrase), peer).await?;
-    let name = named(&new.account)?;
-    let first = chosen(&new.first_passphrase)?;
+    let name = AccountName::new(new.account.trim())?;
+    let first = Passphrase::new(&new.first_passphrase)?;
     Ok(Json(app.accounts.add(name, &new.display, new.role, first, Some(&lead.account)).await?))
 }
 
@@ -168,7 +167,7 @@ async fn change(
 
     let change = match wanted.change {
         WantedChange::Passphrase { first_passphrase } => {
-            app.accounts.replace_passphrase(&name, chosen(&first_passphrase)?, by).await?;
+            app.accounts.replace_passphrase(&name, Passphrase::new(&first_passphrase)?, by).await?;
             return Ok(Json(app.accounts.lines().await?));
         }
         WantedChange::Role { role } => AccountChange::Role(role),
@@ -178,18 +177,6 @@ async fn change(
     };
     app.accounts.change(&name, &change, by).await?;
     Ok(Json(app.accounts.lines().await?))
-}
-
-fn named(text: &str) -> Result<AccountName, Error> {
-    AccountName::new(text.trim()).map_err(refused)
-}
-
-fn chosen(text: &str) -> Result<Passphrase, Error> {
-    Passphrase::new(text).map_err(refused)
-}
-
-fn refused(refusal: Refusal) -> Error {
-    AccountError::from(refusal).into()
 }
 
 /// The routes of this file.

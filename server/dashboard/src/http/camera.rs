@@ -63,7 +63,7 @@ async fn record(app: &App, message: String) -> Result<(), Error> {
     let at = app.clock.now();
 
     let event = DeviceEvent { wall, at, device: "camera".into(), working, message };
-    app.store.device_event(&event).await.map_err(|error| Error::Storage(error.to_string()))
+    Ok(app.store.device_event(&event).await?)
 }
 
 /// The routes of this file.

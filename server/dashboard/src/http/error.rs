@@ -20,8 +20,9 @@ use parfocal_language::{Language, Message};
 use parfocal_records::accounts::AccountError;
 use parfocal_records::store::StoreError;
 use parfocal_session::conductor::ConductError;
-use parfocal_trial::refusal::RefusalKind;
+use parfocal_trial::refusal::{Refusal, RefusalKind};
 use parfocal_trial::role::Role;
+use parfocal_trial::study::refusal::StudyRefusal;
 
 /// The reason why a request was not done. The text is written for people.
 #[derive(Debug, Clone)]
@@ -183,6 +184,18 @@ impl From<ConductError> for Error {
     }
 }
 
+impl From<Refusal> for Error {
+    fn from(refusal: Refusal) -> Self {
+        ConductError::from(refusal).into()
+    }
+}
+
+impl From<StudyRefusal> for Error {
+    fn from(refusal: StudyRefusal) -> Self {
+        ConductError::from(refusal).into()
+    }
+}
+
 impl From<StoreError> for Error {
     fn from(error: StoreError) -> Self {
         Self::Storage(error.to_string())
@@ -197,7 +210,7 @@ impl From<AccountError> for Error {
             AccountError::TooMany { .. } => Self::TooMany(text),
             AccountError::Taken(_) | AccountError::ChooseAnother => Self::Conflict(text),
             AccountError::Unknown(_) => Self::NotFound(text),
-            AccountError::Refused(refusal) => ConductError::from(refusal).into(),
+            AccountError::Refused(refusal) => refusal.into(),
             AccountError::Storage(_) => Self::Storage(text),
         }
     }

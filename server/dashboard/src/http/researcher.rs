@@ -342,7 +342,7 @@ async fn unblind(
 ) -> Result<StatusCode, Error> {
     if app.conductor.study_of(id).await?.is_some() {
         let lead = confirmed_lead(&app, &by, passphrase.as_deref(), peer).await?;
-        let signature = Signature::of_account(lead, &reason).map_err(ConductError::from)?;
+        let signature = Signature::of_account(lead, &reason)?;
         app.conductor.unblind_in_emergency(by.actor(), id, signature, despite_outstanding).await?;
     } else {
         app.conductor.act(by.actor(), id, Action::Unblind { reason, despite_outstanding }).await?;

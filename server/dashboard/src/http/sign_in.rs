@@ -17,7 +17,7 @@ use super::json::JsonBody;
 use super::people::{PeerAddress, SignedIn};
 use super::roles::home;
 use super::security::Nonce;
-use parfocal_records::accounts::{AccountError, Passphrase};
+use parfocal_records::accounts::Passphrase;
 use parfocal_trial::account::{Account, AccountRole, SIGN_IN_LIMIT};
 use parfocal_trial::role::Role;
 
@@ -98,7 +98,7 @@ async fn sign_in(
     PeerAddress(peer): PeerAddress,
     JsonBody(wanted): JsonBody<SignIn>,
 ) -> Result<Response, Error> {
-    let chosen = wanted.new_passphrase.as_deref().map(Passphrase::new).transpose().map_err(AccountError::from)?;
+    let chosen = wanted.new_passphrase.as_deref().map(Passphrase::new).transpose()?;
     let (account, token) = app.accounts.sign_in(&wanted.name, &wanted.passphrase, chosen, peer).await?;
     // The log names nobody; the database records who it was.
     tracing::info!(role = page_role(account.role).name(), "somebody signed in");

@@ -19,7 +19,6 @@ use parfocal_base::priority;
 use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{BadCircle, Calibration, Circle, MosaicFrame, SpectrumSum};
 use parfocal_pipeline::control::ControlledFrame;
-use parfocal_session::conductor::ConductError;
 use parfocal_session::playback::PlaceSpectrum;
 use parfocal_trial::permission::{self, Request};
 use parfocal_trial::role::Role;
@@ -90,8 +89,7 @@ async fn spectra(
 
 /// Whether spectra may be seen now.
 fn check(app: &App) -> Result<(), Error> {
-    let checked = permission::check(Role::Operator, Request::SeeSpectra, app.current_session());
-    checked.map_err(|refusal| ConductError::from(refusal).into())
+    Ok(permission::check(Role::Operator, Request::SeeSpectra, app.current_session())?)
 }
 
 fn circles(places: &[LivePlace]) -> Result<Vec<Circle>, Error> {

@@ -14,7 +14,6 @@ use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::Researcher;
 use super::security::Nonce;
 use super::{AppState, now};
-use parfocal_session::conductor::ConductError;
 use parfocal_session::reports::{StudyDetail, StudyLine};
 use parfocal_trial::account::Account;
 use parfocal_trial::allocation::Order;
@@ -222,7 +221,7 @@ async fn plan_study(
     JsonBody(plan): JsonBody<PlanStudy>,
 ) -> Result<Json<StudyDetail>, Error> {
     let PlanStudy { definition, sites, reason } = plan;
-    let signature = signed(by.personally()?, &reason)?;
+    let signature = Signature::of_account(by.personally()?, &reason)?;
     let name = app.conductor.plan_study(Role::Researcher, definition, sites, signature).await?;
     Ok(Json(StudyDetail::read(app.conductor.studies(), name.as_str()).await?))
 }
@@ -264,14 +263,9 @@ async fn change_study(
         Change::Lock { .. } | Change::Unblind => confirmed_lead(&app, &by, wanted.passphrase.as_deref(), peer).await?,
         Change::Open { .. } | Change::Close | Change::Withdraw { .. } => by.personally()?,
     };
-    let signature = signed(account, &wanted.reason)?;
+    let signature = Signature::of_account(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;
     Ok(Json(StudyDetail::read(app.conductor.studies(), &name).await?))
-}
-
-/// The signature of a change by the person of `account`.
-fn signed(account: &Account, reason: &str) -> Result<Signature, Error> {
-    Signature::of_account(account, reason).map_err(|refusal| ConductError::from(refusal).into())
 }
 
 /// The routes of this file.

@@ -3,8 +3,8 @@
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
+use axum::http::HeaderMap;
 use axum::http::header::USER_AGENT;
-use axum::http::{HeaderMap, StatusCode};
 use axum::response::{Html, IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -69,11 +69,11 @@ async fn tried(
     State(app): State<AppState>,
     headers: HeaderMap,
     JsonBody(trial): JsonBody<TabletTrial>,
-) -> Result<(StatusCode, Json<bool>), Error> {
+) -> Json<bool> {
     let user_agent = headers.get(USER_AGENT).and_then(|agent| agent.to_str().ok()).unwrap_or_default().to_owned();
     let failing = trial.tried.iter().filter(|tried| !tried.works).map(|tried| tried.part).collect();
     app.tablet_trials.note(trial.device, TriedTablet { user_agent, at: app.clock.wall(), failing });
-    Ok((StatusCode::OK, Json(true)))
+    Json(true)
 }
 
 /// The routes of this file.
