@@ -2,20 +2,17 @@
 
 use askama::Template;
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Path, State};
-use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
-use axum::response::{Html, IntoResponse};
+use axum::response::{Html, Response};
 use jiff::Timestamp;
-use tokio::runtime::Handle;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::export::zip_download;
 use super::people::Acting;
 use super::roles::Researcher;
 use parfocal_records::store::Access;
-use parfocal_records::store::export::ZipStream;
 use parfocal_results::analysis::{
     Analysis, AnalysisError, Comparison, PolicySummary, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords,
     analyse, check, decimals, p_words,
@@ -154,21 +151,9 @@ async fn analysis_zip(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
-) -> Result<impl IntoResponse, Error> {
+) -> Result<Response, Error> {
     let analysis = looked_at(&app, &by, &study).await?;
-    let name = Analysis::folder_name(&study);
-    let (zip, bytes) = ZipStream::new(name.clone());
-
-    // On a separate thread: compressing would delay the streams.
-    tokio::task::spawn_blocking(move || {
-        if let Err(error) = Handle::current().block_on(analysis.into_zip(zip)) {
-            tracing::warn!(%study, %error, "the download of an analysis was cut off");
-        }
-    });
-
-    let disposition = format!("attachment; filename=\"{name}.zip\"");
-    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
-    Ok((headers, Body::from_stream(bytes)))
+    Ok(zip_download(Analysis::folder_name(&study), async move |zip| analysis.into_zip(zip).await))
 }
 
 /// The routes of this file.

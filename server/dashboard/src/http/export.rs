@@ -1,12 +1,15 @@
 //! Exports for the researcher's browser, and the data dictionary that describes them.
 
+use std::fmt::Display;
+
 use askama::Template;
 use axum::body::Body;
 use axum::extract::{Path, Query, State};
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
-use axum::response::{Html, IntoResponse};
+use axum::response::{Html, IntoResponse, Response};
 use serde::Deserialize;
 use tokio::runtime::Handle;
+use tokio::task::spawn_blocking;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -49,22 +52,29 @@ async fn zip(
     State(app): State<AppState>,
     Path(session): Path<SessionId>,
     Query(query): Query<ExportQuery>,
-) -> Result<impl IntoResponse, Error> {
-    let name = folder_name(session, query.unblinded);
+) -> Result<Response, Error> {
     let by = by.for_session(&app, session).await?;
     let export = Export::prepare(&app.access_log(by), session, query.unblinded).await?;
+    Ok(zip_download(folder_name(session, query.unblinded), async move |zip| export.into_zip(zip).await))
+}
+
+/// Answers with a ZIP file while `fill` fills it, with one folder in it. Both go by `name`.
+pub(super) fn zip_download<E: Display>(
+    name: String,
+    fill: impl AsyncFnOnce(ZipStream) -> Result<(), E> + Send + 'static,
+) -> Response {
     let (zip, bytes) = ZipStream::new(name.clone());
+    let disposition = format!("attachment; filename=\"{name}.zip\"");
 
     // On a separate thread: compressing would delay the streams.
-    tokio::task::spawn_blocking(move || {
-        if let Err(error) = Handle::current().block_on(export.into_zip(zip)) {
-            tracing::warn!(%session, %error, "an export was cut off");
+    spawn_blocking(move || {
+        if let Err(error) = Handle::current().block_on(fill(zip)) {
+            tracing::warn!(%error, "the download of {name} was cut off");
         }
     });
 
-    let disposition = format!("attachment; filename=\"{name}.zip\"");
     let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
-    Ok((headers, Body::from_stream(bytes)))
+    (headers, Body::from_stream(bytes)).into_response()
 }
 
 #[derive(Template)]

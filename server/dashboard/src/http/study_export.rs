@@ -1,22 +1,19 @@
 //! The export of a whole study for the researcher's browser: starts it, reports its progress, and sends the file.
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Path, State};
-use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
-use axum::response::IntoResponse;
+use axum::response::Response;
 use serde::Deserialize;
-use tokio::runtime::Handle;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::export::zip_download;
 use super::json::JsonBody;
 use super::people::Acting;
 use super::roles::{ResearchReader, Researcher};
 use parfocal_records::store::Access;
-use parfocal_records::store::export::ZipStream;
 use parfocal_results::study_export::{StudyExportError, StudyExportState, check};
 
 impl From<StudyExportError> for Error {
@@ -84,7 +81,7 @@ async fn study_export_zip(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
-) -> Result<impl IntoResponse, Error> {
+) -> Result<Response, Error> {
     let person = by.personally()?;
     let missing = || Error::NotFound("No export of this study is ready. Start one on the study's page.".to_owned());
     let made = app.study_exports.made(app.store.reader(), &study).await?;
@@ -99,19 +96,8 @@ async fn study_export_zip(
     }
 
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
-    let (zip, bytes) = ZipStream::new(name.clone());
-
-    // On a separate thread: compressing would delay the streams.
-    tokio::task::spawn_blocking(move || {
-        // This holds `made`, so its files stay until all of them are sent.
-        if let Err(error) = Handle::current().block_on(zip.send_folder(&made.folder)) {
-            tracing::warn!(%study, %error, "the download of a study's export was cut off");
-        }
-    });
-
-    let disposition = format!("attachment; filename=\"{name}.zip\"");
-    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
-    Ok((headers, Body::from_stream(bytes)))
+    // The closure holds `made`, so its files stay until all of them are sent.
+    Ok(zip_download(name, async move |zip| Box::pin(zip.send_folder(&made.folder)).await))
 }
 
 /// The routes of this file.
