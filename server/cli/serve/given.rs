@@ -114,36 +114,27 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     let keys = folder.as_ref().and_then(|_| problems.keep(Keys::load_or_create(&arguments.data_dir)));
     let certificates = problems.keep(certificates(arguments, folder.is_some(), clock));
 
-    match (folder, keys, certificates, calibration, library, camera, lens, listener, navigation) {
-        (
-            Some(folder),
-            Some(keys),
-            Some(certificates),
-            Some(calibration),
-            Some(library),
-            Some(camera),
-            Some(lens),
-            Some(listener),
-            Some(navigation),
-        ) if problems.0.is_empty() => {
-            let developer = Developer::new(&calibration);
-            let reconstructor = developer.reconstructor().clone();
-            let rig = Rig { camera, lens, reconstructor, registry, clock: Arc::clone(clock) };
-            let certificates = certificates.map(Arc::new);
-            Ok(Given {
-                folder,
-                keys,
-                certificates,
-                calibration,
-                developer,
-                library,
-                rig,
-                lens_info,
-                dynamics,
-                listener,
-                navigation,
-            })
-        }
+    // Without a problem, everything is there.
+    let given = || {
+        let calibration = calibration?;
+        let developer = Developer::new(&calibration);
+        let reconstructor = developer.reconstructor().clone();
+        Some(Given {
+            folder: folder?,
+            keys: keys?,
+            certificates: certificates?.map(Arc::new),
+            rig: Rig { camera: camera?, lens: lens?, reconstructor, registry, clock: Arc::clone(clock) },
+            calibration,
+            developer,
+            library: library?,
+            lens_info,
+            dynamics,
+            listener: listener?,
+            navigation: navigation?,
+        })
+    };
+    match given() {
+        Some(given) if problems.0.is_empty() => Ok(given),
         _ => Err(problems.into_failure()),
     }
 }
