@@ -3,7 +3,6 @@
 use std::io::{BufReader, BufWriter};
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use clap::builder::RangedU64ValueParser;
 
 use super::output::Failure;
@@ -22,36 +21,6 @@ use parfocal_learning::training::served::{Fleet, Shows, serve};
 /// Bytes that the pipes are read and written with at a time.
 const BUFFER: usize = 1 << 16;
 
-/// What a frame shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Observation {
-    /// The patch.
-    Patch,
-    /// The patch, and those at two coarser scales around it.
-    View,
-}
-
-/// What the scenes are for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Purpose {
-    /// To learn from.
-    Training,
-    /// To choose by.
-    Validation,
-    /// To report results: the scenes of the reference benchmark.
-    Test,
-}
-
-impl From<Purpose> for Split {
-    fn from(purpose: Purpose) -> Self {
-        match purpose {
-            Purpose::Training => Self::Training,
-            Purpose::Validation => Self::Validation,
-            Purpose::Test => Self::Test,
-        }
-    }
-}
-
 /// Arguments of `parfocal environment`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -69,7 +38,7 @@ pub struct Arguments {
     /// What the scenes are for: each purpose has drawn scenes of its own, and of five recordings or more every fifth is
     /// not for training. Footage is the same for all.
     #[arg(long, value_enum, default_value = "training")]
-    split: Purpose,
+    split: Split,
     /// Scenes of each kind to draw.
     #[arg(
         long, value_name = "N", default_value = "32",
@@ -82,7 +51,7 @@ pub struct Arguments {
     variety: f64,
     /// What is shown of a frame.
     #[arg(long, value_enum, default_value = "patch")]
-    observation: Observation,
+    observation: Shows,
     /// Environments side by side.
     #[arg(
         long, value_name = "N", default_value = "1",
@@ -104,12 +73,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scenery = scenery(arguments)?;
     let variety = Variety { share: arguments.variety };
-    let shows = match arguments.observation {
-        Observation::Patch => Shows::Patch,
-        Observation::View => Shows::View,
-    };
-
-    let mut fleet = Fleet::new(scenery, variety, shows, arguments.count, arguments.frames, arguments.seed);
+    let mut fleet =
+        Fleet::new(scenery, variety, arguments.observation, arguments.count, arguments.frames, arguments.seed);
     let requests = BufReader::with_capacity(BUFFER, std::io::stdin().lock());
     let answers = BufWriter::with_capacity(BUFFER, std::io::stdout().lock());
     Ok(serve(&mut fleet, requests, answers)?)
@@ -119,19 +84,18 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
     if !arguments.footage.is_empty() && !arguments.scans.iter().any(|scans| scans == "simulated") {
         return Err("--footage needs simulated scans; add simulated to --scans".into());
     }
-    if !arguments.footage.is_empty() && arguments.split != Purpose::Training {
+    if !arguments.footage.is_empty() && arguments.split != Split::Training {
         tell(format_args!("note: footage is the same for training, validation and test"));
     }
 
-    let split = Split::from(arguments.split);
     let mut groups: Vec<Vec<Scene>> = Vec::new();
     let mut folders = Vec::new();
 
     for scans in &arguments.scans {
         match scans.as_str() {
-            "simulated" => groups.push(flat(arguments, split)?),
+            "simulated" => groups.push(flat(arguments)?),
             "relief" => {
-                let scenes = relief::scenes(split, arguments.scenes)?;
+                let scenes = relief::scenes(arguments.split, arguments.scenes)?;
                 groups.push(scenes.into_iter().map(Scene::Stack).collect());
             }
             folder => folders.push(folder.to_owned()),
@@ -140,14 +104,14 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
 
     if !folders.is_empty() {
         let bench = BenchScenes::read(&folders, arguments.raw)?;
-        groups.push(if arguments.split == Purpose::Training { bench.training } else { bench.validation });
+        groups.push(if arguments.split == Split::Training { bench.training } else { bench.validation });
     }
 
     Scenery::evenly(groups).ok_or_else(|| "there is nothing to scan; name scans with --scans".into())
 }
 
 /// Scenes with everything at one distance.
-fn flat(arguments: &Arguments, split: Split) -> Result<Vec<Scene>, Failure> {
+fn flat(arguments: &Arguments) -> Result<Vec<Scene>, Failure> {
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);
@@ -156,7 +120,7 @@ fn flat(arguments: &Arguments, split: Split) -> Result<Vec<Scene>, Failure> {
     if arguments.footage.is_empty() {
         // Scans that are those of the reference benchmark are over its kind of pictures.
         let draw = if arguments.variety > 0.0 { varied } else { reference };
-        clips = draw(split, arguments.scenes)?;
+        clips = draw(arguments.split, arguments.scenes)?;
     }
     Ok(clips.into_iter().map(Scene::Flat).collect())
 }

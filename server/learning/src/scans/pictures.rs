@@ -12,13 +12,13 @@ use parfocal_imaging::GrayImage;
 const SIDE: usize = 480;
 
 /// What pictures are for. Each split has its own seeds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Split {
     /// To learn from.
     Training,
-    /// To choose the best learned policy.
+    /// To choose by.
     Validation,
-    /// To report results.
+    /// To report results: the scenes of the reference benchmark.
     Test,
 }
 

@@ -15,11 +15,11 @@ use parfocal_imaging::{PATCH_SIDE, Patch, WIDER};
 const PATCH_BYTES: usize = PATCH_SIDE * PATCH_SIDE;
 
 /// What an environment shows of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Shows {
     /// The patch.
     Patch,
-    /// The patch, and those at coarser scales around it.
+    /// The patch, and those at two coarser scales around it.
     View,
 }
 
