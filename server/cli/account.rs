@@ -8,7 +8,7 @@ use std::sync::Arc;
 use clap::{Args, Subcommand};
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_json};
 use super::wait::wait_for;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
@@ -129,7 +129,7 @@ async fn list(list: &List) -> Result<(), Failure> {
     let accounts = open(&list.folder.data_dir).await?;
     let all = accounts.all().await?;
     if list.json {
-        return print(&(serde_json::to_string(&all)? + "\n"));
+        return print_json(&all);
     }
     if all.is_empty() {
         return print("no accounts yet\n");

@@ -8,7 +8,7 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::named::without_systems_own;
-use super::output::{Failure, bar, print};
+use super::output::{Failure, bar, print, print_result};
 use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{FieldOfView, Registry, exec, scripted, shipped};
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .out
         .as_ref()
         .map_or(Ok(()), |folder| report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error)));
-    print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })?;
+    print_result(arguments.json, &report, || report.markdown())?;
     Ok(written?)
 }
 
@@ -274,7 +274,7 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
         report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error))?;
     }
 
-    print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })
+    print_result(arguments.json, &report, || report.markdown())
 }
 
 /// The requested policies, each once.

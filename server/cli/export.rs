@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::output::{Failure, Steps, print};
+use super::output::{Failure, Steps, print, print_json};
 use super::wait::wait_for;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::ids::SessionId;
@@ -59,7 +59,7 @@ async fn write(arguments: &Arguments) -> Result<(), Failure> {
 async fn write_session(access_log: &AccessLog, session: SessionId, arguments: &Arguments) -> Result<(), Failure> {
     let summary = export(access_log, session, &arguments.out, arguments.unblinded).await?;
     if arguments.json {
-        return print(&(serde_json::to_string(&summary)? + "\n"));
+        return print_json(&summary);
     }
     let kind = if summary.unblinded { "unblinded" } else { "blinded" };
     let practice = if summary.practice { ", practice" } else { "" };
@@ -96,7 +96,7 @@ pub fn join(sources: &[PackageSource], left_out: &[LeftOut], out: &Path, json: b
 /// Prints what a package holds.
 fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
     if json {
-        return print(&(serde_json::to_string(summary)? + "\n"));
+        return print_json(summary);
     }
     let kind = if summary.unblinded { "unblinded" } else { "blinded" };
     let left_out = match summary.left_out.len() {

@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 use parfocal_base::notices;
 
@@ -16,6 +17,16 @@ pub fn print(text: &str) -> Result<(), Failure> {
     out.write_all(text.as_bytes())
         .and_then(|()| out.flush())
         .map_err(|error| format!("cannot write to standard output: {error}").into())
+}
+
+/// Writes a command's result to standard output, as a line of JSON.
+pub fn print_json(result: &impl Serialize) -> Result<(), Failure> {
+    print(&(serde_json::to_string(result)? + "\n"))
+}
+
+/// Writes a command's result to standard output: as JSON if that was asked for, otherwise as `text`.
+pub fn print_result(json: bool, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), Failure> {
+    if json { print_json(result) } else { print(&text()) }
 }
 
 /// A progress bar over `total` poses that starts at `done`.

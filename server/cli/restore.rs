@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_json};
 use super::wait::wait_for;
 use parfocal_base::clock::SystemClock;
 use parfocal_records::store::backup::{self, Relation, Restored};
@@ -30,7 +30,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let restored = wait_for(backup::restore(&arguments.data_dir, &arguments.file, Arc::new(SystemClock)))??;
     if arguments.json {
-        return print(&(serde_json::to_string(&restored)? + "\n"));
+        return print_json(&restored);
     }
 
     let file = arguments.file.display();

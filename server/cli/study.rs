@@ -13,7 +13,7 @@ use rand_chacha::ChaCha12Rng;
 use super::export::join;
 use super::library::protocols;
 use super::named::without_systems_own;
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_result};
 use super::study_analysis;
 use super::wait::wait_for;
 use parfocal_autofocus::Registry;
@@ -214,17 +214,10 @@ async fn show(show: &Show) -> Result<(), Failure> {
         details.push(StudyDetail::of(&study));
     }
 
-    if show.json {
-        let json = match (&show.study, details.first()) {
-            (Some(_), Some(detail)) => serde_json::to_string(detail)?,
-            _ => serde_json::to_string(&details)?,
-        };
-        return print(&(json + "\n"));
-    }
-    match &show.study {
-        Some(_) => print(&details.iter().map(whole).collect::<String>()),
-        None if details.is_empty() => print("no studies yet\n"),
-        None => print(&details.iter().map(in_short).collect::<String>()),
+    match (&show.study, details.as_slice()) {
+        (Some(_), [detail]) => print_result(show.json, detail, || whole(detail)),
+        (None, []) if !show.json => print("no studies yet\n"),
+        (_, all) => print_result(show.json, &all, || all.iter().map(in_short).collect()),
     }
 }
 

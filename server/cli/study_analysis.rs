@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_json};
 use parfocal_base::notices;
 use parfocal_records::store::Reader;
 use parfocal_records::store::export::verify::Verdict;
@@ -51,7 +51,7 @@ pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
 
     if arguments.json {
-        return print(&(serde_json::to_string(&analysis)? + "\n"));
+        return print_json(&analysis);
     }
     let mut text = in_words(&analysis);
     if let Some((out, files)) = written {

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
 use super::named::without_systems_own;
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_result};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
@@ -103,7 +103,7 @@ fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
         .into_iter()
         .map(|folder| TrainedRun::read(folder))
         .collect::<Result<Vec<_>, _>>()?;
-    print(&if json { serde_json::to_string(&runs)? + "\n" } else { markdown(&runs) })
+    print_result(json, &runs, || markdown(&runs))
 }
 
 fn train(arguments: &Training) -> Result<(), Failure> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::{Failure, print};
+use super::output::{Failure, print_result};
 use super::wait::wait_for;
 use parfocal_records::store::export::verify::{Check, Verdict, is_export, verify};
 use parfocal_records::store::{Head, verify_database};
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         ("database", wait_for(verify_database(path, arguments.head.clone()))??)
     };
 
-    print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;
+    print_result(arguments.json, &checks, || checks.iter().map(line).collect())?;
 
     let failed = checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).count();
     if failed == 0 {

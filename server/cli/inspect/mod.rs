@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::named::without_systems_own;
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_json};
 use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let paths = without_systems_own(&arguments.paths);
     for path in &paths {
         match inspector.inspect(path) {
-            Ok(report) if arguments.json => print(&(serde_json::to_string(&report)? + "\n"))?,
+            Ok(report) if arguments.json => print_json(&report)?,
             Ok(report) => reports.push(report),
             Err(failure) if paths.len() == 1 => return Err(failure),
             Err(failure) => {

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::which::LensChoice;
-use crate::cli::output::{Failure, print};
+use crate::cli::output::{Failure, print_result};
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::files::replace;
 use parfocal_devices::camera::{self, CameraSettings};
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         save(folder, &report, &measured)?;
     }
 
-    print(&if arguments.which.json { serde_json::to_string(&report)? + "\n" } else { report.text() })
+    print_result(arguments.which.json, &report, || report.text())
 }
 
 impl Report {

@@ -5,7 +5,7 @@ mod measure;
 mod sweep;
 mod which;
 
-use super::output::{Failure, print};
+use super::output::{Failure, print, print_json};
 use parfocal_base::FocalPower;
 use which::{LensChoice, go};
 
@@ -57,7 +57,7 @@ fn info(which: &LensChoice) -> Result<(), Failure> {
     let mut lens = which.open()?;
     let info = lens.info()?;
     if which.json {
-        return print(&(serde_json::to_string(&info)? + "\n"));
+        return print_json(&info);
     }
 
     let temperature = info.temperature_celsius.map_or("unknown".into(), |celsius| format!("{celsius:.1} °C"));
@@ -75,7 +75,7 @@ fn set(target: FocalPower, which: &LensChoice) -> Result<(), Failure> {
     let mut lens = which.open_to_stay()?;
     let position = go(lens.as_mut(), target)?;
     if which.json {
-        return print(&(serde_json::to_string(&position)? + "\n"));
+        return print_json(&position);
     }
     print(&format!("focal power {:.4}, {:.3} dpt\n", position.focal_power, position.dioptre))
 }

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::which::{LensChoice, dioptre, go};
-use crate::cli::output::{Failure, print};
+use crate::cli::output::{Failure, print_result};
 use parfocal_base::FocalPower;
 use parfocal_base::files::replace;
 
@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.plot {
         save(path, &plot(&stops))?;
     }
-    print(&if arguments.which.json { serde_json::to_string(&stops)? + "\n" } else { table(&stops) })
+    print_result(arguments.which.json, &stops, || table(&stops))
 }
 
 fn measure(arguments: &Arguments) -> Result<Vec<Stop>, Failure> {

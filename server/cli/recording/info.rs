@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::view_info;
-use crate::cli::output::{Failure, print};
+use crate::cli::output::{Failure, print_result};
 use parfocal_recording::{AnyRecording, Header, Recording};
 
 /// Bytes per sample when four samples of 10 bit are packed into five bytes.
@@ -68,8 +68,7 @@ fn tell<I: Serialize>(
     describe: impl Fn(&I) -> String,
     damaged: &[String],
 ) -> Result<(), Failure> {
-    let text = if arguments.json { serde_json::to_string(info)? + "\n" } else { describe(info) };
-    print(&text)?;
+    print_result(arguments.json, info, || describe(info))?;
 
     match damaged {
         [] => Ok(()),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::cli::output::{Failure, bar, print};
+use crate::cli::output::{Failure, bar, print_result};
 use parfocal_base::files::replace;
 use parfocal_base::plot::{Axis, Plot};
 use parfocal_devices::camera::recorded::{Damage, Image, ScanFolder, poses};
@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()))?;
     }
 
-    print(&if arguments.json { serde_json::to_string(&info)? + "\n" } else { text(&info) })?;
+    print_result(arguments.json, &info, || text(&info))?;
 
     if let Some(damage) = damages.first() {
         let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
