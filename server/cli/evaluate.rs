@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::named::without_systems_own;
-use super::output::{Failure, bar, print, print_result};
+use super::output::{Failure, bar, bar_of_poses, print, print_result};
 use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{FieldOfView, Registry, exec, scripted, shipped};
@@ -363,7 +363,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     }
 
     let folder = ScanFolder::open(folder)?;
-    let bar = bar(folder.poses().len(), 0);
+    let bar = bar_of_poses(folder.poses().len());
     let scan = RecordedScan::read(&folder, kept, &|| bar.inc(1))?;
     bar.finish_and_clear();
 
@@ -371,7 +371,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
 }
 
 fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
-    let bar = bar(POSES, 0);
+    let bar = bar_of_poses(POSES);
     let trajectory = Trajectory::new(seed, POSES, HASTE);
     let scan = RecordedScan::phantom(&trajectory, seed, FOCAL_POWERS, kept, &|| bar.inc(1));
     bar.finish_and_clear();
@@ -403,9 +403,7 @@ fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
 }
 
 fn progress(total: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} scans, {eta} left: {msg}");
-    let bar = ProgressBar::new(total as u64);
-    style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+    bar(total as u64, "{bar:30} {pos}/{len} scans, {eta} left: {msg}")
 }
 
 #[cfg(test)]

@@ -29,18 +29,18 @@ pub fn print_result(json: bool, result: &impl Serialize, text: impl FnOnce() -> 
     if json { print_json(result) } else { print(&text()) }
 }
 
-/// A progress bar over `total` poses that starts at `done`.
-pub fn bar(total: usize, done: usize) -> ProgressBar {
-    let bar = steps(total, "poses").with_position(done as u64);
-    bar.reset_eta();
-    bar
+/// A progress bar over `total` items that looks as `template` says.
+pub fn bar(total: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::new(total);
+    match ProgressStyle::with_template(template) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
 }
 
-/// A progress bar over `total` items; `name` says what they are, in the plural.
-pub fn steps(total: usize, name: &str) -> ProgressBar {
-    let bar = ProgressBar::new(total as u64);
-    let style = ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {name}, {{eta}} left {{msg}}"));
-    style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+/// A progress bar over `total` poses.
+pub fn bar_of_poses(total: usize) -> ProgressBar {
+    bar(total as u64, "{bar:30} {pos}/{len} poses, {eta} left {msg}")
 }
 
 /// Progress of work that has several parts, on standard error: a bar on a terminal, otherwise one line per tenth of a
@@ -54,11 +54,7 @@ pub struct Steps {
 impl Steps {
     /// Nothing reported yet.
     pub fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(0);
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}, {eta} left");
-            style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
-        });
+        let bar = std::io::stderr().is_terminal().then(|| bar(0, "{bar:30} {pos}/{len} {msg}, {eta} left"));
         Self { bar, last: Mutex::new(("", 0)) }
     }
 

@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
 use super::named::without_systems_own;
-use super::output::{Failure, print, print_result};
+use super::output::{Failure, bar, print, print_result};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
@@ -117,7 +116,8 @@ fn train(arguments: &Training) -> Result<(), Failure> {
     }
 
     let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
-    let bar = bar(total, run.updates());
+    let bar = bar(total, "{bar:25} {pos}/{len} updates, {per_sec}, {eta} left: {msg}").with_position(run.updates());
+    bar.reset_eta();
     let mut validation = run.best();
 
     let mut tell_progress = |progress: &TrainingProgress| {
@@ -223,11 +223,4 @@ fn own_recipe(arguments: &Training) -> Result<Option<Recipe>, Failure> {
     }
 
     Ok(Some(recipe))
-}
-
-fn bar(total: u64, done: u64) -> ProgressBar {
-    let bar = ProgressBar::new(total).with_position(done);
-    bar.reset_eta();
-    let template = "{bar:25} {pos}/{len} updates, {per_sec}, {eta} left: {msg}";
-    ProgressStyle::with_template(template).map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
 }

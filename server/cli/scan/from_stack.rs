@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use sha2::{Digest, Sha256};
 
 use super::info;
-use crate::cli::output::{Failure, bar, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES};
 use parfocal_imaging::PixelFormat;
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         seed: arguments.seed,
     };
 
-    let progress = bar(cut.poses, 0);
+    let progress = bar_of_poses(cut.poses);
     from_stack(&even, &cut, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::cli::output::{Failure, bar, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::scans::recording::{Imported, import};
 
@@ -34,7 +34,7 @@ pub struct Arguments {
 /// If the pictures are not a scan, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let imported = Imported::look(&arguments.folder, arguments.bits, arguments.raw)?;
-    let progress = bar(imported.count(), 0);
+    let progress = bar_of_poses(imported.count());
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy().into_owned();
     let camera = arguments.camera.clone().unwrap_or(folder);
     import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;

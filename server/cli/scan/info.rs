@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::cli::output::{Failure, bar, print_result};
+use crate::cli::output::{Failure, bar_of_poses, print_result};
 use parfocal_base::files::replace;
 use parfocal_base::plot::{Axis, Plot};
 use parfocal_devices::camera::recorded::{Damage, Image, ScanFolder, poses};
@@ -78,7 +78,7 @@ struct Deviation {
 /// If there is no scan. If poses are missing or pictures are damaged, after reporting them.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scan = ScanFolder::open(&arguments.folder)?;
-    let progress = bar(scan.poses().len(), 0);
+    let progress = bar_of_poses(scan.poses().len());
     let poses: Vec<_> = scan.poses().values().collect();
     let checked: Vec<_> = poses.par_iter().map(|pose| scan.check(pose)).inspect(|_| progress.inc(1)).collect();
     progress.finish_and_clear();

@@ -10,7 +10,7 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
-use crate::cli::output::{Failure, bar, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{FORMAT, Header, MOST_POSES, PictureOrder, ScanRecording, VERSION};
@@ -63,7 +63,7 @@ pub struct Arguments {
 /// If something fails; the poses before it are kept.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let interrupt = Interrupt::listen("stopping after this pose".to_owned())?;
-    let progress = bar(arguments.poses, 0);
+    let progress = bar_of_poses(arguments.poses);
 
     let (mut source, header) = match &arguments.lens {
         None if arguments.camera == "phantom" => phantom(arguments),
