@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::RangedU64ValueParser;
 
+use super::input::number;
 use super::output::Failure;
 use parfocal_base::notices::tell;
 use parfocal_imaging::PixelFormat;
@@ -47,7 +48,7 @@ pub struct Arguments {
     scenes: u64,
     /// Share of the scans that vary in speed, blur, noise, exposure, lens and what else is in view, 0 to 1. At 0 they
     /// are those of the reference benchmark.
-    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = parse_share)]
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = number(0.0..=1.0))]
     variety: f64,
     /// What is shown of a frame.
     #[arg(long, value_enum, default_value = "patch")]
@@ -123,9 +124,4 @@ fn flat(arguments: &Arguments) -> Result<Vec<Scene>, Failure> {
         clips = draw(arguments.split, arguments.scenes)?;
     }
     Ok(clips.into_iter().map(Scene::Flat).collect())
-}
-
-fn parse_share(text: &str) -> Result<f64, String> {
-    let share = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
-    share.ok_or_else(|| format!("must be a number from 0 to 1, not '{text}'"))
 }

@@ -7,7 +7,7 @@ use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
-use super::named::without_systems_own;
+use super::input::without_systems_own;
 use super::output::{Failure, bar, bar_of_poses, print, print_result};
 use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;

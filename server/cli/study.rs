@@ -11,8 +11,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
 use super::export::join;
+use super::input::without_systems_own;
 use super::library::protocols;
-use super::named::without_systems_own;
 use super::output::{Failure, print, print_result};
 use super::study_analysis;
 use super::wait::wait_for;

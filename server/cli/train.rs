@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
+use super::input::without_systems_own;
 use super::interrupt::Interrupt;
-use super::named::without_systems_own;
 use super::output::{Failure, bar, print, print_result};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::SystemClock;

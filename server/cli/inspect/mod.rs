@@ -8,7 +8,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::named::without_systems_own;
+use super::input::without_systems_own;
 use super::output::{Failure, print, print_json};
 use parfocal_autofocus::{mgm, mlr};
 use parfocal_base::files::replace;

@@ -1,18 +1,22 @@
 //! `parfocal lens emulate`: emulates an Optotune Lens Driver 4, and its faults on request.
 
-use std::io::BufRead;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 
+use crate::cli::input::{hear_lines, number};
 use crate::cli::output::{Failure, print};
 use crate::cli::wait::wait_for;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::notices::tell;
 use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
 use parfocal_devices::lens::{LensDynamics, Optics};
+
+/// Temperatures that can be set, °C.
+const TEMPERATURES: RangeInclusive<f64> = -100.0..=200.0;
 
 const HELP: &str = "type what should happen, then Enter:
   unplug | plug-in | restart       pull its USB cable, plug it in, cut its power for a moment
@@ -51,7 +55,7 @@ pub struct Arguments {
         long,
         value_name = "CELSIUS",
         default_value = "25.5",
-        value_parser = parse_temperature,
+        value_parser = number(TEMPERATURES),
         allow_negative_numbers = true
     )]
     temperature: f64,
@@ -89,7 +93,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
-    let mut lines = typed_lines();
+    let (sender, mut lines) = mpsc::unbounded_channel();
+    hear_lines(move |line| sender.send(line).is_ok());
 
     loop {
         tokio::select! {
@@ -103,22 +108,6 @@ async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
     }
 }
 
-/// Lines typed until the terminal is closed. The thread ends with the process: reading a terminal
-/// cannot be interrupted.
-fn typed_lines() -> mpsc::UnboundedReceiver<String> {
-    let (sender, lines) = mpsc::unbounded_channel();
-
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                return;
-            }
-        }
-    });
-
-    lines
-}
-
 /// Carries out the command in `line`. Returns the answer, or the reason why it was not done.
 fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
     let words: Vec<_> = line.split_whitespace().collect();
@@ -128,7 +117,7 @@ fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
         ["restart"] => emulator.restart(),
         ["lens", "out"] => emulator.set_lens_present(false),
         ["lens", "in"] => emulator.set_lens_present(true),
-        ["temperature", celsius] => emulator.set_temperature(parse_temperature(celsius)?),
+        ["temperature", celsius] => emulator.set_temperature(number(TEMPERATURES)(celsius)?),
         ["latency", millis] => emulator.set_latency(parse_millis(millis)?),
         ["fault", name] => emulator.set_fault(name.parse::<Fault>()?),
         ["glitch", name] => emulator.glitch(name.parse::<Glitch>()?, 0, 1),
@@ -165,7 +154,7 @@ fn parse_firmware(text: &str) -> Result<u8, String> {
 }
 
 fn parse_millis(text: &str) -> Result<Duration, String> {
-    Ok(Duration::from_secs_f64(parse_within(text, 0.0, 10_000.0)? / 1000.0))
+    Ok(Duration::from_secs_f64(number(0.0..=10_000.0)(text)? / 1000.0))
 }
 
 /// A hysteresis given in dioptres, in the unit of [`Model`].
@@ -177,13 +166,4 @@ fn parse_play(text: &str) -> Result<f64, String> {
 fn parse_replies(text: &str) -> Result<usize, String> {
     let replies = text.parse().ok().filter(|replies| (1..=1000).contains(replies));
     replies.ok_or_else(|| format!("must be a number of replies from 1 to 1000, not '{text}'"))
-}
-
-fn parse_temperature(text: &str) -> Result<f64, String> {
-    parse_within(text, -100.0, 200.0)
-}
-
-fn parse_within(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (least..=most).contains(value));
-    value.ok_or_else(|| format!("must be a number from {least} to {most}, not '{text}'"))
 }

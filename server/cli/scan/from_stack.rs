@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use sha2::{Digest, Sha256};
 
 use super::info;
+use crate::cli::input::whole_number;
 use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES};
@@ -42,13 +43,13 @@ pub struct Arguments {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(3..=1000))]
     planes: Option<u16>,
     /// Width and height in pixels of the window that drifts over the stack.
-    #[arg(long, value_name = "N", default_value_t = 128, value_parser = parse_size)]
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = whole_number(LEAST_SIDE..=4096))]
     size: usize,
     /// Make the pictures smaller: average blocks of S x S pixels.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
     scale: u8,
     /// Number of poses.
-    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
+    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = whole_number(1..=MOST_POSES))]
     poses: usize,
     /// Seed of the walks of window and optimum.
     #[arg(long, value_name = "N", default_value_t = SEED)]
@@ -103,16 +104,4 @@ fn digest(stack: &FocalStack) -> String {
         plane.picture.data.iter().for_each(|level| hash.update(level.to_le_bytes()));
     }
     hex::encode(hash.finalize())
-}
-
-fn parse_size(text: &str) -> Result<usize, String> {
-    text.parse()
-        .ok()
-        .filter(|size| (LEAST_SIDE..=4096).contains(size))
-        .ok_or_else(|| "must be from 64 to 4096".to_owned())
-}
-
-fn parse_poses(text: &str) -> Result<usize, String> {
-    let inside = text.parse().ok().filter(|poses| (1..=MOST_POSES).contains(poses));
-    inside.ok_or_else(|| format!("must be from 1 to {MOST_POSES}"))
 }

@@ -1,7 +1,7 @@
 //! `parfocal scan record`: records from the phantom, held still at each pose, or from a bench of camera, lens and
 //! stepper.
 
-use std::io::{BufRead, IsTerminal};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
+use crate::cli::input::{hear_lines, whole_number};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_base::clock::SystemClock;
@@ -41,10 +42,10 @@ pub struct Arguments {
     #[arg(long, value_name = "COMMAND", requires = "lens")]
     stepper: Option<String>,
     /// Number of poses.
-    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
+    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = whole_number(1..=MOST_POSES))]
     poses: usize,
     /// Number of focal powers, evenly spaced over the range of the lens.
-    #[arg(long, value_name = "N", default_value_t = FOCAL_POWERS, value_parser = parse_powers)]
+    #[arg(long, value_name = "N", default_value_t = FOCAL_POWERS, value_parser = whole_number(2..=1001))]
     focal_powers: usize,
     /// Seed of the order of the focal powers, and of the whole simulation.
     #[arg(long, value_name = "N", default_value_t = SEED)]
@@ -160,15 +161,7 @@ fn asker(
     progress: ProgressBar,
 ) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
     let (sender, lines) = channel();
-
-    // The thread ends with the process: reading a terminal cannot be interrupted.
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                return;
-            }
-        }
-    });
+    hear_lines(move |line| sender.send(line).is_ok());
     let typed = std::io::stdin().is_terminal();
 
     move |pose| {
@@ -186,13 +179,4 @@ fn asker(
             }
         }
     }
-}
-
-fn parse_poses(text: &str) -> Result<usize, String> {
-    let inside = text.parse().ok().filter(|poses| (1..=MOST_POSES).contains(poses));
-    inside.ok_or_else(|| format!("must be from 1 to {MOST_POSES}"))
-}
-
-fn parse_powers(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|powers| (2..=1001).contains(powers)).ok_or_else(|| "must be from 2 to 1001".to_owned())
 }

@@ -1,0 +1,51 @@
+//! Shared by all commands: what people give to them, on the command line and by typing.
+
+use std::io::BufRead;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use parfocal_base::files::is_systems_own;
+use parfocal_base::notices::tell;
+
+/// Reads a whole number, which must be in `range`.
+pub fn whole_number(range: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("must be from {} to {}", range.start(), range.end()))
+    }
+}
+
+/// Reads a number, which must be in `range`.
+pub fn number(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("must be a number from {} to {}, not '{text}'", range.start(), range.end()))
+    }
+}
+
+/// Hands the lines that are typed to `take`, until the terminal is closed or `take` wants no more. Its thread ends with
+/// the process: reading a terminal cannot be interrupted.
+pub fn hear_lines(take: impl Fn(String) -> bool + Send + 'static) {
+    std::thread::spawn(move || {
+        let lines = std::io::stdin().lock().lines();
+        lines.map_while(Result::ok).all(take)
+    });
+}
+
+/// The `paths` without files that an operating system keeps beside people's own, such as `Thumbs.db`; standard error
+/// names each that is passed over. If there are no others, all of them: somebody means them.
+pub fn without_systems_own<P: AsRef<Path>>(paths: &[P]) -> Vec<&P> {
+    let is_own = |path: &&P| {
+        let path = path.as_ref();
+        path.is_file() && path.file_name().is_some_and(is_systems_own)
+    };
+    let (own, others): (Vec<&P>, Vec<&P>) = paths.iter().partition(is_own);
+    if others.is_empty() {
+        return own;
+    }
+
+    for path in own {
+        tell(format_args!("passed over: {}, a file of the operating system", path.as_ref().display()));
+    }
+    others
+}
