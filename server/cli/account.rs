@@ -8,8 +8,7 @@ use std::sync::Arc;
 use clap::{Args, Subcommand};
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 
-use super::output::{Failure, print, print_json};
-use super::wait::wait_for;
+use super::output::{Failure, print, print_json, wait_for};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};

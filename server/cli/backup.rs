@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::output::{Failure, print};
-use super::wait::wait_for;
+use super::output::{Failure, print, wait_for};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices;
 use parfocal_records::store::backup::{self, Backup};

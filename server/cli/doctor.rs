@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use jiff::tz::TimeZone;
 
-use super::output::{Failure, print};
-use super::wait::wait_for;
+use super::output::{Failure, print, wait_for};
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_dashboard::doctor::{Finding, Verdict, calibration, database, lens, machine, unreadable_calibration};
 use parfocal_devices::camera::calibration::read;

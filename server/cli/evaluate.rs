@@ -8,10 +8,11 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
 use super::input::without_systems_own;
+use super::library;
 use super::output::{Failure, bar, bar_of_poses, print, print_result};
 use super::policy_process;
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_autofocus::{FieldOfView, Registry, exec, scripted, shipped};
+use parfocal_autofocus::{FieldOfView, Registry, exec, scripted};
 use parfocal_base::PolicyName;
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
@@ -139,22 +140,12 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> String {
 /// The requested policies, each of which can run, and the registry that builds them.
 fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
     compute_on_this_thread();
-    let mut registry = Registry::standard();
+    let registry = library::policies(arguments.weights.as_deref(), arguments.blur_rate())?;
 
-    if let Some(folder) = &arguments.weights {
-        registry = shipped::with_folder(registry, folder)?;
-    }
-
-    match arguments.blur {
-        Some(Blur::Rate(rate)) => registry = registry.knowing(Some(rate)),
-        Some(Blur::Measured) if arguments.stacks.is_empty() => {
-            return Err(
-                "--blur measured works only with --stacks; for other scans give the pixels; `parfocal scan info` \
-                        shows them for a recorded scan"
-                    .into(),
-            );
-        }
-        Some(Blur::Measured) | None => {}
+    if matches!(arguments.blur, Some(Blur::Measured)) && arguments.stacks.is_empty() {
+        return Err("--blur measured works only with --stacks; for other scans give the pixels; `parfocal scan info` \
+             shows them for a recorded scan"
+            .into());
     }
 
     let policies = policies(&arguments.policies, &registry);
@@ -211,10 +202,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
         count,
         footage: arguments.footage.iter().map(|path| path.display().to_string()).collect(),
         between,
-        blur: match arguments.blur {
-            Some(Blur::Rate(rate)) => Some(rate.get()),
-            Some(Blur::Measured) | None => None,
-        },
+        blur: arguments.blur_rate().map(BlurRate::get),
         weights_folder: arguments.weights.as_ref().map(|folder| folder.display().to_string()),
         weights,
     };
@@ -252,6 +240,14 @@ fn read_shard(file: &Path) -> Result<(String, Shard), Failure> {
 impl Arguments {
     fn seed(&self) -> u64 {
         self.seed.unwrap_or(SEED)
+    }
+
+    /// The blur rate that was given; none if each stack's is measured.
+    const fn blur_rate(&self) -> Option<BlurRate> {
+        match self.blur {
+            Some(Blur::Rate(rate)) => Some(rate),
+            Some(Blur::Measured) | None => None,
+        }
     }
 }
 

@@ -25,7 +25,6 @@ mod study;
 mod study_analysis;
 mod train;
 mod verify;
-mod wait;
 
 use std::process::ExitCode;
 

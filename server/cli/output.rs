@@ -1,4 +1,4 @@
-//! Shared by all commands: how they fail, what they print, and the progress bar.
+//! Shared by all commands: how they fail and wait, what they print, and the progress bar.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
@@ -10,6 +10,15 @@ use parfocal_base::notices;
 
 /// A command's failure: one clear sentence that says what to do.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Runs `work`, such as a database query, to its end on this thread.
+///
+/// # Errors
+/// If the system refuses a resource that waiting needs, such as one more open file.
+pub fn wait_for<T>(work: impl Future<Output = T>) -> std::io::Result<T> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    Ok(runtime.block_on(work))
+}
 
 /// Writes a command's result to standard output.
 pub fn print(text: &str) -> Result<(), Failure> {

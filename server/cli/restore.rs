@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::output::{Failure, print, print_json};
-use super::wait::wait_for;
+use super::output::{Failure, print, print_json, wait_for};
 use parfocal_base::clock::SystemClock;
 use parfocal_records::store::backup::{self, Relation, Restored};
 

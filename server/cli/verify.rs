@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::{Failure, print_result};
-use super::wait::wait_for;
+use super::output::{Failure, print_result, wait_for};
 use parfocal_records::store::export::verify::{Check, Verdict, is_export, verify};
 use parfocal_records::store::{Head, verify_database};
 use parfocal_results::package::{check, is_package};

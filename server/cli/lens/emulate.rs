@@ -8,8 +8,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 
 use crate::cli::input::{hear_lines, number};
-use crate::cli::output::{Failure, print};
-use crate::cli::wait::wait_for;
+use crate::cli::output::{Failure, print, wait_for};
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::notices::tell;
 use parfocal_devices::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};

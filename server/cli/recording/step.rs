@@ -3,10 +3,11 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::cli::library::policies;
 use crate::cli::output::{Failure, print};
 use crate::cli::policy_process;
+use parfocal_autofocus::Registry;
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_autofocus::{Registry, shipped};
 use parfocal_base::files::replace;
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::calibration;
@@ -62,9 +63,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// All policies, `name` among them. A policy in another process gets frames at the recording's `rate`.
 fn registry(arguments: &Arguments, name: &PolicyName, rate: Option<f64>) -> Result<Registry, Failure> {
     compute_on_this_thread();
-    let mut registry = Registry::standard().knowing(arguments.blur);
-    if let Some(folder) = &arguments.weights {
-        registry = shipped::with_folder(registry, folder)?;
-    }
+    let registry = policies(arguments.weights.as_deref(), arguments.blur)?;
     Ok(policy_process::with_outside(registry, name, &policy_process::for_evaluation(rate)))
 }
