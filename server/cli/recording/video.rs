@@ -60,16 +60,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::read(&recording.calibration())?;
     let frames = chosen(arguments, &recording)?;
-    let mut developer =
-        SizedDeveloper { developer: Developer::new(&calibration), size: arguments.size.unwrap_or(Size::Cell) };
+    let mut developer = Developer::new(&calibration);
+    let size = arguments.size.unwrap_or(Size::Cell);
+    let mut develop = |mosaic: &MosaicFrame, picture: &mut RgbImage| {
+        developer.develop(mosaic, size, picture, &mut GrayImage::default());
+    };
 
     if let Some(format) = format {
         let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
-            save_video(&Video { file, format }, &recording, &frames, &mut developer)
+            save_video(&Video { file, format }, &recording, &frames, &mut develop)
         });
         made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
     } else {
-        save_pictures(arguments, &recording, &frames, &mut developer)?;
+        save_pictures(arguments, &recording, &frames, &mut develop)?;
     }
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
 }
@@ -122,18 +125,6 @@ fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Fa
     Ok(frames)
 }
 
-/// Develops mosaics into pictures for people.
-struct SizedDeveloper {
-    developer: Developer,
-    size: Size,
-}
-
-impl SizedDeveloper {
-    fn develop(&mut self, mosaic: &MosaicFrame, picture: &mut RgbImage) {
-        self.developer.develop(mosaic, self.size, picture, &mut GrayImage::default());
-    }
-}
-
 /// A video to write.
 struct Video<'a> {
     file: &'a Path,
@@ -145,7 +136,7 @@ fn save_video(
     video: &Video,
     recording: &Recording,
     frames: &[usize],
-    developer: &mut SizedDeveloper,
+    develop: &mut impl FnMut(&MosaicFrame, &mut RgbImage),
 ) -> Result<(), Failure> {
     let fps = recording.rate().map_or(25.0, |rate| rate.round().clamp(1.0, 1000.0));
     let rows = recording.rows();
@@ -162,7 +153,7 @@ fn save_video(
             continue;
         }
 
-        developer.develop(&recording.frame(frame)?, &mut picture);
+        develop(&recording.frame(frame)?, &mut picture);
         if encoder.is_none() {
             encoder = Some(Encoder(start_encoder(video, fps, &picture)?));
         }
@@ -222,7 +213,7 @@ fn save_pictures(
     arguments: &Arguments,
     recording: &Recording,
     frames: &[usize],
-    developer: &mut SizedDeveloper,
+    develop: &mut impl FnMut(&MosaicFrame, &mut RgbImage),
 ) -> Result<(), Failure> {
     let out = &arguments.out;
     fs::create_dir(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
@@ -232,7 +223,7 @@ fn save_pictures(
         let mosaic = recording.frame(frame)?;
         let (ending, written) = match arguments.pictures.unwrap_or(Pictures::Png) {
             Pictures::Png => {
-                developer.develop(&mosaic, &mut picture);
+                develop(&mosaic, &mut picture);
                 ("png", encode_png(&picture))
             }
             Pictures::Tiff => ("tiff", encode_tiff(&mosaic)),
