@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::now;
 use super::people::{PeerAddress, SignedIn, confirmed_lead, lead};
@@ -56,7 +56,7 @@ impl Page {
 /// The accounts, for leads.
 #[utoipa::path(get, path = "/researcher/accounts", tag = "accounts", responses(
     (status = 200, description = "The page", content_type = "text/html"),
-    (status = 403, description = "No lead is signed in", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in")))]
 async fn people_page(
     by: Researcher,
     SignedIn(person): SignedIn,
@@ -72,7 +72,7 @@ async fn people_page(
 /// All accounts, by name.
 #[utoipa::path(get, path = "/api/researcher/accounts", tag = "accounts", responses(
     (status = 200, body = Vec<AccountLine>),
-    (status = 403, description = "No lead is signed in", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in")))]
 async fn list(by: Researcher, State(app): State<AppState>) -> Result<Json<Vec<AccountLine>>, Error> {
     lead(&by)?;
     Ok(Json(app.accounts.lines().await?))
@@ -96,10 +96,10 @@ struct NewAccount {
 /// Makes an account. Its person chooses another passphrase at the first sign-in.
 #[utoipa::path(post, path = "/api/researcher/accounts", tag = "accounts", request_body = NewAccount, responses(
     (status = 200, body = Account),
-    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
-    (status = 409, description = "An account of this name or display name exists", body = ErrorBody),
-    (status = 422, description = "A name or passphrase is missing or malformed", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong"),
+    (status = 409, description = "An account of this name or display name exists"),
+    (status = 422, description = "A name or passphrase is missing or malformed"),
+    (status = 429, description = "Too many attempts failed")))]
 async fn make(
     by: Researcher,
     State(app): State<AppState>,
@@ -149,11 +149,11 @@ struct ChangeAccount {
 #[utoipa::path(post, path = "/api/researcher/accounts/{account}/changes", tag = "accounts",
     params(("account" = String, Path)), request_body = ChangeAccount, responses(
     (status = 200, body = Vec<AccountLine>),
-    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
-    (status = 404, description = "No such account", body = ErrorBody),
-    (status = 409, description = "The account is of the last lead who can sign in", body = ErrorBody),
-    (status = 422, description = "A passphrase is missing or malformed", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong"),
+    (status = 404, description = "No such account"),
+    (status = 409, description = "The account is of the last lead who can sign in"),
+    (status = 422, description = "A passphrase is missing or malformed"),
+    (status = 429, description = "Too many attempts failed")))]
 async fn change(
     by: Researcher,
     State(app): State<AppState>,

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::export::zip_download;
 use super::people::Acting;
 use super::roles::Researcher;
@@ -112,8 +112,8 @@ fn remarked(protocol: &ProtocolAnalysis) -> Vec<&parfocal_results::analysis::Ana
 #[utoipa::path(get, path = "/researcher/studies/{study}/analysis", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
-    (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
+    (status = 404, description = "No such study"),
+    (status = 409, description = "The study is not unblinded")))]
 async fn analysis_page(
     by: Researcher,
     State(app): State<AppState>,
@@ -131,8 +131,8 @@ async fn analysis_page(
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/analysis", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, body = Analysis),
-    (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
+    (status = 404, description = "No such study"),
+    (status = 409, description = "The study is not unblinded")))]
 async fn analysis(
     by: Researcher,
     State(app): State<AppState>,
@@ -145,8 +145,8 @@ async fn analysis(
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/analysis.zip", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
-    (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "The study is not unblinded", body = ErrorBody)))]
+    (status = 404, description = "No such study"),
+    (status = 409, description = "The study is not unblinded")))]
 async fn analysis_zip(
     by: Researcher,
     State(app): State<AppState>,

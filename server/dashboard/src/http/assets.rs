@@ -182,7 +182,7 @@ pub fn body(name: &str) -> Option<&'static [u8]> {
     responses(
         (status = 200, description = "The file"),
         (status = 304, description = "The browser's copy is current"),
-        (status = 404, description = "No such file", body = super::error::ErrorBody),
+        (status = 404, description = "No such file"),
     )
 )]
 async fn asset(

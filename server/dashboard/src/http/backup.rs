@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::{Acting, PeerAddress, confirmed_lead, lead};
 use super::roles::Researcher;
@@ -35,9 +35,9 @@ struct MakeBackup {
 /// Begins to make a backup in the background, and records that. If one is being made already, no other begins.
 #[utoipa::path(post, path = "/api/researcher/backup", tag = "accounts", request_body = MakeBackup, responses(
     (status = 200, body = BackupState),
-    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong", body = ErrorBody),
-    (status = 422, description = "The passphrase is missing", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong"),
+    (status = 422, description = "The passphrase is missing"),
+    (status = 429, description = "Too many attempts failed")))]
 async fn start_backup(
     by: Researcher,
     State(app): State<AppState>,
@@ -52,7 +52,7 @@ async fn start_backup(
 /// erased.
 #[utoipa::path(get, path = "/api/researcher/backup", tag = "accounts", responses(
     (status = 200, body = BackupState),
-    (status = 403, description = "No lead is signed in", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in")))]
 async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Json<BackupState>, Error> {
     let lead = lead(&by)?;
     let state = app.backups.state(app.store.reader(), &lead.account).await;
@@ -62,8 +62,8 @@ async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Jso
 /// The backup as a file for `parfocal restore`.
 #[utoipa::path(get, path = "/api/researcher/backup.db", tag = "accounts", responses(
     (status = 200, description = "The file", content_type = "application/vnd.sqlite3"),
-    (status = 403, description = "No lead is signed in", body = ErrorBody),
-    (status = 404, description = "The lead has no backup that is ready", body = ErrorBody)))]
+    (status = 403, description = "No lead is signed in"),
+    (status = 404, description = "The lead has no backup that is ready")))]
 async fn backup_file(by: Researcher, State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let lead = lead(&by)?;
     let made = app.backups.made(app.store.reader(), &lead.account).await?;

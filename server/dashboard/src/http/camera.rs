@@ -7,7 +7,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::roles::Operator;
 use super::{App, AppState};
@@ -35,10 +35,9 @@ struct Change {
 /// `/api/operator/camera` and the live status show the value that the camera then uses.
 #[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
     (status = 204, description = "The camera received the request"),
-    (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
-    (status = 422, description = "The value is outside the camera's bounds", body = ErrorBody),
-    (status = 507, description = "The camera received the request, but the log could not be written",
-        body = ErrorBody)))]
+    (status = 409, description = "The camera does not offer this setting now"),
+    (status = 422, description = "The value is outside the camera's bounds"),
+    (status = 507, description = "The camera received the request, but the log could not be written")))]
 async fn change(
     _: Operator,
     State(app): State<AppState>,

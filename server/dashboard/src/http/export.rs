@@ -14,7 +14,7 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::people::Acting;
 use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
@@ -45,8 +45,8 @@ struct ExportQuery {
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/export.zip", tag = "researcher",
     params(("session" = SessionId, Path), ExportQuery), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew")))]
 async fn zip(
     by: Researcher,
     State(app): State<AppState>,

@@ -25,7 +25,7 @@ use parfocal_trial::role::Role;
 /// The server's counters in the `OpenMetrics` text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", responses(
     (status = 200, description = "Counters", content_type = "application/openmetrics-text"),
-    (status = 403, description = "For operator and researcher", body = super::error::ErrorBody)))]
+    (status = 403, description = "For operator and researcher")))]
 async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoResponse, Error> {
     roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
     let mut text = String::new();

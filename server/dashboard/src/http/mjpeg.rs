@@ -28,7 +28,7 @@ const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\
 /// The live picture as an endless motion JPEG, one pixel per mosaic cell.
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
-    (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
+    (status = 403, description = "No role is held")))]
 async fn mjpeg(
     State(app): State<AppState>,
     roles: Roles,

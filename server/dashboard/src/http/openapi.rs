@@ -65,6 +65,8 @@ const WITH_BODY: [(&str, &str); 3] = [
     ("422", "The body is JSON, but not as described"),
 ];
 
+const JSON: &str = "application/json";
+
 /// Name of the security scheme for keys and tokens that programs send.
 const KEY: &str = "key";
 
@@ -120,6 +122,7 @@ pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String>
 fn complete(api: &mut utoipa::openapi::OpenApi) {
     for (path, item) in &mut api.paths.paths {
         for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
+            describe_failures(operation);
             for (status, words) in around(path, operation) {
                 let responses = &mut operation.responses.responses;
                 responses.entry(status.to_owned()).or_insert_with(|| RefOr::T(failure(words)));
@@ -164,11 +167,28 @@ fn around(path: &str, operation: &Operation) -> Vec<(&'static str, &'static str)
     statuses
 }
 
+/// Adds what a program gets to the failures that the handler of `operation` names.
+fn describe_failures(operation: &mut Operation) {
+    for (status, response) in &mut operation.responses.responses {
+        if let RefOr::T(failure) = response
+            && status.as_str() >= "400"
+            // A player that asked for a part that is not there reads no words.
+            && status != "416"
+            && failure.content.is_empty()
+        {
+            failure.content.insert(JSON.to_owned(), RefOr::T(error_body()));
+        }
+    }
+}
+
 /// A failure: JSON for a program, a page for a browser.
 fn failure(words: &str) -> Response {
-    let json = Content::new(Some(Ref::from_schema_name("ErrorBody")));
     let page = Content::default();
-    ResponseBuilder::new().description(words).content("application/json", json).content("text/html", page).build()
+    ResponseBuilder::new().description(words).content(JSON, error_body()).content("text/html", page).build()
+}
+
+fn error_body() -> Content {
+    Content::new(Some(Ref::from_schema_name("ErrorBody")))
 }
 
 /// The ways to authenticate for `operation`: as the role in its tags, or as any role if there is none.
@@ -186,7 +206,7 @@ fn shown_by(operation: &Operation) -> Vec<SecurityRequirement> {
     responses((status = 200, description = "OpenAPI 3.1")))]
 async fn openapi(_: Roles, Extension(document): Extension<Finished>) -> Result<impl IntoResponse, Error> {
     let text = document.get().cloned().ok_or(Error::Internal)?;
-    Ok(([(CONTENT_TYPE, "application/json")], text))
+    Ok(([(CONTENT_TYPE, JSON)], text))
 }
 
 /// The routes of this file.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::{Acting, SignedIn};
 use super::roles::{Operator, Roles};
@@ -162,8 +162,8 @@ async fn codes(app: &App) -> Result<Vec<String>, Error> {
 /// and only while it is paused or after an abort; that is recorded in the session.
 #[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
     (status = 204, description = "Done"),
-    (status = 404, description = "No such policy", body = ErrorBody),
-    (status = 409, description = "A session is under way, or the policy cannot run", body = ErrorBody)))]
+    (status = 404, description = "No such policy"),
+    (status = 409, description = "A session is under way, or the policy cannot run")))]
 async fn focus(
     by: Operator,
     State(app): State<AppState>,
@@ -181,9 +181,9 @@ async fn focus(
 /// setting is inspected whose protocol lets the surgeon point.
 #[utoipa::path(post, path = "/api/operator/patch", tag = "operator", request_body = NewChoice, responses(
     (status = 204, description = "The next frame is focused there"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The protocol or the state of the session does not allow it", body = ErrorBody),
-    (status = 422, description = "The place lies outside the picture", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The protocol or the state of the session does not allow it"),
+    (status = 422, description = "The place lies outside the picture")))]
 async fn patch(
     by: Operator,
     State(app): State<AppState>,
@@ -207,7 +207,7 @@ struct NewParticipant {
 
 /// Adds a participant; one that exists already stays as it is. Answers with all codes.
 #[utoipa::path(post, path = "/api/operator/participants", tag = "operator", request_body = NewParticipant, responses(
-    (status = 200, body = Vec<String>), (status = 422, description = "No such code", body = ErrorBody)))]
+    (status = 200, body = Vec<String>), (status = 422, description = "No such code")))]
 async fn add_participant(
     _: Operator,
     State(app): State<AppState>,
@@ -251,9 +251,9 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
 /// Prepares a session: draws its order, or takes the next place of its study's list, and waits for its start.
 #[utoipa::path(post, path = "/api/operator/sessions", tag = "operator", request_body = NewSession, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 404, description = "No such participant, protocol or study", body = ErrorBody),
-    (status = 409, description = "A session is under way, or the study allows no such session", body = ErrorBody),
-    (status = 422, description = "The study has no such site or protocol", body = ErrorBody)))]
+    (status = 404, description = "No such participant, protocol or study"),
+    (status = 409, description = "A session is under way, or the study allows no such session"),
+    (status = 422, description = "The study has no such site or protocol")))]
 async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
     match new.study {
         Some(StudyPlace { study, site }) => {
@@ -271,10 +271,10 @@ async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBo
 /// Advances the session; repeating an action changes nothing. Returns the session after the action.
 #[utoipa::path(post, path = "/api/operator/actions", tag = "operator", request_body = Act, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 403, description = "The action belongs to another role", body = ErrorBody),
-    (status = 404, description = "No such session or segment", body = ErrorBody),
-    (status = 422, description = "No reason was given", body = ErrorBody),
-    (status = 409, description = "The action does not fit the state of the session", body = ErrorBody)))]
+    (status = 403, description = "The action belongs to another role"),
+    (status = 404, description = "No such session or segment"),
+    (status = 422, description = "No reason was given"),
+    (status = 409, description = "The action does not fit the state of the session")))]
 async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     let by = by.for_session(&app, act.session).await?;
     app.conductor.act(by, act.session, act.action).await?;
@@ -284,9 +284,9 @@ async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<
 /// Records a participant's consent. Returns the session after that.
 #[utoipa::path(post, path = "/api/operator/consents", tag = "operator", request_body = NewConsent, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 404, description = "No such session"),
     (status = 422, description = "Something is missing, the day is in the future, or the protocol requires another \
-                                  version of the text", body = ErrorBody)))]
+                                  version of the text")))]
 async fn consent(
     by: Operator,
     State(app): State<AppState>,
@@ -307,7 +307,7 @@ struct Dismissal {
 /// Takes an ended session off the screens, so that the next can be prepared.
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 409, description = "The session is under way", body = ErrorBody)))]
+    (status = 409, description = "The session is under way")))]
 async fn dismiss(
     by: Operator,
     State(app): State<AppState>,

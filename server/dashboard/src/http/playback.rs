@@ -9,7 +9,7 @@ use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::people::Acting;
 use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
@@ -34,8 +34,8 @@ impl From<PlaybackError> for Error {
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionRecordings),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew")))]
 async fn recordings(
     by: Researcher,
     State(app): State<AppState>,
@@ -97,9 +97,9 @@ struct PictureQuery {
     params(FramePath, PictureQuery),
     responses(
     (status = 200, description = "The picture", content_type = "image/jpeg"),
-    (status = 404, description = "No such session, recording or frame", body = ErrorBody),
-    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody),
-    (status = 500, description = "The frame is damaged", body = ErrorBody)))]
+    (status = 404, description = "No such session, recording or frame"),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew"),
+    (status = 500, description = "The frame is damaged")))]
 async fn frame(
     by: Researcher,
     State(app): State<AppState>,
@@ -131,10 +131,10 @@ struct PlaceQuery {
     params(FramePath, PlaceQuery),
     responses(
     (status = 200, body = PlaceSpectrum),
-    (status = 404, description = "No such session, recording or frame, or it has no bands", body = ErrorBody),
-    (status = 409, description = "The session is not unblinded, or its participant withdrew", body = ErrorBody),
-    (status = 422, description = "No such place in the picture", body = ErrorBody),
-    (status = 500, description = "The frame is damaged", body = ErrorBody)))]
+    (status = 404, description = "No such session, recording or frame, or it has no bands"),
+    (status = 409, description = "The session is not unblinded, or its participant withdrew"),
+    (status = 422, description = "No such place in the picture"),
+    (status = 500, description = "The frame is damaged")))]
 async fn spectrum(
     by: Researcher,
     State(app): State<AppState>,

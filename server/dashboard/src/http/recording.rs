@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::roles::Operator;
 use parfocal_session::recorder::{RecordingStatus, StartError};
@@ -30,8 +30,8 @@ struct RecordingOrder {
 /// Starts or stops recording. Stopping again changes nothing. Answers with the new state of recording.
 #[utoipa::path(post, path = "/api/operator/recording", tag = "operator", request_body = RecordingOrder, responses(
     (status = 200, body = RecordingStatus),
-    (status = 409, description = "A recording is under way, or the camera has no mosaics", body = ErrorBody),
-    (status = 507, description = "The disk has no room, or cannot be written", body = ErrorBody)))]
+    (status = 409, description = "A recording is under way, or the camera has no mosaics"),
+    (status = 507, description = "The disk has no room, or cannot be written")))]
 async fn order(
     _: Operator,
     State(app): State<AppState>,

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::Acting;
 use super::roles::Researcher;
@@ -21,10 +21,10 @@ use parfocal_trial::erasure::NewErasure;
     params(("session" = SessionId, Path)),
     request_body = NewCorrection, responses(
     (status = 204, description = "Recorded"),
-    (status = 404, description = "No such session or record", body = ErrorBody),
+    (status = 404, description = "No such session or record"),
     (status = 409, description = "The session is under way, its participant withdrew, what a surgeon wrote cannot be \
-                                  corrected, or somebody has corrected the same meanwhile", body = ErrorBody),
-    (status = 422, description = "The correction does not fit the record, or no reason was given", body = ErrorBody)))]
+                                  corrected, or somebody has corrected the same meanwhile"),
+    (status = 422, description = "The correction does not fit the record, or no reason was given")))]
 async fn correct(
     by: Researcher,
     State(app): State<AppState>,
@@ -41,9 +41,9 @@ async fn correct(
     params(("session" = SessionId, Path)),
     request_body = NewErasure, responses(
     (status = 204, description = "Erased"),
-    (status = 404, description = "No such session or record", body = ErrorBody),
-    (status = 409, description = "A session is under way, or the record has no words", body = ErrorBody),
-    (status = 422, description = "No reason was given", body = ErrorBody)))]
+    (status = 404, description = "No such session or record"),
+    (status = 409, description = "A session is under way, or the record has no words"),
+    (status = 422, description = "No reason was given")))]
 async fn erase(
     by: Researcher,
     State(app): State<AppState>,
@@ -69,10 +69,9 @@ struct EraseAll {
     params(("session" = SessionId, Path)),
     request_body = EraseAll, responses(
     (status = 204, description = "Erased"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The participant has not withdrawn, a session is under way, or no words are left",
-     body = ErrorBody),
-    (status = 422, description = "No reason was given", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The participant has not withdrawn, a session is under way, or no words are left"),
+    (status = 422, description = "No reason was given")))]
 async fn erase_all(
     by: Researcher,
     State(app): State<AppState>,
@@ -97,9 +96,9 @@ struct Withdraw {
     params(("session" = SessionId, Path)),
     request_body = Withdraw, responses(
     (status = 204, description = "Withdrawn"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The session is under way", body = ErrorBody),
-    (status = 422, description = "No reason was given", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The session is under way"),
+    (status = 422, description = "No reason was given")))]
 async fn withdraw(
     by: Researcher,
     State(app): State<AppState>,

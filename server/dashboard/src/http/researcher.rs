@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::{Researcher, Roles};
@@ -207,7 +207,7 @@ pub(super) fn day_and_time(at: &Timestamp) -> String {
 #[utoipa::path(get, path = "/researcher/sessions/{session}", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
-    (status = 404, description = "No such session", body = ErrorBody)))]
+    (status = 404, description = "No such session")))]
 async fn session_page(
     by: Researcher,
     SignedIn(person): SignedIn,
@@ -240,7 +240,7 @@ async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<Ses
 /// One session in detail; with its policies once it is unblinded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
-    (status = 200, body = SessionDetail), (status = 404, description = "No such session", body = ErrorBody)))]
+    (status = 200, body = SessionDetail), (status = 404, description = "No such session")))]
 async fn session(
     by: Researcher,
     State(app): State<AppState>,
@@ -253,8 +253,8 @@ async fn session(
 /// One session over time, without its focal path.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/course", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
-    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The participant withdrew", body = ErrorBody)))]
+    (status = 200, body = Timeline), (status = 404, description = "No such session"),
+    (status = 409, description = "The participant withdrew")))]
 async fn course(
     by: Researcher,
     State(app): State<AppState>,
@@ -268,8 +268,8 @@ async fn course(
 /// One session over time with its focal path. The path may tell policies apart, so each access is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
-    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The participant withdrew", body = ErrorBody)))]
+    (status = 200, body = Timeline), (status = 404, description = "No such session"),
+    (status = 409, description = "The participant withdrew")))]
 async fn timeline(
     by: Researcher,
     State(app): State<AppState>,
@@ -295,7 +295,7 @@ struct ChainHead {
 /// The head of the chain. A note of it can later prove that nothing recorded before it was changed.
 #[utoipa::path(get, path = "/api/chain/head", tag = "service", responses(
     (status = 200, body = ChainHead),
-    (status = 403, description = "For operator and researcher", body = ErrorBody)))]
+    (status = 403, description = "For operator and researcher")))]
 async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {
     roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
     let head = app.store.reader().head().await?;
@@ -328,11 +328,11 @@ struct Unblind {
     params(("session" = SessionId, Path)),
     request_body = Unblind, responses(
     (status = 204, description = "Unblinded"),
-    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 404, description = "No such session"),
     (status = 409, description = "The order would reveal that of another session of its balanced set, or \
-                                  comments and answers may be outstanding", body = ErrorBody),
-    (status = 422, description = "No reason was given, or no passphrase for a session of a study", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
+                                  comments and answers may be outstanding"),
+    (status = 422, description = "No reason was given, or no passphrase for a session of a study"),
+    (status = 429, description = "Too many attempts failed")))]
 async fn unblind(
     by: Researcher,
     State(app): State<AppState>,

@@ -187,8 +187,7 @@ struct EnterQuery {
 /// Lets a browser in: takes the key of a role's link, sets the role's cookie and goes to the role's page.
 #[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
     (status = 303, description = "The role's cookie, and a redirect to its page"),
-    (status = 403, description = "The key is not of this server, or its session has ended",
-     body = super::error::ErrorBody)))]
+    (status = 403, description = "The key is not of this server, or its session has ended")))]
 async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
     let key = query.key.trim();
     let (role, token) = match (app.keys.role_of(key), app.keys.session_of(key)) {
@@ -212,7 +211,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 /// The start page: redirects to the page of the role that the browser holds.
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "Redirect to the role's page"),
-    (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
+    (status = 403, description = "No role is held")))]
 async fn start(Roles { held, .. }: Roles) -> Redirect {
     // Somebody who holds more than one role works here, and is not a participant of the trial.
     Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))

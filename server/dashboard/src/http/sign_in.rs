@@ -12,7 +12,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::credentials::{ACCOUNT_COOKIE, set_cookie};
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::{PeerAddress, SignedIn};
 use super::roles::home;
@@ -88,11 +88,11 @@ struct SignedInAs {
 #[utoipa::path(post, path = "/api/sign-in", tag = "accounts", request_body = SignIn, responses(
     (status = 200, description = "Signed in: a cookie, or a token if the request asked for it", body = SignedInAs),
     (status = 403, description = "The name or passphrase is wrong, the account is disabled, or another site made \
-                                  the request", body = ErrorBody),
-    (status = 409, description = "A lead set this passphrase; the person has to choose another", body = ErrorBody),
-    (status = 422, description = "The new passphrase is too short, or the same as before", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody),
-    (status = 507, description = "The disk failed", body = ErrorBody)))]
+                                  the request"),
+    (status = 409, description = "A lead set this passphrase; the person has to choose another"),
+    (status = 422, description = "The new passphrase is too short, or the same as before"),
+    (status = 429, description = "Too many attempts failed"),
+    (status = 507, description = "The disk failed")))]
 async fn sign_in(
     State(app): State<AppState>,
     PeerAddress(peer): PeerAddress,
@@ -115,7 +115,7 @@ async fn sign_in(
 /// Signs out: the token is no longer valid. Signing out again changes nothing.
 #[utoipa::path(post, path = "/api/sign-out", tag = "accounts", responses(
     (status = 204, description = "Signed out"),
-    (status = 507, description = "The disk failed", body = ErrorBody)))]
+    (status = 507, description = "The disk failed")))]
 async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Result<impl IntoResponse, Error> {
     if let Some(person) = person {
         app.accounts.sign_out(&person.token).await?;

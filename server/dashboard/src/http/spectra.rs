@@ -11,7 +11,7 @@ use tokio::time::timeout;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::roles::Operator;
 use super::{App, AppState};
@@ -65,10 +65,8 @@ struct LiveSpectra {
 /// The spectra at places of the camera's next frame. Not while a session is under way.
 #[utoipa::path(post, path = "/api/operator/spectra", tag = "operator", request_body = LivePlaces, responses(
     (status = 200, body = LiveSpectra),
-    (status = 409, description = "A session is under way, the camera delivers nothing, or its pictures have no bands",
-        body = ErrorBody),
-    (status = 422, description = "No such place in the picture, too many places, or too large a circle",
-        body = ErrorBody)))]
+    (status = 409, description = "A session is under way, the camera delivers nothing, or its pictures have no bands"),
+    (status = 422, description = "No such place in the picture, too many places, or too large a circle")))]
 async fn spectra(
     _: Operator,
     State(app): State<AppState>,

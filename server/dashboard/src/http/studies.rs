@@ -8,7 +8,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::people::{Acting, PeerAddress, SignedIn, confirmed_lead};
 use super::roles::Researcher;
@@ -162,7 +162,7 @@ pub(super) const fn session_state(session: &Enrolled) -> &'static str {
 #[utoipa::path(get, path = "/researcher/studies/{study}", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
-    (status = 404, description = "No such study", body = ErrorBody)))]
+    (status = 404, description = "No such study")))]
 async fn study_page(
     by: Researcher,
     SignedIn(person): SignedIn,
@@ -187,7 +187,7 @@ async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json
 /// One study in detail, without the orders.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}", tag = "researcher",
     params(("study" = String, Path)), responses(
-    (status = 200, body = StudyDetail), (status = 404, description = "No such study", body = ErrorBody)))]
+    (status = 200, body = StudyDetail), (status = 404, description = "No such study")))]
 async fn study(
     by: Researcher,
     State(app): State<AppState>,
@@ -213,8 +213,8 @@ struct PlanStudy {
 /// Plans a study.
 #[utoipa::path(post, path = "/api/researcher/studies", tag = "researcher", request_body = PlanStudy, responses(
     (status = 200, body = StudyDetail),
-    (status = 409, description = "A study of this name exists", body = ErrorBody),
-    (status = 422, description = "The definition is malformed, or a reason is missing", body = ErrorBody)))]
+    (status = 409, description = "A study of this name exists"),
+    (status = 422, description = "The definition is malformed, or a reason is missing")))]
 async fn plan_study(
     by: Researcher,
     State(app): State<AppState>,
@@ -246,12 +246,11 @@ struct ChangeStudy {
     params(("study" = String, Path)), request_body = ChangeStudy, responses(
     (status = 200, body = StudyDetail),
     (status = 403, description = "Nobody with the right is signed in, the passphrase is wrong, or the study lets \
-                                  other people unblind", body = ErrorBody),
-    (status = 429, description = "Too many attempts failed", body = ErrorBody),
-    (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "The change does not fit the stage of the study", body = ErrorBody),
-    (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy",
-     body = ErrorBody)))]
+                                  other people unblind"),
+    (status = 429, description = "Too many attempts failed"),
+    (status = 404, description = "No such study"),
+    (status = 409, description = "The change does not fit the stage of the study"),
+    (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy")))]
 async fn change_study(
     by: Researcher,
     State(app): State<AppState>,

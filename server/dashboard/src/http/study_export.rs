@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::export::zip_download;
 use super::json::JsonBody;
 use super::people::Acting;
@@ -45,8 +45,8 @@ struct ExportStudy {
 #[utoipa::path(post, path = "/api/researcher/studies/{study}/export", tag = "researcher",
     params(("study" = String, Path)), request_body = ExportStudy, responses(
     (status = 200, body = StudyExportState),
-    (status = 404, description = "No such study", body = ErrorBody),
-    (status = 409, description = "The study has no session to export, or is not unblinded", body = ErrorBody)))]
+    (status = 404, description = "No such study"),
+    (status = 409, description = "The study has no session to export, or is not unblinded")))]
 async fn start_study_export(
     by: ResearchReader,
     State(app): State<AppState>,
@@ -76,7 +76,7 @@ async fn study_export(
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/export.zip", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
-    (status = 404, description = "No export of the study is finished", body = ErrorBody)))]
+    (status = 404, description = "No export of the study is finished")))]
 async fn study_export_zip(
     by: Researcher,
     State(app): State<AppState>,

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::credentials::{link_name, pass};
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::offline::PAGE_VERSION;
 use super::roles::{Surgeon, SurgeonsTablet};
@@ -98,9 +98,9 @@ pub(super) struct Act {
 /// Advances the session; repeating an action changes nothing. Returns the session after the action.
 #[utoipa::path(post, path = "/api/surgeon/actions", tag = "surgeon", request_body = Act, responses(
     (status = 200, body = Option<SurgeonView>),
-    (status = 403, description = "The action belongs to another role", body = ErrorBody),
-    (status = 404, description = "No such session or segment", body = ErrorBody),
-    (status = 409, description = "The action does not fit the state of the session", body = ErrorBody)))]
+    (status = 403, description = "The action belongs to another role"),
+    (status = 404, description = "No such session or segment"),
+    (status = 409, description = "The action does not fit the state of the session")))]
 async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Surgeon, act.session, act.action).await?;
     Ok(Json(app.surgeon_view.borrow().clone()))
@@ -110,9 +110,9 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
 /// setting is inspected whose protocol lets the surgeon point.
 #[utoipa::path(post, path = "/api/surgeon/patch", tag = "surgeon", request_body = NewChoice, responses(
     (status = 204, description = "The next frame is focused there"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The protocol or the state of the session does not allow it", body = ErrorBody),
-    (status = 422, description = "The place lies outside the picture", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The protocol or the state of the session does not allow it"),
+    (status = 422, description = "The place lies outside the picture")))]
 async fn patch(
     _: Surgeon,
     State(app): State<AppState>,
@@ -125,10 +125,10 @@ async fn patch(
 /// Stores a comment: once this has answered, it is on disk. A comment sent again with the same key is stored once.
 #[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
     (status = 204, description = "Kept"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "The key belongs to another comment", body = ErrorBody),
-    (status = 422, description = "Empty or too long", body = ErrorBody),
-    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 409, description = "The key belongs to another comment"),
+    (status = 422, description = "Empty or too long"),
+    (status = 507, description = "The disk failed; send it again")))]
 async fn comment(
     _: SurgeonsTablet,
     State(app): State<AppState>,
@@ -142,10 +142,10 @@ async fn comment(
 /// that arrives too long after the session's end is stored, but never counts.
 #[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
     (status = 204, description = "Kept"),
-    (status = 404, description = "No such session or question", body = ErrorBody),
-    (status = 409, description = "The question is not asked yet, or the key belongs to another answer", body = ErrorBody),
-    (status = 422, description = "The value does not fit the question", body = ErrorBody),
-    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+    (status = 404, description = "No such session or question"),
+    (status = 409, description = "The question is not asked yet, or the key belongs to another answer"),
+    (status = 422, description = "The value does not fit the question"),
+    (status = 507, description = "The disk failed; send it again")))]
 async fn answer(
     _: SurgeonsTablet,
     State(app): State<AppState>,
@@ -158,8 +158,8 @@ async fn answer(
 /// Notes how much of a session a surgeon's device still holds, so that nobody unblinds it without being warned.
 #[utoipa::path(post, path = "/api/surgeon/holding", tag = "surgeon", request_body = Holding, responses(
     (status = 204, description = "Noted"),
-    (status = 404, description = "No such session", body = ErrorBody),
-    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+    (status = 404, description = "No such session"),
+    (status = 507, description = "The disk failed; send it again")))]
 async fn holding(
     _: SurgeonsTablet,
     State(app): State<AppState>,

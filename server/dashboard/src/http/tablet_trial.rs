@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::json::JsonBody;
 use super::roles::SurgeonsTablet;
 use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
@@ -63,7 +63,7 @@ struct TriedPart {
 /// Notes what works on a surgeon's tablet, for the operator's page. It is forgotten when the server ends.
 #[utoipa::path(post, path = "/api/surgeon/tablet-trials", tag = "surgeon", request_body = TabletTrial, responses(
     (status = 200, description = "Noted", body = bool),
-    (status = 422, description = "The body is malformed", body = ErrorBody)))]
+    (status = 422, description = "The body is malformed")))]
 async fn tried(
     _: SurgeonsTablet,
     State(app): State<AppState>,

@@ -9,7 +9,7 @@ use axum::response::{Html, IntoResponse};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use uuid::Uuid;
 
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::links::asked_host;
 use super::security::Nonce;
 use super::{App, AppState};
@@ -53,7 +53,7 @@ fn authority(app: &App) -> Result<&PublicAuthority, Error> {
 /// The page that explains how to trust the server on this device.
 #[utoipa::path(get, path = "/trust", tag = "trust", responses(
     (status = 200, description = "The page", content_type = "text/html"),
-    (status = 404, description = "The server has no local authority", body = ErrorBody)))]
+    (status = 404, description = "The server has no local authority")))]
 async fn page(State(app): State<AppState>, Nonce(nonce): Nonce, headers: HeaderMap) -> Result<Html<String>, Error> {
     let authority = authority(&app)?;
     let host = asked_host(&headers).map_or_else(|| app.address.host(), str::to_owned);
@@ -69,7 +69,7 @@ async fn page(State(app): State<AppState>, Nonce(nonce): Nonce, headers: HeaderM
 /// The authority's certificate, PEM.
 #[utoipa::path(get, path = "/trust/authority.crt", tag = "trust", responses(
     (status = 200, description = "The certificate", content_type = "application/x-x509-ca-cert"),
-    (status = 404, description = "The server has no local authority", body = ErrorBody)))]
+    (status = 404, description = "The server has no local authority")))]
 async fn certificate(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let authority = authority(&app)?;
     let headers = [
@@ -82,7 +82,7 @@ async fn certificate(State(app): State<AppState>) -> Result<impl IntoResponse, E
 /// The authority as a profile for Apple's devices.
 #[utoipa::path(get, path = "/trust/authority.mobileconfig", tag = "trust", responses(
     (status = 200, description = "The profile", content_type = "application/x-apple-aspen-config"),
-    (status = 404, description = "The server has no local authority", body = ErrorBody)))]
+    (status = 404, description = "The server has no local authority")))]
 async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let authority = authority(&app)?;
     let [own_id, content_id] = [0, 16].map(|from| identifier(&authority.digest[from..from + 16]));

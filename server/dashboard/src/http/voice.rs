@@ -11,7 +11,7 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::{Error, ErrorBody};
+use super::error::Error;
 use super::people::Acting;
 use super::ranges;
 use super::roles::{Researcher, SurgeonsTablet};
@@ -45,10 +45,10 @@ struct PieceQuery {
         (Vec<u8> = "audio/webm;codecs=opus"), (Vec<u8> = "audio/mp4"), (Vec<u8> = "audio/ogg;codecs=opus"))),
     responses(
     (status = 204, description = "Kept"),
-    (status = 404, description = "The session has no such voice comment", body = ErrorBody),
-    (status = 409, description = "The recording has another piece in this place", body = ErrorBody),
-    (status = 422, description = "The sound is of an unknown kind, or too large", body = ErrorBody),
-    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+    (status = 404, description = "The session has no such voice comment"),
+    (status = 409, description = "The recording has another piece in this place"),
+    (status = 422, description = "The sound is of an unknown kind, or too large"),
+    (status = 507, description = "The disk failed; send it again")))]
 async fn keep_piece(
     _: SurgeonsTablet,
     State(app): State<AppState>,
@@ -71,8 +71,8 @@ async fn keep_piece(
     (status = 200, description = "The recording", content(
         (Vec<u8> = "audio/webm;codecs=opus"), (Vec<u8> = "audio/mp4"), (Vec<u8> = "audio/ogg;codecs=opus"))),
     (status = 206, description = "A part of the recording"),
-    (status = 404, description = "No such session or recording, or the recording was erased", body = ErrorBody),
-    (status = 409, description = "The participant withdrew", body = ErrorBody),
+    (status = 404, description = "No such session or recording, or the recording was erased"),
+    (status = 409, description = "The participant withdrew"),
     (status = 416, description = "The recording has no such part")))]
 async fn recording(
     by: Researcher,

@@ -80,9 +80,9 @@ struct LiveQuery {
 /// Pictures and state, as they come (WebSocket).
 #[utoipa::path(get, path = "/live", tag = "stream", params(LiveQuery), responses(
     (status = 101, description = "WebSocket: binary messages are frames, text messages are state"),
-    (status = 400, description = "The request is not for a WebSocket", body = super::error::ErrorBody),
-    (status = 403, description = "The role is not held", body = super::error::ErrorBody),
-    (status = 426, description = "The connection cannot become a WebSocket", body = super::error::ErrorBody)))]
+    (status = 400, description = "The request is not for a WebSocket"),
+    (status = 403, description = "The role is not held"),
+    (status = 426, description = "The connection cannot become a WebSocket")))]
 async fn live(
     State(app): State<AppState>,
     roles: Roles,
