@@ -68,12 +68,6 @@ pub enum Error {
     Internal,
 }
 
-/// What an error says. What a surgeon can meet is there in every language, the rest in English.
-enum Sentence {
-    Translated(Message),
-    English(String),
-}
-
 /// An error as programs get it.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ErrorBody {
@@ -108,56 +102,45 @@ impl Error {
             Self::Unreadable(_) | Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
-}
 
-impl Error {
     /// The error in `language`, as far as a surgeon can meet it; otherwise in English.
     #[must_use]
     pub fn say_in(&self, language: Language) -> String {
-        match self.sentence() {
-            Sentence::Translated(message) => message.say_in(language),
-            Sentence::English(text) => text,
-        }
-    }
-
-    fn sentence(&self) -> Sentence {
-        use Sentence::{English, Translated};
-
         match self {
-            Self::Said(_, message) => Translated(message.clone()),
-            Self::NeedsRole(Role::Surgeon) => Translated(Message::new("error-needs-surgeon")),
-            Self::NoRole => Translated(Message::new("error-no-role")),
-            Self::WrongKey => Translated(Message::new("error-wrong-key")),
-            Self::SessionOver => Translated(Message::new("error-session-over")),
-            Self::NeedsSessionLink => Translated(Message::new("error-needs-session-link")),
-            Self::CrossSite => Translated(Message::new("error-cross-site")),
-            Self::Busy => Translated(Message::new("error-busy")),
-            Self::Storage(reason) => Translated(Message::new("error-storage").words("reason", reason)),
-            Self::Internal => Translated(Message::new("error-internal")),
+            Self::Said(_, message) => message.say_in(language),
+            Self::NeedsRole(Role::Surgeon) => language.say("error-needs-surgeon"),
+            Self::NoRole => language.say("error-no-role"),
+            Self::WrongKey => language.say("error-wrong-key"),
+            Self::SessionOver => language.say("error-session-over"),
+            Self::NeedsSessionLink => language.say("error-needs-session-link"),
+            Self::CrossSite => language.say("error-cross-site"),
+            Self::Busy => language.say("error-busy"),
+            Self::Storage(reason) => Message::new("error-storage").words("reason", reason).say_in(language),
+            Self::Internal => language.say("error-internal"),
             Self::NotFound(text)
             | Self::Conflict(text)
             | Self::Invalid(text)
             | Self::TooMany(text)
             | Self::Forbidden(text)
-            | Self::Unreadable(text) => English(text.clone()),
-            Self::NeedsRole(role) => English(format!(
+            | Self::Unreadable(text) => text.clone(),
+            Self::NeedsRole(role) => format!(
                 "This page is for the {role}. Open it with the {role}'s link, which the server prints when it starts.",
                 role = role_name(*role)
-            )),
-            Self::NeedsAccount(role) => English(format!(
+            ),
+            Self::NeedsAccount(role) => format!(
                 "This belongs to a study, where everybody but the surgeon acts under a personal account. The link of \
                  the {role} is not enough: sign in at /sign-in with an account that may act as {role}.",
                 role = role_name(*role)
-            )),
-            Self::WrongHost => English(
+            ),
+            Self::WrongHost => {
                 "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, start it with --bind \
                  0.0.0.0:8080 --tls."
-                    .to_owned(),
-            ),
-            Self::Unencrypted(host) => English(format!(
+                    .to_owned()
+            }
+            Self::Unencrypted(host) => format!(
                 "This server takes encrypted requests alone. Send this one to https://{host} instead. A key or \
                  passphrase in it could be read on the way: change it if others use this network."
-            )),
+            ),
         }
     }
 }
