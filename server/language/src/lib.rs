@@ -36,8 +36,8 @@ pub enum Language {
 /// The messages of one language.
 type Bundle = FluentBundle<FluentResource>;
 
-static BUNDLES: LazyLock<Vec<(Language, Bundle)>> =
-    LazyLock::new(|| Language::ALL.into_iter().map(|language| (language, bundle(language))).collect());
+/// Those of each language, in the order of [`Language::ALL`].
+static BUNDLES: LazyLock<[Bundle; 4]> = LazyLock::new(|| Language::ALL.map(bundle));
 
 fn bundle(language: Language) -> Bundle {
     // A code that cannot be read would be taken for English. A test reads them all.
@@ -53,7 +53,7 @@ fn bundle(language: Language) -> Bundle {
 }
 
 impl Language {
-    /// All languages.
+    /// All languages, in the order in which they are declared.
     pub const ALL: [Self; 4] = [Self::English, Self::German, Self::French, Self::Spanish];
 
     /// The language's code, as protocols and pages name it (BCP 47).
@@ -115,15 +115,15 @@ impl Language {
         Self::ALL.map(Self::code).join(", ")
     }
 
-    fn bundle(self) -> Option<&'static Bundle> {
-        BUNDLES.iter().find(|(language, _)| *language == self).map(|(_, bundle)| bundle)
+    fn bundle(self) -> &'static Bundle {
+        &BUNDLES[self as usize]
     }
 
     /// The value of message `id`, or of its `attribute`. A message that is missing is shown by its id; a test looks for
     /// missing ones.
     fn format(self, id: &str, attribute: Option<&str>, args: Option<&FluentArgs<'_>>) -> String {
         let found = || {
-            let bundle = self.bundle()?;
+            let bundle = self.bundle();
             let message = bundle.get_message(id)?;
             let pattern = match attribute {
                 None => message.value()?,

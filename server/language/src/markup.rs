@@ -33,15 +33,14 @@ impl Language {
 
     /// The text of message `id`; empty if it has attributes only.
     fn value(self, id: &str) -> String {
-        let message = self.bundle().and_then(|bundle| bundle.get_message(id));
-        match message {
+        match self.bundle().get_message(id) {
             Some(message) if message.value().is_none() => String::new(),
             _ => self.say(id),
         }
     }
 
     fn attributes(self, id: &str) -> Vec<(String, String)> {
-        let message = self.bundle().and_then(|bundle| bundle.get_message(id));
+        let message = self.bundle().get_message(id);
         let attributes = message.into_iter().flat_map(|message| message.attributes().collect::<Vec<_>>());
         attributes.map(|one| (one.id().to_owned(), self.format(id, Some(one.id()), None))).collect()
     }
