@@ -1,10 +1,9 @@
-//! Checks the devices of a running server by what it already knows: a device that the control loop holds is never
-//! asked.
+//! Checks camera and lens. Those of a running server are checked by what it already knows: a device that the control
+//! loop holds is never asked.
 
 use super::finding::Finding;
-use super::lens;
 use parfocal_devices::camera::CameraHealth;
-use parfocal_devices::lens::{LensHealth, LensInfo};
+use parfocal_devices::lens::{LensError, LensHealth, LensInfo};
 
 const CAMERA: &str = "camera";
 const LENS: &str = "lens";
@@ -40,9 +39,33 @@ pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
         return Finding::advice(LENS, found, "For real glass, start the server with --lens optotune:auto.");
     }
     match info {
-        Some(info) => lens(Ok(info.clone())),
+        Some(info) => described(info),
         None => Finding::well(LENS, found),
     }
+}
+
+/// Checks a lens that no server uses; `asked` is what it reported about itself, or why it did not answer.
+#[must_use]
+pub fn lens(asked: Result<LensInfo, LensError>) -> Finding {
+    match asked {
+        Ok(info) => described(&info),
+        Err(error) => {
+            let found = format!("No lens can be used: {error}.");
+            Finding::wrong(LENS, found, "Check its cable and power, and that no server uses it now.")
+        }
+    }
+}
+
+/// Checks a lens by what it reported about itself.
+fn described(info: &LensInfo) -> Finding {
+    let LensInfo { driver, firmware, serial, min_dioptre, max_dioptre, status, .. } = info;
+    let found =
+        format!("{driver}, firmware {firmware}, serial number {serial}: {min_dioptre:.1} to {max_dioptre:.1} dpt.");
+
+    if status.is_empty() {
+        return Finding::well(LENS, found);
+    }
+    Finding::wrong(LENS, format!("{found} It reports: {}.", status.join("; ")), "Follow docs/bench.md, \"Lens\".")
 }
 
 /// A device's name and message as one sentence.
