@@ -1,11 +1,13 @@
 //! Shared by all commands: how they fail and wait, what they print, and the progress bar.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use parfocal_base::files::replace;
 use parfocal_base::notices;
 
 /// A command's failure: one clear sentence that says what to do.
@@ -36,6 +38,20 @@ pub fn print_json(result: &impl Serialize) -> Result<(), Failure> {
 /// Writes a command's result to standard output: as JSON if that was asked for, otherwise as `text`.
 pub fn print_result(json: bool, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), Failure> {
     if json { print_json(result) } else { print(&text()) }
+}
+
+/// Writes a command's result to the file `path`, whole or not at all.
+pub fn save(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    replace(path, bytes).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+}
+
+/// A table of `rows` as CSV.
+pub fn csv<R: Serialize>(rows: impl IntoIterator<Item = Result<R, Failure>>) -> Result<Vec<u8>, Failure> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table.serialize(row?)?;
+    }
+    table.into_inner().map_err(|error| error.to_string().into())
 }
 
 /// A progress bar over `total` items that looks as `template` says.

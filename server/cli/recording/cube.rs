@@ -1,10 +1,9 @@
 //! `parfocal recording cube`: one frame as an ENVI file, a header beside its data.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::cli::output::{Failure, print};
-use parfocal_base::files::replace;
+use crate::cli::output::{Failure, print, save};
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{CELL, Calibration, MosaicFrame};
 use parfocal_recording::{Recording, by_wavelength};
@@ -86,10 +85,6 @@ fn header(arguments: &Arguments, recording: &Recording, calibration: &Calibratio
     let _ = writeln!(text, "fwhm = {{{}}}", list(&|band| calibration.bands[band].fwhm_nm));
     let _ = writeln!(text, "data ignore value = {}", u16::MAX);
     text
-}
-
-fn save(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    replace(path, bytes).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }
 
 fn header_path(text: &str) -> Result<PathBuf, String> {

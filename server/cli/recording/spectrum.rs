@@ -1,10 +1,8 @@
 //! `parfocal recording spectrum`: what each band shows at a place, as a table.
 
-use std::io;
 use std::path::PathBuf;
 
-use crate::cli::output::{Failure, print};
-use parfocal_base::files::replace;
+use crate::cli::output::{Failure, csv, print, save};
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Circle, Spectrum, SpectrumSum};
@@ -47,22 +45,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let spectrum = sum.spectrum();
 
-    let table = table(&PlaceSpectrum::new(&calibration, &spectrum)).map_err(|error| error.to_string())?;
+    let table = csv(PlaceSpectrum::new(&calibration, &spectrum).bands.into_iter().map(Ok))?;
     let Some(out) = &arguments.out else {
         print(&String::from_utf8_lossy(&table))?;
         tell(format_args!("{}", summary(&spectrum)));
         return Ok(());
     };
-    replace(out, &table).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+    save(out, &table)?;
     print(&format!("{} in {}\n", summary(&spectrum), out.display()))
-}
-
-fn table(spectrum: &PlaceSpectrum) -> io::Result<Vec<u8>> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for band in &spectrum.bands {
-        table.serialize(band)?;
-    }
-    table.into_inner().map_err(|error| io::Error::other(error.to_string()))
 }
 
 fn summary(spectrum: &Spectrum) -> String {

@@ -1,14 +1,12 @@
 //! `parfocal recording step`: what a policy sees in a recording, and which focal powers it would have requested.
 
-use std::io;
 use std::path::PathBuf;
 
 use crate::cli::library::policies;
-use crate::cli::output::{Failure, print};
+use crate::cli::output::{Failure, csv, print, save};
 use crate::cli::policy_process;
 use parfocal_autofocus::Registry;
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_base::files::replace;
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::calibration;
 use parfocal_recording::Recording;
@@ -50,13 +48,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let registry = registry(arguments, &name, recording.rate())?;
     let policy = registry.build(&name)?;
 
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for step in Stepping::new(&recording, &calibration, policy) {
-        table.serialize(step?)?;
-    }
-
-    let bytes = table.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
-    replace(&arguments.out, &bytes).map_err(|error| format!("cannot write {}: {error}", arguments.out.display()))?;
+    let steps = Stepping::new(&recording, &calibration, policy);
+    save(&arguments.out, &csv(steps.map(|step| step.map_err(Failure::from)))?)?;
     print(&format!("{} steps of {name} in {}\n", recording.rows().len(), arguments.out.display()))
 }
 

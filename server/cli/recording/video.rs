@@ -5,8 +5,8 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use crate::cli::output::{Failure, print};
-use parfocal_base::files::{create_with, replace};
+use crate::cli::output::{Failure, print, save};
+use parfocal_base::files::create_with;
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, encode_png, encode_tiff};
 use parfocal_recording::Recording;
@@ -230,8 +230,7 @@ fn save_pictures(
         };
 
         let path = out.join(format!("frame{frame:06}.{ending}"));
-        let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
-        replace(&path, &written.map_err(|error| failed(&error))?).map_err(|error| failed(&error))?;
+        save(&path, &written.map_err(|error| format!("cannot write {}: {error}", path.display()))?)?;
     }
     Ok(())
 }
