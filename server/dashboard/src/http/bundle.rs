@@ -33,14 +33,11 @@ struct Bundle<'a, F> {
 impl<F: Fn(&str) -> Option<&'static str>> Bundle<'_, F> {
     /// Adds the script `name` after those that it imports, as the constant whose members are its exports.
     fn add(&mut self, name: &str) -> Result<(), String> {
-        match self.state.insert(name.to_owned(), State::Begun) {
+        match self.state.get(name) {
             Some(State::Begun) => return Err(format!("{name} imports itself, through others")),
-            Some(State::Done) => {
-                self.state.insert(name.to_owned(), State::Done);
-                return Ok(());
-            }
-            None => {}
-        }
+            Some(State::Done) => return Ok(()),
+            None => self.state.insert(name.to_owned(), State::Begun),
+        };
 
         let source = (self.source)(name).ok_or_else(|| format!("{name} is missing"))?;
         let module = Module::read(name, source)?;

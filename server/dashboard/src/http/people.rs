@@ -48,7 +48,7 @@ impl<S: Sync> FromRequestParts<S> for PeerAddress {
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
         let permit = parts.extensions.get::<Arc<Permit>>();
-        Ok(Self(permit.map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |permit| permit.host())))
+        Ok(Self(permit.map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |permit| permit.host)))
     }
 }
 

@@ -6,7 +6,7 @@
 //! key shows it at once, but one that only wants to use them up waits.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::http::HeaderMap;
@@ -52,6 +52,8 @@ struct Connection {
 
 /// A connection's permit; freed when dropped.
 pub struct Permit {
+    /// The host that the connection came from.
+    pub host: IpAddr,
     number: u64,
     permits: Permits,
 }
@@ -75,7 +77,7 @@ impl Permits {
         given.next += 1;
         let (stay, give_way) = oneshot::channel();
         given.connections.insert(number, Connection { host, member: false, _stay: stay });
-        (Permit { number, permits: self.clone() }, give_way)
+        (Permit { host, number, permits: self.clone() }, give_way)
     }
 
     fn given(&self) -> MutexGuard<'_, GivenPermits> {
@@ -99,12 +101,6 @@ impl GivenPermits {
 }
 
 impl Permit {
-    /// The host that the connection came from.
-    pub fn host(&self) -> IpAddr {
-        let given = self.permits.given();
-        given.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
-    }
-
     /// Makes the connection a member if a request with `headers` shows one of `keys`, or if somebody is `signed_in`.
     ///
     /// # Errors
