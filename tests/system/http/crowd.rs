@@ -8,6 +8,7 @@ use reqwest::{Client, StatusCode};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::io::AsyncReadExt;
 use tokio::net::{TcpSocket, TcpStream};
+use tokio::task::JoinSet;
 
 use super::live::Page;
 use crate::support::{Server, command};
@@ -97,4 +98,34 @@ async fn an_idle_flood_from_many_hosts_shuts_nobody_with_a_key_out() {
         open += usize::from(!is_closed(connection).await);
     }
     assert!((1..=128).contains(&open), "{open} of the flood's connections are open");
+}
+
+#[tokio::test]
+async fn each_open_page_takes_one_of_its_hosts_places_until_it_leaves() {
+    let server = server();
+    let mut pages = JoinSet::new();
+    for _ in 0..128 {
+        let mut page = Page::open(&server, "surgeon").await;
+        // A page that answers no ping would be taken for gone.
+        pages.spawn(async move {
+            loop {
+                page.message().await;
+            }
+        });
+    }
+
+    let another = client_at("127.0.0.1".parse().unwrap());
+    let status = async || {
+        let request = another.get(server.url("/surgeon")).bearer_auth(server.key("surgeon"));
+        request.send().await.unwrap().status()
+    };
+    assert_eq!(status().await, StatusCode::SERVICE_UNAVAILABLE);
+
+    pages.shutdown().await;
+    let let_in = async {
+        while status().await != StatusCode::OK {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_mins(1), let_in).await.unwrap();
 }
