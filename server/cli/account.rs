@@ -29,7 +29,13 @@ enum Action {
     /// List the accounts.
     List(List),
     /// Change what a person may do.
-    Role(ChangeRole),
+    Role {
+        #[command(flatten)]
+        named: NamedAccount,
+        /// lead, operator, researcher or monitor.
+        #[arg(value_parser = role)]
+        role: AccountRole,
+    },
     /// Replace a passphrase, and end all sign-ins of the account. Asks for it, or reads it from standard input.
     Passphrase(NamedAccount),
     /// Stop a person from signing in, and end all sign-ins of the account.
@@ -50,15 +56,6 @@ struct Add {
     /// The person's name as it appears in signatures; the account's name by default.
     #[arg(long, value_name = "TEXT")]
     display: Option<String>,
-}
-
-#[derive(Debug, Args)]
-struct ChangeRole {
-    #[command(flatten)]
-    named: NamedAccount,
-    /// lead, operator, researcher or monitor.
-    #[arg(value_parser = role)]
-    role: AccountRole,
 }
 
 #[derive(Debug, Args)]
@@ -106,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         match &arguments.action {
             Action::Add(add) => self::add(add).await,
             Action::List(list) => self::list(list).await,
-            Action::Role(change) => self::change(&change.named, &AccountChange::Role(change.role)).await,
+            Action::Role { named, role } => change(named, &AccountChange::Role(*role)).await,
             Action::Passphrase(named) => replace_passphrase(named).await,
             Action::Disable(named) => change(named, &AccountChange::Disable).await,
             Action::Enable(named) => change(named, &AccountChange::Enable).await,

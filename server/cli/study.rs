@@ -36,11 +36,32 @@ enum Action {
     /// Plan a study from a definition; docs/study.md explains its keys.
     New(NewArguments),
     /// Allow new sessions. The first time, draw the orders and print the commitment to them.
-    Open(Open),
+    Open {
+        /// Name of the study.
+        study: String,
+        /// Open it even if its plan cannot work as it is meant.
+        #[arg(long)]
+        despite_concerns: bool,
+        #[command(flatten)]
+        signed: Signed,
+    },
     /// Allow no more new sessions.
-    Close(Move),
+    Close {
+        /// Name of the study.
+        study: String,
+        #[command(flatten)]
+        signed: Signed,
+    },
     /// Lock a closed study, so that it cannot be changed any more.
-    Lock(Lock),
+    Lock {
+        /// Name of the study.
+        study: String,
+        /// Lock it even if a surgeon's device may still hold unsent data, which would then not count.
+        #[arg(long)]
+        despite_outstanding: bool,
+        #[command(flatten)]
+        signed: Signed,
+    },
     /// Print the state of a study, also while a server runs; without a name, of all studies.
     Show(Show),
     /// Join the exports of several sites into one package, after verifying each.
@@ -59,36 +80,6 @@ struct NewArguments {
     /// Folder with more trial protocols; `trial-protocols` by default, if it exists.
     #[arg(long, value_name = "DIR")]
     protocols: Option<PathBuf>,
-    #[command(flatten)]
-    signed: Signed,
-}
-
-#[derive(Debug, Args)]
-struct Move {
-    /// Name of the study.
-    study: String,
-    #[command(flatten)]
-    signed: Signed,
-}
-
-#[derive(Debug, Args)]
-struct Open {
-    /// Name of the study.
-    study: String,
-    /// Open it even if its plan cannot work as it is meant.
-    #[arg(long)]
-    despite_concerns: bool,
-    #[command(flatten)]
-    signed: Signed,
-}
-
-#[derive(Debug, Args)]
-struct Lock {
-    /// Name of the study.
-    study: String,
-    /// Lock it even if a surgeon's device may still hold unsent data, which would then not count.
-    #[arg(long)]
-    despite_outstanding: bool,
     #[command(flatten)]
     signed: Signed,
 }
@@ -139,14 +130,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     wait_for(async {
         match &arguments.action {
             Action::New(new) => plan(new).await,
-            Action::Open(open) => {
-                let despite_concerns = open.despite_concerns;
-                change(&open.study, Change::Open { despite_concerns }, &open.signed).await
+            Action::Open { study, despite_concerns, signed } => {
+                let despite_concerns = *despite_concerns;
+                change(study, Change::Open { despite_concerns }, signed).await
             }
-            Action::Close(close) => change(&close.study, Change::Close, &close.signed).await,
-            Action::Lock(lock) => {
-                let despite_outstanding = lock.despite_outstanding;
-                change(&lock.study, Change::Lock { despite_outstanding }, &lock.signed).await
+            Action::Close { study, signed } => change(study, Change::Close, signed).await,
+            Action::Lock { study, despite_outstanding, signed } => {
+                let despite_outstanding = *despite_outstanding;
+                change(study, Change::Lock { despite_outstanding }, signed).await
             }
             Action::Show(show) => self::show(show).await,
             Action::Merge(sites) => merge(sites),
