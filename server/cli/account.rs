@@ -15,15 +15,9 @@ use parfocal_records::accounts::{Accounts, Cost, Passphrase};
 use parfocal_records::store::StoreError;
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole};
 
-/// Arguments of `parfocal account`.
-#[derive(Debug, Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal account` does.
 #[derive(Debug, Subcommand)]
-enum Action {
+pub enum Action {
     /// Make an account. Asks for its passphrase, or reads it from standard input.
     Add(Add),
     /// List the accounts.
@@ -47,7 +41,7 @@ enum Action {
 }
 
 #[derive(Debug, Args)]
-struct Add {
+pub struct Add {
     #[command(flatten)]
     named: NamedAccount,
     /// What the person may do.
@@ -59,7 +53,7 @@ struct Add {
 }
 
 #[derive(Debug, Args)]
-struct NamedAccount {
+pub struct NamedAccount {
     /// Name of the account: lower-case letters, digits, dots and dashes.
     #[arg(value_parser = name)]
     account: AccountName,
@@ -68,7 +62,7 @@ struct NamedAccount {
 }
 
 #[derive(Debug, Args)]
-struct List {
+pub struct List {
     #[command(flatten)]
     folder: Folder,
     /// Print them as JSON.
@@ -98,9 +92,9 @@ fn role(text: &str) -> Result<AccountRole, String> {
 ///
 /// # Errors
 /// If there is no database, the passphrase is too short, or the account rules refuse the change.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(action: &Action) -> Result<(), Failure> {
     wait_for(async {
-        match &arguments.action {
+        match action {
             Action::Add(add) => self::add(add).await,
             Action::List(list) => self::list(list).await,
             Action::Role { named, role } => change(named, &AccountChange::Role(*role)).await,

@@ -18,15 +18,9 @@ const WARM_UP: u32 = 10;
 /// Longest wait for a frame.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Arguments of `parfocal calibrate`.
-#[derive(Debug, clap::Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal calibrate` does.
 #[derive(Debug, clap::Subcommand)]
-enum Action {
+pub enum Action {
     /// Take the dark reference: lens cap on, at the exposure and gain that you will use.
     Dark(Capture),
     /// Take the white reference: an even white target fills the picture, out of focus, in the light that you will use.
@@ -36,7 +30,7 @@ enum Action {
 }
 
 #[derive(Debug, clap::Args)]
-struct Capture {
+pub struct Capture {
     /// Camera, for example `gige:ID?exposure=8000&gain=0`; try it with `phantom:dark` and `phantom:white`.
     #[arg(long, value_name = "SPEC")]
     camera: String,
@@ -51,7 +45,7 @@ struct Capture {
 }
 
 #[derive(Debug, clap::Args)]
-struct Import {
+pub struct Import {
     /// A calibration as TOML: any of `name`, `unit`, `bit_depth`, `centre_nm`, `fwhm_nm`, `dark`,
     /// `white`, `spectral_correction`. What it leaves out stays as it is.
     #[arg(value_name = "FILE")]
@@ -87,8 +81,8 @@ struct Destination {
 ///
 /// # Errors
 /// If the camera fails, a reference cannot be used, or a file cannot be read or written.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    match &arguments.action {
+pub fn run(action: &Action) -> Result<(), Failure> {
+    match action {
         Action::Dark(capture) => dark(capture),
         Action::White(capture) => white(capture),
         Action::Import(arguments) => import(arguments),

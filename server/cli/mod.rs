@@ -45,11 +45,13 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make and change the personal accounts of the people in studies.
-    Account(account::Arguments),
+    #[command(subcommand)]
+    Account(account::Action),
     /// Copy the database, verified, while the server runs or not.
     Backup(backup::Arguments),
     /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
-    Calibrate(calibrate::Arguments),
+    #[command(subcommand)]
+    Calibrate(calibrate::Action),
     /// Check whether this machine is ready for a trial, and say what to do if it is not.
     Doctor(doctor::Arguments),
     /// Simulated scans for a training in another program, as Python's `parfocal.FocusEnv` uses them.
@@ -59,7 +61,8 @@ enum Command {
     /// Show content area, patch and focus metrics of pictures and mosaics.
     Inspect(inspect::Arguments),
     /// Look at a lens, move it, sweep it, measure it, or emulate one.
-    Lens(lens::Arguments),
+    #[command(subcommand)]
+    Lens(lens::Action),
     /// Compare policies on focal-time scans or photographed focal stacks.
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
@@ -70,14 +73,17 @@ enum Command {
     /// Replace the database by a backup, and keep the old one.
     Restore(restore::Arguments),
     /// Record hyperspectral video, and get cubes, video and pictures out of it.
-    Recording(recording::Arguments),
+    #[command(subcommand)]
+    Recording(recording::Action),
     /// Record, import and check focal-time scans.
-    Scan(scan::Arguments),
+    #[command(subcommand)]
+    Scan(scan::Action),
     /// Start the server: the live view, the control loop and the trial.
     #[command(after_help = serve::REAL_TIME)]
     Serve(serve::Arguments),
     /// Plan a study of many sessions, open, close and lock it, show where it stands, and analyse it.
-    Study(study::Arguments),
+    #[command(subcommand)]
+    Study(study::Action),
     /// Train a learned policy, or compare trainings.
     Train(train::Arguments),
     /// Check that an export, a data folder or a backup is complete, unchanged, and matches its commitments.
@@ -102,22 +108,22 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Account(arguments) => account::run(&arguments),
+        Command::Account(action) => account::run(&action),
         Command::Backup(arguments) => backup::run(&arguments),
-        Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Calibrate(action) => calibrate::run(&action),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Environment(arguments) => environment::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Lens(arguments) => lens::run(&arguments),
+        Command::Lens(action) => lens::run(&action),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::PolicyProcess(arguments) => policy_process::run(&arguments),
         Command::Restore(arguments) => restore::run(&arguments),
-        Command::Recording(arguments) => recording::run(&arguments),
-        Command::Scan(arguments) => scan::run(&arguments),
+        Command::Recording(action) => recording::run(&action),
+        Command::Scan(action) => scan::run(&action),
         Command::Serve(arguments) => serve::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments),
+        Command::Study(action) => study::run(&action),
         Command::Train(arguments) => train::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
     }

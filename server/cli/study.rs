@@ -24,15 +24,9 @@ use parfocal_session::reports::StudyDetail;
 use parfocal_trial::study::signature::{Channel, Signature};
 use parfocal_trial::study::state::Change;
 
-/// Arguments of `parfocal study`.
-#[derive(Debug, Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal study` does.
 #[derive(Debug, Subcommand)]
-enum Action {
+pub enum Action {
     /// Plan a study from a definition; docs/study.md explains its keys.
     New(NewArguments),
     /// Allow new sessions. The first time, draw the orders and print the commitment to them.
@@ -71,7 +65,7 @@ enum Action {
 }
 
 #[derive(Debug, Args)]
-struct NewArguments {
+pub struct NewArguments {
     /// The definition: a TOML file.
     definition: PathBuf,
     /// A site that this database runs; may be repeated; all sites of the definition by default.
@@ -85,7 +79,7 @@ struct NewArguments {
 }
 
 #[derive(Debug, Args)]
-struct Signed {
+pub struct Signed {
     /// Person who makes the change; recorded with it.
     #[arg(long, value_name = "PERSON")]
     by: String,
@@ -98,7 +92,7 @@ struct Signed {
 }
 
 #[derive(Debug, Args)]
-struct Show {
+pub struct Show {
     /// Name of the study.
     study: Option<String>,
     /// Folder of the server's database.
@@ -110,7 +104,7 @@ struct Show {
 }
 
 #[derive(Debug, Args)]
-struct Merge {
+pub struct Merge {
     /// The sites' exports: folders written by `parfocal export --study`, or exports of single sessions.
     #[arg(required = true, value_name = "DIR")]
     sites: Vec<PathBuf>,
@@ -126,9 +120,9 @@ struct Merge {
 ///
 /// # Errors
 /// If there is no database, a server has it open, or the study's rules refuse the change.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(action: &Action) -> Result<(), Failure> {
     wait_for(async {
-        match &arguments.action {
+        match action {
             Action::New(new) => plan(new).await,
             Action::Open { study, despite_concerns, signed } => {
                 let despite_concerns = *despite_concerns;

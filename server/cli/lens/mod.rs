@@ -9,15 +9,9 @@ use super::output::{Failure, print, print_json};
 use parfocal_base::FocalPower;
 use which::{LensChoice, go};
 
-/// Arguments of `parfocal lens`.
-#[derive(Debug, clap::Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal lens` does.
 #[derive(Debug, clap::Subcommand)]
-enum Action {
+pub enum Action {
     /// Print what the lens is and what state it is in.
     Info {
         #[command(flatten)]
@@ -43,8 +37,8 @@ enum Action {
 ///
 /// # Errors
 /// If the lens cannot be used or does not obey.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    match &arguments.action {
+pub fn run(action: &Action) -> Result<(), Failure> {
+    match action {
         Action::Info { which } => info(which),
         Action::Set { focal_power, which } => set(*focal_power, which),
         Action::Sweep(arguments) => sweep::run(arguments),

@@ -10,15 +10,9 @@ mod view_info;
 
 use super::output::Failure;
 
-/// Arguments of `parfocal recording`.
-#[derive(Debug, clap::Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal recording` does.
 #[derive(Debug, clap::Subcommand)]
-enum Action {
+pub enum Action {
     /// Record every frame of a camera, lossless, until Ctrl-C.
     Record(record::Arguments),
     /// Print what a recording holds, and check every frame against its checksum.
@@ -37,8 +31,8 @@ enum Action {
 ///
 /// # Errors
 /// If a recording cannot be made, read or saved as something else.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    match &arguments.action {
+pub fn run(action: &Action) -> Result<(), Failure> {
+    match action {
         Action::Record(arguments) => record::run(arguments),
         Action::Info(arguments) => info::run(arguments),
         Action::Cube(arguments) => cube::run(arguments),

@@ -7,15 +7,9 @@ mod record;
 
 use super::output::Failure;
 
-/// Arguments of `parfocal scan`.
-#[derive(Debug, clap::Args)]
-pub struct Arguments {
-    #[command(subcommand)]
-    action: Action,
-}
-
+/// What `parfocal scan` does.
 #[derive(Debug, clap::Subcommand)]
-enum Action {
+pub enum Action {
     /// Record a scan: at each pose a picture at every focal power, in random order. Run it again to continue.
     Record(record::Arguments),
     /// Print what a scan holds, and check every picture against its checksum.
@@ -30,8 +24,8 @@ enum Action {
 ///
 /// # Errors
 /// If a scan cannot be read, recorded or imported.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    match &arguments.action {
+pub fn run(action: &Action) -> Result<(), Failure> {
+    match action {
         Action::Record(arguments) => record::run(arguments),
         Action::Info(arguments) => info::run(arguments),
         Action::Import(arguments) => import::run(arguments),
