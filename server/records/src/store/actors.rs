@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::sqlite::SqliteConnection;
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::{Reader, StoreError, chain};
 use parfocal_base::ids::SessionId;
@@ -36,6 +37,13 @@ pub(super) async fn name_actor(
     let number = done.last_insert_rowid().to_string();
     chain::append(connection, "actor", &number, wall).await?;
     Ok(())
+}
+
+/// The account behind the record in `row`, if somebody was signed in.
+pub(super) fn account(row: &SqliteRow) -> Result<Option<AccountName>, StoreError> {
+    let name: Option<String> = row.try_get("account")?;
+    let account = name.map(|name| AccountName::new(&name)).transpose();
+    account.map_err(|error| StoreError::Damaged(error.to_string()))
 }
 
 impl Reader {

@@ -5,7 +5,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
 use super::insert::Insert;
-use super::values::{begin, nanoseconds, parsed, stamp};
+use super::values::{begin, named, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
@@ -81,29 +81,21 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn consents(&self, session: SessionId) -> Result<Vec<StoredConsent>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM consents WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-        rows.iter().map(consent).collect()
+        self.rows("SELECT * FROM consents WHERE session = ? ORDER BY number", &session, consent).await
     }
 }
 
 fn consent(row: &SqliteRow) -> Result<StoredConsent, StoreError> {
-    let medium: String = row.try_get("medium")?;
-    let role: String = row.try_get("role")?;
-    let unknown = |what: &str| StoreError::Damaged(format!("a consent has the unknown {what}"));
-
     Ok(StoredConsent {
         number: row.try_get("number")?,
         run: row.try_get("run")?,
-        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        by: named(row, "role", "a consent", Role::named)?,
         stamp: stamp(row)?,
         consent: Consent {
             text_version: row.try_get("text_version")?,
             given_on: parsed(row, "given_on")?,
             obtained_by: row.try_get("obtained_by")?,
-            medium: Medium::named(&medium).ok_or_else(|| unknown(&format!("medium '{medium}'")))?,
+            medium: named(row, "medium", "a consent", Medium::named)?,
         },
     })
 }

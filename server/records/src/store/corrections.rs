@@ -7,7 +7,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
 use super::insert::Insert;
-use super::values::{begin, nanoseconds, parsed, stamp};
+use super::values::{begin, named, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -134,29 +134,20 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn corrections(&self, session: SessionId) -> Result<Vec<StoredCorrection>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM corrections WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-        rows.iter().map(correction).collect()
+        self.rows("SELECT * FROM corrections WHERE session = ? ORDER BY number", &session, correction).await
     }
 }
 
 fn correction(row: &SqliteRow) -> Result<StoredCorrection, StoreError> {
-    let subject: String = row.try_get("subject")?;
-    let field: String = row.try_get("field")?;
-    let role: String = row.try_get("role")?;
-    let unknown = |what: &str| StoreError::Damaged(format!("a correction has the unknown {what}"));
-
     let correction = Correction {
         session: parsed(row, "session")?,
-        subject: Subject::named(&subject).ok_or_else(|| unknown(&format!("subject '{subject}'")))?,
+        subject: named(row, "subject", "a correction", Subject::named)?,
         record: row.try_get("record")?,
-        field: Field::named(&field).ok_or_else(|| unknown(&format!("field '{field}'")))?,
+        field: named(row, "field", "a correction", Field::named)?,
         old: row.try_get("old_value")?,
         new: row.try_get("new_value")?,
         reason: row.try_get("reason")?,
-        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        by: named(row, "role", "a correction", Role::named)?,
         stamp: stamp(row)?,
     };
     Ok(StoredCorrection { number: row.try_get("number")?, run: row.try_get("run")?, correction })

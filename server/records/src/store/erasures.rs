@@ -10,7 +10,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::actors::name_actor;
 use super::insert::Insert;
 use super::scrub::scrub;
-use super::values::{begin, nanoseconds, parsed, stamp};
+use super::values::{begin, named, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
@@ -189,25 +189,17 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn erasures(&self, session: SessionId) -> Result<Vec<StoredErasure>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM erasures WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-        rows.iter().map(erasure).collect()
+        self.rows("SELECT * FROM erasures WHERE session = ? ORDER BY number", &session, erasure).await
     }
 }
 
 fn erasure(row: &SqliteRow) -> Result<StoredErasure, StoreError> {
-    let subject: String = row.try_get("subject")?;
-    let role: String = row.try_get("role")?;
-    let unknown = |what: &str| StoreError::Damaged(format!("an erasure has the unknown {what}"));
-
     let erasure = Erasure {
         session: parsed(row, "session")?,
-        subject: Erasable::named(&subject).ok_or_else(|| unknown(&format!("subject '{subject}'")))?,
+        subject: named(row, "subject", "an erasure", Erasable::named)?,
         record: row.try_get("record")?,
         reason: row.try_get("reason")?,
-        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        by: named(row, "role", "an erasure", Role::named)?,
         stamp: stamp(row)?,
     };
     Ok(StoredErasure { number: row.try_get("number")?, run: row.try_get("run")?, erasure })

@@ -10,7 +10,7 @@ use super::chain::Entry;
 use super::export::{
     AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
 };
-use super::values::parsed;
+use super::values::{parsed, parsed_if_any};
 use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
 
@@ -27,21 +27,15 @@ pub(super) struct PlannedStudy {
 impl Reader {
     /// The starts of the server that recorded something of `session`.
     pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<RunRow>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
+        let sql = "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
                  SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
                  UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
                  UNION SELECT frame_run FROM comments WHERE session = ?1
                  UNION SELECT run FROM corrections WHERE session = ?1
                  UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1
                  UNION SELECT run FROM voice_pieces WHERE session = ?1)
-             ORDER BY run",
-        )
-        .bind(session.to_string())
-        .fetch_all(self.pool())
-        .await?;
-
-        rows.iter().map(run_row).collect()
+             ORDER BY run";
+        self.rows(sql, &session, run_row).await
     }
 
     /// The plan of study `study`.
@@ -127,11 +121,7 @@ impl Reader {
 
     /// The accesses to `session`.
     pub(super) async fn export_accesses(&self, session: SessionId) -> Result<Vec<AccessRow>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM accesses WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-        rows.iter().map(access_row).collect()
+        self.rows("SELECT * FROM accesses WHERE session = ? ORDER BY number", &session, access_row).await
     }
 
     /// Passes every row of the chain to `take`, with all its columns.
@@ -236,12 +226,6 @@ fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
 }
 
 fn study_event_row(row: &SqliteRow) -> Result<StudyEventRow, StoreError> {
-    let session: Option<String> = row.try_get("session")?;
-    let about_session = match session {
-        Some(_) => Some(parsed(row, "session")?),
-        None => None,
-    };
-
     Ok(StudyEventRow {
         study: row.try_get("study")?,
         number: row.try_get("number")?,
@@ -251,7 +235,7 @@ fn study_event_row(row: &SqliteRow) -> Result<StudyEventRow, StoreError> {
         role: row.try_get("role")?,
         person: row.try_get("person")?,
         kind: row.try_get("kind")?,
-        about_session,
+        about_session: parsed_if_any(row, "session")?,
         commitment: row.try_get("commitment")?,
         reason: row.try_get("reason")?,
     })

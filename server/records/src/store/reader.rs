@@ -111,6 +111,17 @@ impl Reader {
         &self.pool
     }
 
+    /// The rows of `sql`, each read by `read`. The only parameter of `sql` is `parameter`.
+    pub(super) async fn rows<T>(
+        &self,
+        sql: &'static str,
+        parameter: &(impl ToString + Sync),
+        read: impl Fn(&SqliteRow) -> Result<T, StoreError>,
+    ) -> Result<Vec<T>, StoreError> {
+        let rows = sqlx::query(sql).bind(parameter.to_string()).fetch_all(&self.pool).await?;
+        rows.iter().map(read).collect()
+    }
+
     /// Size of the database in bytes, without its log.
     pub(super) async fn bytes(&self) -> Result<u64, StoreError> {
         let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&self.pool).await?;
@@ -216,17 +227,11 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn device_events(&self, session: SessionId) -> Result<Vec<(i64, i64, DeviceEvent)>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
+        let sql = "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
              WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (
                  SELECT 1 FROM events AS e WHERE e.session = ?1 AND e.kind IN ('completed', 'aborted')
                      AND (e.run, e.monotonic_ns) < (d.run, d.monotonic_ns))
-             ORDER BY number",
-        )
-        .bind(session.to_string())
-        .fetch_all(&self.pool)
-        .await?;
-
+             ORDER BY number";
         let event = |row: &SqliteRow| {
             let Stamp { wall, at } = stamp(row)?;
             let device = row.try_get("device")?;
@@ -234,8 +239,7 @@ impl Reader {
             let message = row.try_get("message")?;
             Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
         };
-
-        rows.iter().map(event).collect()
+        self.rows(sql, &session, event).await
     }
 
     /// The focal power of the last command to the lens in `segment`, from telemetry; `None` if no policy was asked

@@ -9,10 +9,10 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
 use super::insert::Insert;
-use super::values::{begin, moment, nanoseconds, parsed, stamp};
+use super::values::{begin, moment, nanoseconds, parsed, parsed_if_any, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use parfocal_base::boxed;
-use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal_base::ids::{IdempotencyKey, SessionId};
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::{CommentContent, Holding, Origin, Sight, WaitClock};
 
@@ -158,7 +158,7 @@ async fn insert_answer(
 
     let kept: String = row.try_get("value")?;
     let same = parsed::<SessionId>(&row, "session")? == answer.session
-        && segment(&row)? == answer.segment
+        && parsed_if_any(&row, "segment")? == answer.segment
         && row.try_get::<String, _>("question")? == answer.question
         && (kept == value || is_erased(&mut transaction, "answer", &answer.key).await?);
     Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
@@ -181,12 +181,8 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn comments(&self, session: SessionId) -> Result<Vec<(i64, Comment)>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM comments WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-
-        rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
+        let kept = |row: &SqliteRow| Ok((row.try_get("run")?, comment(row)?));
+        self.rows("SELECT * FROM comments WHERE session = ? ORDER BY number", &session, kept).await
     }
 
     /// The surgeons' devices that sent comments or answers of `session`, or reported how many they hold, each with its
@@ -195,18 +191,12 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn surgeon_devices(&self, session: SessionId) -> Result<Vec<DeviceReport>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT d.device, t.holding, t.run, t.monotonic_ns
+        let sql = "SELECT d.device, t.holding, t.run, t.monotonic_ns
              FROM (SELECT device FROM surgeon_devices WHERE session = ?1
                  UNION SELECT device FROM comments WHERE session = ?1
                  UNION SELECT device FROM answers WHERE session = ?1) AS d
              LEFT JOIN surgeon_devices AS t ON t.session = ?1 AND t.device = d.device
-             WHERE d.device IS NOT NULL ORDER BY d.device",
-        )
-        .bind(session.to_string())
-        .fetch_all(self.pool())
-        .await?;
-
+             WHERE d.device IS NOT NULL ORDER BY d.device";
         let report = |row: &SqliteRow| {
             let holding: Option<u32> = row.try_get("holding")?;
             let report = match holding {
@@ -216,8 +206,7 @@ impl Reader {
 
             Ok(DeviceReport { device: parsed(row, "device")?, report })
         };
-
-        rows.iter().map(report).collect()
+        self.rows(sql, &session, report).await
     }
 
     /// The answers of `session`, changed ones included, in the order they were kept, each with the start of the server
@@ -226,12 +215,8 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn answers(&self, session: SessionId) -> Result<Vec<(i64, Answer)>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM answers WHERE session = ? ORDER BY number")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-
-        rows.iter().map(|row| Ok((row.try_get("run")?, answer(row)?))).collect()
+        let kept = |row: &SqliteRow| Ok((row.try_get("run")?, answer(row)?));
+        self.rows("SELECT * FROM answers WHERE session = ? ORDER BY number", &session, kept).await
     }
 }
 
@@ -249,9 +234,9 @@ pub fn withdrawn(comments: &[(i64, Comment)]) -> BTreeMap<IdempotencyKey, Timest
 fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
     let frame: Option<i64> = row.try_get("frame")?;
     Ok(Comment {
-        key: parsed::<IdempotencyKey>(row, "key")?,
+        key: parsed(row, "key")?,
         session: parsed(row, "session")?,
-        segment: segment(row)?,
+        segment: parsed_if_any(row, "segment")?,
         frame: frame.map(i64::cast_unsigned),
         frame_run: row.try_get("frame_run")?,
         sight: Sight {
@@ -270,9 +255,9 @@ fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
     let value: AnswerValue =
         serde_json::from_str(&value).map_err(|error| StoreError::Damaged(format!("answer {value}: {error}")))?;
     Ok(Answer {
-        key: parsed::<IdempotencyKey>(row, "key")?,
+        key: parsed(row, "key")?,
         session: parsed(row, "session")?,
-        segment: segment(row)?,
+        segment: parsed_if_any(row, "segment")?,
         question: row.try_get("question")?,
         value,
         origin: origin(row)?,
@@ -282,20 +267,14 @@ fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
 }
 
 fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
-    let device: Option<String> = row.try_get("device")?;
     let waited_by: Option<String> = row.try_get("waited_by")?;
     Ok(Origin {
-        device: device.map(|_| parsed(row, "device")).transpose()?,
+        device: parsed_if_any(row, "device")?,
         sequence: row.try_get("sequence")?,
         client_millis: row.try_get("client_millis")?,
         waited_millis: row.try_get("waited_ms")?,
         waited_by: waited_by.as_deref().and_then(WaitClock::named),
     })
-}
-
-fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {
-    let text: Option<String> = row.try_get("segment")?;
-    text.map(|_| parsed(row, "segment")).transpose()
 }
 
 fn said(row: &SqliteRow) -> Result<CommentContent, StoreError> {

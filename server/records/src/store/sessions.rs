@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
+use super::actors::account;
 use super::chain;
 use super::insert::Insert;
 use super::session_events::insert_event;
@@ -15,7 +16,6 @@ use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use parfocal_base::PolicyName;
 use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_trial::account::AccountName;
 use parfocal_trial::allocation::{Algorithm, Seed};
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::grace::{DEFAULT_GRACE, Grace};
@@ -239,11 +239,9 @@ impl Reader {
     }
 
     async fn segments(&self, session: SessionId) -> Result<Vec<(SegmentId, PolicyName)>, StoreError> {
-        let rows = sqlx::query("SELECT segment, policy FROM segments WHERE session = ? ORDER BY setting")
-            .bind(session.to_string())
-            .fetch_all(self.pool())
-            .await?;
-        rows.iter().map(|row| Ok((parsed(row, "segment")?, PolicyName::new(row.try_get("policy")?)))).collect()
+        let sql = "SELECT segment, policy FROM segments WHERE session = ? ORDER BY setting";
+        let segment = |row: &SqliteRow| Ok((parsed(row, "segment")?, PolicyName::new(row.try_get("policy")?)));
+        self.rows(sql, &session, segment).await
     }
 
     /// The events of `session`, each with the start of the server that recorded it.
@@ -251,16 +249,11 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn events(&self, session: SessionId) -> Result<Vec<(i64, Event)>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT run, number, wall, monotonic_ns, role, payload, (SELECT account FROM actors AS a
+        let sql = "SELECT run, number, wall, monotonic_ns, role, payload, (SELECT account FROM actors AS a
                  WHERE a.kind = 'event' AND a.record = e.session || '/' || e.number) AS account
-             FROM events AS e WHERE session = ? ORDER BY number",
-        )
-        .bind(session.to_string())
-        .fetch_all(self.pool())
-        .await?;
-
-        rows.iter().map(|row| Ok((row.try_get("run")?, event(row)?))).collect()
+             FROM events AS e WHERE session = ? ORDER BY number";
+        let recorded = |row: &SqliteRow| Ok((row.try_get("run")?, event(row)?));
+        self.rows(sql, &session, recorded).await
     }
 
     /// The latest session that is neither completed nor aborted.
@@ -301,10 +294,7 @@ fn event(row: &SqliteRow) -> Result<Event, StoreError> {
     let kind: EventKind =
         serde_json::from_str(&payload).map_err(|error| StoreError::Damaged(format!("event {payload}: {error}")))?;
     let Stamp { wall, at } = stamp(row)?;
-    let account: Option<String> = row.try_get("account")?;
-    let account = account.map(|name| AccountName::new(&name)).transpose();
-    let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
-    Ok(Event { number: row.try_get("number")?, by, account, at, wall, kind })
+    Ok(Event { number: row.try_get("number")?, by, account: account(row)?, at, wall, kind })
 }
 
 pub(super) fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {

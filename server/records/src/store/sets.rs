@@ -4,11 +4,10 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::sessions::{index, seed};
-use super::values::parsed;
+use super::values::{parsed, status};
 use super::{Reader, StoreError};
 use parfocal_trial::allocation::{Algorithm, Seed};
 use parfocal_trial::balanced_set::{BalancedSet, Member};
-use parfocal_trial::phase::SessionStatus;
 
 impl Reader {
     /// The balanced set of the latest session outside any study that has this protocol, by its hash, and this
@@ -42,35 +41,22 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn balanced_set(&self, seed: Seed) -> Result<BalancedSet, StoreError> {
-        let rows = sqlx::query(
-            "SELECT session, participant, wall, set_index,
+        let sql = "SELECT session, participant, wall, set_index,
                  EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'completed') AS completed,
                  EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'aborted') AS aborted,
                  EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded') AS unblinded
-             FROM sessions AS s WHERE seed = ? ORDER BY rowid",
-        )
-        .bind(seed.to_hex())
-        .fetch_all(self.pool())
-        .await?;
-
-        let members = rows.iter().map(member).collect::<Result<_, _>>()?;
-        Ok(BalancedSet { seed, members })
+             FROM sessions AS s WHERE seed = ? ORDER BY rowid";
+        Ok(BalancedSet { seed, members: self.rows(sql, &seed.to_hex(), member).await? })
     }
 }
 
 fn member(row: &SqliteRow) -> Result<Member, StoreError> {
-    let status = match (row.try_get("completed")?, row.try_get("aborted")?) {
-        (_, true) => SessionStatus::Aborted,
-        (true, false) => SessionStatus::Completed,
-        (false, false) => SessionStatus::UnderWay,
-    };
-
     Ok(Member {
         session: parsed(row, "session")?,
         participant: row.try_get("participant")?,
         made: parsed(row, "wall")?,
         place: index(row)?,
-        status,
+        status: status(row)?,
         unblinded: row.try_get("unblinded")?,
     })
 }

@@ -6,6 +6,7 @@ use sqlx::{Connection, Row, Sqlite, Transaction};
 
 use super::{Stamp, StoreError};
 use parfocal_base::clock::Moment;
+use parfocal_trial::phase::SessionStatus;
 
 /// A moment as the database keeps it. The range is 292 years of uptime.
 pub(super) fn nanoseconds(at: Moment) -> i64 {
@@ -29,6 +30,35 @@ where
 {
     let text: String = row.try_get(column)?;
     text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
+}
+
+/// Column `column` of `row`, parsed from text; `None` if it is empty.
+pub(super) fn parsed_if_any<T>(row: &SqliteRow, column: &str) -> Result<Option<T>, StoreError>
+where
+    T: std::str::FromStr<Err: std::fmt::Display>,
+{
+    let text: Option<String> = row.try_get(column)?;
+    text.map(|_| parsed(row, column)).transpose()
+}
+
+/// What column `column` of `row` names; `known` finds it by its name. Errors call the record `of`.
+pub(super) fn named<T>(
+    row: &SqliteRow,
+    column: &str,
+    of: &str,
+    known: impl FnOnce(&str) -> Option<T>,
+) -> Result<T, StoreError> {
+    let name: String = row.try_get(column)?;
+    known(&name).ok_or_else(|| StoreError::Damaged(format!("{of} has the unknown {column} '{name}'")))
+}
+
+/// The state of a session, from the columns `completed` and `aborted`.
+pub(super) fn status(row: &SqliteRow) -> Result<SessionStatus, StoreError> {
+    Ok(match (row.try_get("completed")?, row.try_get("aborted")?) {
+        (_, true) => SessionStatus::Aborted,
+        (true, false) => SessionStatus::Completed,
+        (false, false) => SessionStatus::UnderWay,
+    })
 }
 
 /// Begins a transaction that has the right to write from its beginning, so that nobody else writes between its reads

@@ -210,17 +210,13 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn voice(&self, session: SessionId) -> Result<BTreeMap<IdempotencyKey, VoiceRecording>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT number, comment, piece, media_type, through_ms, ended, bytes, sha256, run, wall, monotonic_ns
-             FROM voice_pieces WHERE session = ? ORDER BY comment, piece",
-        )
-        .bind(session.to_string())
-        .fetch_all(self.pool())
-        .await?;
+        let sql = "SELECT number, comment, piece, media_type, through_ms, ended, bytes, sha256, run, wall, monotonic_ns
+             FROM voice_pieces WHERE session = ? ORDER BY comment, piece";
+        let of_comment = |row: &SqliteRow| Ok((parsed(row, "comment")?, stored(row)?));
 
         let mut recordings: BTreeMap<IdempotencyKey, VoiceRecording> = BTreeMap::new();
-        for row in &rows {
-            recordings.entry(parsed(row, "comment")?).or_default().pieces.push(stored(row)?);
+        for (comment, piece) in self.rows(sql, &session, of_comment).await? {
+            recordings.entry(comment).or_default().pieces.push(piece);
         }
         Ok(recordings)
     }

@@ -29,18 +29,13 @@ impl Reader {
     /// # Errors
     /// If the database fails.
     pub async fn withdrawals(&self, session: SessionId) -> Result<Vec<Withdrawal>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT s.session, s.protocol, s.place, e.wall, e.role
+        let sql = "SELECT s.session, s.protocol, s.place, e.wall, e.role
              FROM (SELECT session, protocol, protocol_sha256,
                      row_number() OVER (PARTITION BY protocol_sha256 ORDER BY rowid) AS place FROM sessions) AS s
                  JOIN events AS e ON e.session = s.session AND e.kind = 'withdrawn'
              WHERE s.protocol_sha256 = (SELECT protocol_sha256 FROM sessions WHERE session = ?)
-             ORDER BY s.place",
-        )
-        .bind(session.to_string())
-        .fetch_all(self.pool())
-        .await?;
-        rows.iter().map(withdrawal).collect()
+             ORDER BY s.place";
+        self.rows(sql, &session, withdrawal).await
     }
 }
 

@@ -5,13 +5,12 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::{Enrolment, StoredStudy};
-use crate::store::values::parsed;
+use crate::store::actors::account;
+use crate::store::values::{parsed, parsed_if_any, status};
 use crate::store::{Reader, StoreError};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_trial::account::AccountName;
 use parfocal_trial::allocation::Seed;
-use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::Definition;
 use parfocal_trial::study::event::{StudyEvent, StudyEventKind};
@@ -54,17 +53,12 @@ impl Reader {
     }
 
     async fn study_protocols(&self, study: &str) -> Result<Vec<Protocol>, StoreError> {
-        let rows: Vec<(String, String)> =
-            sqlx::query_as("SELECT protocol, protocol_toml FROM study_protocols WHERE study = ? ORDER BY protocol")
-                .bind(study)
-                .fetch_all(self.pool())
-                .await?;
-
-        let protocol = |(name, text): (String, String)| {
-            Protocol::parse_kept(&text, &name)
+        let sql = "SELECT protocol, protocol_toml FROM study_protocols WHERE study = ? ORDER BY protocol";
+        let protocol = |row: &SqliteRow| {
+            Protocol::parse_kept(row.try_get("protocol_toml")?, row.try_get("protocol")?)
                 .map_err(|error| StoreError::Damaged(format!("study {study}, protocol {error}")))
         };
-        rows.into_iter().map(protocol).collect()
+        self.rows(sql, &study, protocol).await
     }
 
     async fn study_seed(&self, study: &str) -> Result<Option<Seed>, StoreError> {
@@ -85,33 +79,23 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn study_events(&self, study: &str) -> Result<Vec<StudyEvent>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT *, (SELECT account FROM actors AS a
+        let sql = "SELECT *, (SELECT account FROM actors AS a
                  WHERE a.kind = 'study-event' AND a.record = study || '/' || e.number) AS account
-             FROM study_events AS e WHERE study = ? ORDER BY number",
-        )
-        .bind(study)
-        .fetch_all(self.pool())
-        .await?;
-        rows.iter().map(event).collect()
+             FROM study_events AS e WHERE study = ? ORDER BY number";
+        self.rows(sql, &study, event).await
     }
 
     /// The sessions of study `study`, in the order in which they were made.
     async fn enrolled(&self, study: &str) -> Result<Vec<Enrolled>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT m.session, m.site, m.protocol, m.place, s.participant,
+        let sql = "SELECT m.session, m.site, m.protocol, m.place, s.participant,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'completed') AS completed,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'aborted') AS aborted,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'unblinded') AS unblinded,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn,
                  (SELECT new_value FROM corrections AS c WHERE c.session = m.session AND field = 'participant'
                      ORDER BY number DESC LIMIT 1) AS corrected_participant
-             FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid",
-        )
-        .bind(study)
-        .fetch_all(self.pool())
-        .await?;
-        rows.iter().map(enrolled).collect()
+             FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid";
+        self.rows(sql, &study, enrolled).await
     }
 
     /// The place of `session` in its study; `None` outside any study.
@@ -155,15 +139,9 @@ impl Reader {
 fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
     let way: String = row.try_get("role")?;
     let kind: String = row.try_get("kind")?;
-    let session: Option<String> = row.try_get("session")?;
-    let session = match session {
-        Some(_) => Some(parsed(row, "session")?),
-        None => None,
-    };
+    let session = parsed_if_any(row, "session")?;
+    let account = account(row)?;
 
-    let account: Option<String> = row.try_get("account")?;
-    let account = account.map(|name| AccountName::new(&name)).transpose();
-    let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
     Ok(StudyEvent {
         number: row.try_get("number")?,
         way: Channel::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
@@ -175,12 +153,6 @@ fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
 }
 
 fn enrolled(row: &SqliteRow) -> Result<Enrolled, StoreError> {
-    let status = match (row.try_get("completed")?, row.try_get("aborted")?) {
-        (_, true) => SessionStatus::Aborted,
-        (true, false) => SessionStatus::Completed,
-        (false, false) => SessionStatus::UnderWay,
-    };
-
     Ok(Enrolled {
         session: parsed(row, "session")?,
         participant: row.try_get("participant")?,
@@ -188,7 +160,7 @@ fn enrolled(row: &SqliteRow) -> Result<Enrolled, StoreError> {
         site: row.try_get("site")?,
         protocol: row.try_get("protocol")?,
         place: place(row)?,
-        status,
+        status: status(row)?,
         unblinded: row.try_get("unblinded")?,
         withdrawn: row.try_get("withdrawn")?,
     })

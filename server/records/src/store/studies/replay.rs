@@ -2,6 +2,7 @@
 //! the study are replayed in the order of the chain.
 
 use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
 
 use super::StoredStudy;
 use crate::store::values::parsed;
@@ -108,8 +109,7 @@ fn apply(enrolled: &mut Enrolled, change: &Change) {
 
 /// What happened to study `study` and its sessions, in the order of the chain.
 async fn moments(snapshot: &Reader, study: &str) -> Result<Vec<Moment>, StoreError> {
-    let rows = sqlx::query(
-        "SELECT c.number AS moment, e.kind AS kind, NULL AS session, NULL AS participant FROM study_events AS e
+    let sql = "SELECT c.number AS moment, e.kind AS kind, NULL AS session, NULL AS participant FROM study_events AS e
              JOIN chain AS c ON c.kind = 'study-event' AND c.key = e.study || '/' || e.number
              WHERE e.study = ?1 AND e.kind IN ('opened', 'closed')
          UNION ALL
@@ -124,14 +124,9 @@ async fn moments(snapshot: &Reader, study: &str) -> Result<Vec<Moment>, StoreErr
              FROM study_sessions AS m JOIN corrections AS k USING (session)
              JOIN chain AS c ON c.kind = 'correction' AND c.key = CAST(k.number AS TEXT)
              WHERE m.study = ?1 AND k.field = 'participant'
-         ORDER BY moment",
-    )
-    .bind(study)
-    .fetch_all(snapshot.pool())
-    .await?;
-
-    let moment = |row| {
-        let kind: String = Row::try_get(row, "kind")?;
+         ORDER BY moment";
+    let moment = |row: &SqliteRow| {
+        let kind: String = row.try_get("kind")?;
         let change = match kind.as_str() {
             "opened" => return Ok(Moment::Opened),
             "closed" => return Ok(Moment::Closed),
@@ -139,10 +134,10 @@ async fn moments(snapshot: &Reader, study: &str) -> Result<Vec<Moment>, StoreErr
             "completed" => Change::Completed,
             "aborted" => Change::Aborted,
             "unblinded" => Change::Unblinded,
-            "corrected" => Change::Corrected(Row::try_get(row, "participant")?),
+            "corrected" => Change::Corrected(row.try_get("participant")?),
             _ => Change::Withdrawn,
         };
         Ok(Moment::Changed(parsed(row, "session")?, change))
     };
-    rows.iter().map(moment).collect()
+    snapshot.rows(sql, &study, moment).await
 }
