@@ -165,21 +165,20 @@ impl AccessLog {
         run: Option<i64>,
         access: &Access,
     ) -> Result<Head, StoreError> {
-        let mut transaction = super::values::begin(connection).await?;
         let wall = self.clock.wall().to_string();
         let session = access.session().map(|session| session.to_string());
 
         // A backup may hold sign-ins that were ended since it was made. So a restore ends all sign-ins.
         if matches!(access, Access::Restored { .. }) {
-            sqlx::query("DELETE FROM sign_ins").execute(&mut *transaction).await?;
+            sqlx::query("DELETE FROM sign_ins").execute(&mut *connection).await?;
         }
 
         // Chains the session's telemetry first, so that the export can prove it.
         if let Access::Exported { session, .. } = access {
-            chain::seal(&mut transaction, &session.to_string(), &wall).await?;
+            chain::seal(connection, &session.to_string(), &wall).await?;
         }
 
-        let done = Insert::into("accesses")
+        let number = Insert::into("accesses")
             .set("run", run)
             .set("wall", &wall)
             .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
@@ -187,14 +186,12 @@ impl AccessLog {
             .set("kind", access.name())
             .set("session", session)
             .set("detail", access.detail())
-            .execute(&mut transaction)
-            .await?;
+            .execute(connection)
+            .await?
+            .to_string();
 
-        let number = done.last_insert_rowid().to_string();
-        name_actor(&mut transaction, self.account.as_ref(), "access", &number, access.session(), &wall).await?;
+        name_actor(connection, self.account.as_ref(), "access", &number, access.session(), &wall).await?;
         // Last, because the chain in an export ends with the record of that export.
-        let head = chain::append(&mut transaction, "access", &number, &wall).await?;
-        transaction.commit().await?;
-        Ok(head)
+        chain::append(connection, "access", &number, &wall).await
     }
 }

@@ -1,11 +1,11 @@
 //! Consents: what participants agreed to before their sessions.
 
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::sqlite::SqliteRow;
 
 use super::actors::name_actor;
 use super::insert::Insert;
-use super::values::{begin, named, nanoseconds, parsed, stamp};
+use super::values::{named, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
@@ -33,6 +33,8 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn keep_consent(
         &self,
         session: SessionId,
@@ -40,39 +42,25 @@ impl Store {
         by: &Actor,
         stamp: Stamp,
     ) -> Result<(), StoreError> {
-        self.write(async |connection| insert_consent(connection, self.inner.run, session, consent, by, stamp).await)
-            .await
+        self.write(async |connection| {
+            let number = Insert::into("consents")
+                .set("session", session.to_string())
+                .set("text_version", &consent.text_version)
+                .set("given_on", consent.given_on.to_string())
+                .set("obtained_by", &consent.obtained_by)
+                .set("medium", consent.medium.name())
+                .set("role", by.role.name())
+                .recorded(self.inner.run, stamp)
+                .execute(connection)
+                .await?
+                .to_string();
+
+            let wall = stamp.wall.to_string();
+            chain::append(connection, "consent", &number, &wall).await?;
+            name_actor(connection, by.account.as_ref(), "consent", &number, Some(session), &wall).await
+        })
+        .await
     }
-}
-
-#[boxed]
-async fn insert_consent(
-    connection: &mut SqliteConnection,
-    run: i64,
-    session: SessionId,
-    consent: &Consent,
-    by: &Actor,
-    stamp: Stamp,
-) -> Result<(), StoreError> {
-    let wall = stamp.wall.to_string();
-    let mut transaction = begin(connection).await?;
-    let done = Insert::into("consents")
-        .set("session", session.to_string())
-        .set("text_version", &consent.text_version)
-        .set("given_on", consent.given_on.to_string())
-        .set("obtained_by", &consent.obtained_by)
-        .set("medium", consent.medium.name())
-        .set("role", by.role.name())
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(stamp.at))
-        .execute(&mut transaction)
-        .await?;
-
-    let number = done.last_insert_rowid().to_string();
-    chain::append(&mut transaction, "consent", &number, &wall).await?;
-    name_actor(&mut transaction, by.account.as_ref(), "consent", &number, Some(session), &wall).await?;
-    Ok(transaction.commit().await?)
 }
 
 impl Reader {

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::sqlite::SqliteRow;
 
 use super::actors::name_actor;
 use super::insert::Insert;
-use super::values::{begin, named, nanoseconds, parsed, stamp};
+use super::values::{named, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -92,40 +92,31 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
-        self.write(async |connection| insert_correction(connection, self.inner.run, correction, account).await).await
+        self.write(async |connection| {
+            let number = Insert::into("corrections")
+                .set("session", correction.session.to_string())
+                .set("subject", correction.subject.name())
+                .set("record", &correction.record)
+                .set("field", correction.field.name())
+                .set("old_value", &correction.old)
+                .set("new_value", &correction.new)
+                .set("reason", &correction.reason)
+                .set("role", correction.by.name())
+                .recorded(self.inner.run, correction.stamp)
+                .execute(connection)
+                .await?
+                .to_string();
+
+            let session = Some(correction.session);
+            let wall = correction.stamp.wall.to_string();
+            chain::append(connection, "correction", &number, &wall).await?;
+            name_actor(connection, account, "correction", &number, session, &wall).await
+        })
+        .await
     }
-}
-
-#[boxed]
-async fn insert_correction(
-    connection: &mut SqliteConnection,
-    run: i64,
-    correction: &Correction,
-    account: Option<&AccountName>,
-) -> Result<(), StoreError> {
-    let wall = correction.stamp.wall.to_string();
-    let mut transaction = begin(connection).await?;
-    let done = Insert::into("corrections")
-        .set("session", correction.session.to_string())
-        .set("subject", correction.subject.name())
-        .set("record", &correction.record)
-        .set("field", correction.field.name())
-        .set("old_value", &correction.old)
-        .set("new_value", &correction.new)
-        .set("reason", &correction.reason)
-        .set("role", correction.by.name())
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(correction.stamp.at))
-        .execute(&mut transaction)
-        .await?;
-
-    let number = done.last_insert_rowid().to_string();
-    chain::append(&mut transaction, "correction", &number, &wall).await?;
-    let session = Some(correction.session);
-    name_actor(&mut transaction, account, "correction", &number, session, &wall).await?;
-    Ok(transaction.commit().await?)
 }
 
 impl Reader {

@@ -25,8 +25,8 @@ use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
-use super::values::{begin, nanoseconds};
-use super::writes::{Turn, WriteKind, Writes};
+use super::values::nanoseconds;
+use super::writes::{Turn, Writes, write_on};
 use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.
@@ -213,15 +213,16 @@ impl Store {
 
     /// Waits for the turn to write records.
     pub(super) async fn turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Records)
+        self.inner.writes.begin(self.inner.turn.lock().await, &self.inner.writes.records)
     }
 
     /// Waits for the turn to write telemetry.
     pub(super) async fn telemetry_turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, WriteKind::Telemetry)
+        self.inner.writes.begin(self.inner.turn.lock().await, &self.inner.writes.telemetry)
     }
 
-    /// Writes records, in a turn of their own. What `write` has committed is on disk when this returns.
+    /// Writes records, in a turn and a transaction of their own. All of them are on disk when this returns; if it
+    /// fails, none is written.
     pub(super) async fn write<T>(
         &self,
         write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
@@ -230,7 +231,7 @@ impl Store {
         turn.write(&self.inner.trial, write).await
     }
 
-    /// Writes telemetry, in a turn of its own.
+    /// Writes telemetry, in a turn and a transaction of its own.
     pub(super) async fn write_telemetry<T>(
         &self,
         write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
@@ -243,16 +244,45 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
-        self.write(async |connection| insert_device_event(connection, self.inner.run, event).await).await
+        self.write(async |connection| {
+            let number = Insert::into("device_events")
+                .set("device", &event.device)
+                .set("working", event.working)
+                .set("message", &event.message)
+                .recorded(self.inner.run, Stamp { wall: event.wall, at: event.at })
+                .execute(connection)
+                .await?;
+
+            chain::append(connection, "device", &number.to_string(), &event.wall.to_string()).await?;
+            Ok(())
+        })
+        .await
     }
 
     /// Adds participant `code`. A participant that exists already stays as it is.
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
-        self.write(async |connection| insert_participant(connection, code, &wall.to_string()).await).await
+        let wall = wall.to_string();
+        self.write(async |connection| {
+            let done = sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
+                .bind(code)
+                .bind(&wall)
+                .execute(&mut *connection)
+                .await?;
+
+            if done.rows_affected() == 1 {
+                chain::append(connection, "participant", code, &wall).await?;
+            }
+            Ok(())
+        })
+        .await
     }
 
     /// Limits the database to `pages` pages, so that tests can simulate a full disk.
@@ -282,27 +312,26 @@ async fn begin_run(trial: &SqlitePool, run: &ServerRun) -> Result<i64, StoreErro
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
 
-    let mut connection = trial.acquire().await?;
-    let mut transaction = begin(&mut connection).await?;
-    seal_what_was_left(&mut transaction, &wall).await?;
+    write_on(trial, async |connection| {
+        seal_what_was_left(connection, &wall).await?;
 
-    let done = Insert::into("runs")
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(run.at))
-        .set("version", env!("CARGO_PKG_VERSION"))
-        .set("camera", &run.camera)
-        .set("lens", &run.lens)
-        .set("calibration", &run.calibration)
-        .set("blur", run.blur.map(BlurRate::get))
-        .set("weights", weights)
-        .set("seed", run.seed.map(u64::cast_signed))
-        .execute(&mut transaction)
-        .await?;
+        let number = Insert::into("runs")
+            .set("wall", &wall)
+            .set("monotonic_ns", nanoseconds(run.at))
+            .set("version", env!("CARGO_PKG_VERSION"))
+            .set("camera", &run.camera)
+            .set("lens", &run.lens)
+            .set("calibration", &run.calibration)
+            .set("blur", run.blur.map(BlurRate::get))
+            .set("weights", weights)
+            .set("seed", run.seed.map(u64::cast_signed))
+            .execute(connection)
+            .await?;
 
-    let number = done.last_insert_rowid();
-    chain::append(&mut transaction, "run", &number.to_string(), &wall).await?;
-    transaction.commit().await?;
-    Ok(number)
+        chain::append(connection, "run", &number.to_string(), &wall).await?;
+        Ok(number)
+    })
+    .await
 }
 
 /// Chains the telemetry that the latest run left unchained. A session under way has an event in every run, so the
@@ -314,44 +343,6 @@ async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Re
         chain::seal(connection, &session, wall).await?;
     }
     Ok(())
-}
-
-#[boxed]
-async fn insert_device_event(
-    connection: &mut SqliteConnection,
-    run: i64,
-    event: &DeviceEvent,
-) -> Result<(), StoreError> {
-    let wall = event.wall.to_string();
-    let mut transaction = begin(connection).await?;
-    let done = Insert::into("device_events")
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(event.at))
-        .set("device", &event.device)
-        .set("working", event.working)
-        .set("message", &event.message)
-        .execute(&mut transaction)
-        .await?;
-
-    let number = done.last_insert_rowid().to_string();
-    chain::append(&mut transaction, "device", &number, &wall).await?;
-    Ok(transaction.commit().await?)
-}
-
-#[boxed]
-async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall: &str) -> Result<(), StoreError> {
-    let mut transaction = begin(connection).await?;
-    let done = sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
-        .bind(code)
-        .bind(wall)
-        .execute(&mut *transaction)
-        .await?;
-
-    if done.rows_affected() == 1 {
-        chain::append(&mut transaction, "participant", code, wall).await?;
-    }
-    Ok(transaction.commit().await?)
 }
 
 /// Keeps other accounts of the machine out of the folder and its files, which hold seeds, policies and what surgeons

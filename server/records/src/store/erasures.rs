@@ -10,7 +10,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::actors::name_actor;
 use super::insert::Insert;
 use super::scrub::scrub;
-use super::values::{begin, named, nanoseconds, parsed, stamp};
+use super::values::{named, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
@@ -74,9 +74,19 @@ impl Store {
     /// # Errors
     /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
     /// free pages of the file or in its log, until [`Store::finish_erasures`] succeeds or the server starts again.
+    #[boxed]
+    #[must_use]
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
-        let run = self.inner.run;
-        self.write(async |connection| insert_erasures(connection, run, erasures, account).await).await?;
+        self.write(async |connection| {
+            // Deleted content is overwritten with zeros. The setting stays with this connection; the others do not need
+            // it.
+            sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
+            for erasure in erasures {
+                insert_erasure(connection, self.inner.run, erasure, account).await?;
+            }
+            Ok(())
+        })
+        .await?;
         self.finish_erasures().await.map(drop)
     }
 
@@ -91,29 +101,12 @@ impl Store {
     }
 }
 
-#[boxed]
-async fn insert_erasures(
-    connection: &mut SqliteConnection,
-    run: i64,
-    erasures: &[Erasure],
-    account: Option<&AccountName>,
-) -> Result<(), StoreError> {
-    // Deleted content is overwritten with zeros. The setting stays with this connection; the others do not need it.
-    sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
-    let mut transaction = begin(connection).await?;
-    for erasure in erasures {
-        insert_erasure(&mut transaction, run, erasure, account).await?;
-    }
-    Ok(transaction.commit().await?)
-}
-
 async fn insert_erasure(
     connection: &mut SqliteConnection,
     run: i64,
     erasure: &Erasure,
     account: Option<&AccountName>,
 ) -> Result<(), StoreError> {
-    let wall = erasure.stamp.wall.to_string();
     let known = "SELECT number FROM erasures WHERE subject = ? AND record = ?";
     let known: Option<i64> = sqlx::query_scalar(known)
         .bind(erasure.subject.name())
@@ -125,18 +118,15 @@ async fn insert_erasure(
         return note_unfinished(connection, known).await;
     }
 
-    let done = Insert::into("erasures")
+    let number = Insert::into("erasures")
         .set("session", erasure.session.to_string())
         .set("subject", erasure.subject.name())
         .set("record", &erasure.record)
         .set("reason", &erasure.reason)
         .set("role", erasure.by.name())
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(erasure.stamp.at))
+        .recorded(run, erasure.stamp)
         .execute(connection)
         .await?;
-    let number = done.last_insert_rowid();
 
     let emptied = match erasure.subject {
         Erasable::Answer => "UPDATE answers SET value = '\"\"' WHERE key = ?",
@@ -161,10 +151,11 @@ async fn insert_erasure(
         .execute(&mut *connection)
         .await?;
     note_unfinished(connection, number).await?;
+
     let key = number.to_string();
+    let wall = erasure.stamp.wall.to_string();
     chain::append(connection, "erasure", &key, &wall).await?;
-    name_actor(connection, account, "erasure", &key, Some(erasure.session), &wall).await?;
-    Ok(())
+    name_actor(connection, account, "erasure", &key, Some(erasure.session), &wall).await
 }
 
 async fn note_unfinished(connection: &mut SqliteConnection, number: i64) -> Result<(), StoreError> {

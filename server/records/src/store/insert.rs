@@ -3,7 +3,9 @@
 use sqlx::sqlite::{Sqlite, SqliteArguments, SqliteConnection, SqliteQueryResult};
 use sqlx::{Arguments, AssertSqlSafe, Encode, Type};
 
-use super::StoreError;
+use super::values::nanoseconds;
+use super::{Stamp, StoreError};
+use parfocal_trial::remark::{Origin, WaitClock};
 
 /// A row to be inserted.
 pub(super) struct Insert {
@@ -28,9 +30,23 @@ impl Insert {
         self
     }
 
-    /// Inserts it.
-    pub(super) async fn execute(self, connection: &mut SqliteConnection) -> Result<SqliteQueryResult, StoreError> {
-        self.run(connection, "").await
+    /// The same row with the run that records it, and when, by both clocks.
+    pub(super) fn recorded(self, run: i64, stamp: Stamp) -> Self {
+        self.set("run", run).set("wall", stamp.wall.to_string()).set("monotonic_ns", nanoseconds(stamp.at))
+    }
+
+    /// The same row with where and when it was entered on a surgeon's device.
+    pub(super) fn entered(self, origin: &Origin) -> Self {
+        self.set("device", origin.device.map(|device| device.to_string()))
+            .set("sequence", origin.sequence)
+            .set("client_millis", origin.client_millis)
+            .set("waited_ms", origin.waited_millis)
+            .set("waited_by", origin.waited_by.map(WaitClock::name))
+    }
+
+    /// Inserts it. Returns the row's number.
+    pub(super) async fn execute(self, connection: &mut SqliteConnection) -> Result<i64, StoreError> {
+        Ok(self.run(connection, "").await?.last_insert_rowid())
     }
 
     /// Inserts it unless there is a row with the same `key`. Returns whether it was inserted.

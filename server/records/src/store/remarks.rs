@@ -9,7 +9,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
 use super::insert::Insert;
-use super::values::{begin, moment, nanoseconds, parsed, parsed_if_any, stamp};
+use super::values::{moment, nanoseconds, parsed, parsed_if_any, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -32,16 +32,88 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn keep_comment(&self, comment: &Comment) -> Result<KeepOutcome, StoreError> {
-        self.write(async |connection| insert_comment(connection, self.inner.run, comment).await).await
+        let key = comment.key.to_string();
+        let (kind, text) = said_columns(&comment.said);
+
+        self.write(async |connection| {
+            let is_new = Insert::into("comments")
+                .set("key", &key)
+                .set("session", comment.session.to_string())
+                .set("segment", comment.segment.map(|segment| segment.to_string()))
+                .recorded(self.inner.run, comment.stamp)
+                .entered(&comment.origin)
+                .set("late", comment.late)
+                .set("frame", comment.frame.map(u64::cast_signed))
+                .set("frame_run", comment.frame_run)
+                .set("picture_width", comment.sight.picture_width)
+                .set("pictures_per_second", comment.sight.pictures_per_second)
+                .set("kind", kind)
+                .set("text", text.as_deref())
+                .execute_once(connection)
+                .await?;
+
+            if is_new {
+                chain::append(connection, "comment", &key, &comment.stamp.wall.to_string()).await?;
+                return Ok(KeepOutcome::New);
+            }
+
+            // Sent again, or another comment under the same key?
+            let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
+                .bind(&key)
+                .fetch_one(&mut *connection)
+                .await?;
+
+            let same = parsed::<SessionId>(&row, "session")? == comment.session
+                && (said(&row)? == comment.said || is_erased(connection, "comment", &key).await?);
+            Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
+        })
+        .await
     }
 
     /// Keeps an answer. It is on disk when this returns.
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn keep_answer(&self, answer: &Answer) -> Result<KeepOutcome, StoreError> {
-        self.write(async |connection| insert_answer(connection, self.inner.run, answer).await).await
+        let key = answer.key.to_string();
+        let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
+
+        self.write(async |connection| {
+            let is_new = Insert::into("answers")
+                .set("key", &key)
+                .set("session", answer.session.to_string())
+                .set("segment", answer.segment.map(|segment| segment.to_string()))
+                .set("question", &answer.question)
+                .set("value", &value)
+                .recorded(self.inner.run, answer.stamp)
+                .entered(&answer.origin)
+                .set("late", answer.late)
+                .execute_once(connection)
+                .await?;
+
+            if is_new {
+                chain::append(connection, "answer", &key, &answer.stamp.wall.to_string()).await?;
+                return Ok(KeepOutcome::New);
+            }
+
+            // Sent again, or another answer under the same key?
+            let row = sqlx::query("SELECT session, segment, question, value FROM answers WHERE key = ?")
+                .bind(&key)
+                .fetch_one(&mut *connection)
+                .await?;
+
+            let same = parsed::<SessionId>(&row, "session")? == answer.session
+                && parsed_if_any(&row, "segment")? == answer.segment
+                && row.try_get::<String, _>("question")? == answer.question
+                && (row.try_get::<String, _>("value")? == value || is_erased(connection, "answer", &key).await?);
+            Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
+        })
+        .await
     }
 
     /// Notes how many comments and answers of a session a surgeon's device still holds, at `stamp`.
@@ -67,112 +139,11 @@ impl Store {
     }
 }
 
-#[boxed]
-async fn insert_comment(
-    connection: &mut SqliteConnection,
-    run: i64,
-    comment: &Comment,
-) -> Result<KeepOutcome, StoreError> {
-    let wall = comment.stamp.wall.to_string();
-    let (kind, text) = said_columns(&comment.said);
-
-    let mut transaction = begin(connection).await?;
-    let is_new = Insert::into("comments")
-        .set("key", comment.key.to_string())
-        .set("session", comment.session.to_string())
-        .set("segment", comment.segment.map(|segment| segment.to_string()))
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(comment.stamp.at))
-        .set("device", comment.origin.device.map(|device| device.to_string()))
-        .set("sequence", comment.origin.sequence)
-        .set("client_millis", comment.origin.client_millis)
-        .set("waited_ms", comment.origin.waited_millis)
-        .set("waited_by", comment.origin.waited_by.map(WaitClock::name))
-        .set("late", comment.late)
-        .set("frame", comment.frame.map(u64::cast_signed))
-        .set("frame_run", comment.frame_run)
-        .set("picture_width", comment.sight.picture_width)
-        .set("pictures_per_second", comment.sight.pictures_per_second)
-        .set("kind", kind)
-        .set("text", text.as_deref())
-        .execute_once(&mut transaction)
-        .await?;
-
-    if is_new {
-        chain::append(&mut transaction, "comment", &comment.key.to_string(), &wall).await?;
-        transaction.commit().await?;
-        return Ok(KeepOutcome::New);
-    }
-
-    // Sent again, or another comment under the same key?
-    let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
-        .bind(comment.key.to_string())
-        .fetch_one(&mut *transaction)
-        .await?;
-
-    let same = parsed::<SessionId>(&row, "session")? == comment.session
-        && (said(&row)? == comment.said || is_erased(&mut transaction, "comment", &comment.key).await?);
-    Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
-}
-
-#[boxed]
-async fn insert_answer(
-    connection: &mut SqliteConnection,
-    run: i64,
-    answer: &Answer,
-) -> Result<KeepOutcome, StoreError> {
-    let wall = answer.stamp.wall.to_string();
-    let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
-
-    let mut transaction = begin(connection).await?;
-    let is_new = Insert::into("answers")
-        .set("key", answer.key.to_string())
-        .set("session", answer.session.to_string())
-        .set("segment", answer.segment.map(|segment| segment.to_string()))
-        .set("question", &answer.question)
-        .set("value", &value)
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(answer.stamp.at))
-        .set("device", answer.origin.device.map(|device| device.to_string()))
-        .set("sequence", answer.origin.sequence)
-        .set("client_millis", answer.origin.client_millis)
-        .set("waited_ms", answer.origin.waited_millis)
-        .set("waited_by", answer.origin.waited_by.map(WaitClock::name))
-        .set("late", answer.late)
-        .execute_once(&mut transaction)
-        .await?;
-
-    if is_new {
-        chain::append(&mut transaction, "answer", &answer.key.to_string(), &wall).await?;
-        transaction.commit().await?;
-        return Ok(KeepOutcome::New);
-    }
-
-    // Sent again, or another answer under the same key?
-    let row = sqlx::query("SELECT session, segment, question, value FROM answers WHERE key = ?")
-        .bind(answer.key.to_string())
-        .fetch_one(&mut *transaction)
-        .await?;
-
-    let kept: String = row.try_get("value")?;
-    let same = parsed::<SessionId>(&row, "session")? == answer.session
-        && parsed_if_any(&row, "segment")? == answer.segment
-        && row.try_get::<String, _>("question")? == answer.question
-        && (kept == value || is_erased(&mut transaction, "answer", &answer.key).await?);
-    Ok(if same { KeepOutcome::Before } else { KeepOutcome::KeyTaken })
-}
-
 /// Whether the words of the comment or answer with this key were erased. If a tablet sends them again, the server
 /// answers that they are kept, so that the tablet deletes its copy.
-pub(super) async fn is_erased(
-    connection: &mut SqliteConnection,
-    subject: &str,
-    key: &IdempotencyKey,
-) -> Result<bool, StoreError> {
+pub(super) async fn is_erased(connection: &mut SqliteConnection, subject: &str, key: &str) -> Result<bool, StoreError> {
     let erased = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM erasures WHERE subject = ? AND record = ?)");
-    Ok(erased.bind(subject).bind(key.to_string()).fetch_one(connection).await?)
+    Ok(erased.bind(subject).bind(key).fetch_one(connection).await?)
 }
 
 impl Reader {

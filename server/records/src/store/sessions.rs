@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::sqlite::SqliteRow;
 
 use super::actors::account;
 use super::chain;
 use super::insert::Insert;
 use super::session_events::insert_event;
 use super::studies::{Enrolment, enrol};
-use super::values::{begin, nanoseconds, parsed, stamp};
+use super::values::{parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use parfocal_base::PolicyName;
 use parfocal_base::boxed;
@@ -99,21 +99,66 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn create_session(
         &self,
         new: &NewSession,
         created: &Event,
         enrolment: Option<&Enrolment>,
     ) -> Result<(), StoreError> {
-        self.write(async |connection| insert_session(connection, self.inner.run, new, created, enrolment).await).await
+        let session = new.session.to_string();
+        let wall = new.stamp.wall.to_string();
+
+        self.write(async |connection| {
+            Insert::into("sessions")
+                .set("session", &session)
+                .recorded(self.inner.run, new.stamp)
+                .set("participant", &new.participant)
+                .set("protocol", &new.protocol)
+                .set("protocol_toml", &new.protocol_toml)
+                .set("protocol_sha256", &new.protocol_sha256)
+                .set("practice", new.practice)
+                .set("algorithm", new.algorithm.name())
+                .set("seed", new.seed.to_hex())
+                .set("set_index", i64::try_from(new.set_index).unwrap_or(i64::MAX))
+                .set("commitment", &new.commitment)
+                .execute(connection)
+                .await?;
+
+            for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
+                Insert::into("segments")
+                    .set("segment", segment.to_string())
+                    .set("session", &session)
+                    .set("setting", setting)
+                    .set("policy", policy.as_str())
+                    .execute(connection)
+                    .await?;
+            }
+
+            chain::append(connection, "session", &session, &wall).await?;
+            if let Some(enrolment) = enrolment {
+                enrol(connection, new.session, enrolment, &wall).await?;
+            }
+            insert_event(connection, self.inner.run, new.session, created).await
+        })
+        .await
     }
 
     /// Appends `events` to `session`, all or none. Appending the same events again changes nothing.
     ///
     /// # Errors
     /// If the disk or database fails.
+    #[boxed]
+    #[must_use]
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
-        self.write(async |connection| insert_events(connection, self.inner.run, session, events).await).await
+        self.write(async |connection| {
+            for event in events {
+                insert_event(connection, self.inner.run, session, event).await?;
+            }
+            Ok(())
+        })
+        .await
     }
 
     /// Notes how long `segment`, under way in `session`, has been inspected so far.
@@ -139,65 +184,6 @@ impl Store {
 
         Ok(())
     }
-}
-
-#[boxed]
-async fn insert_session(
-    connection: &mut SqliteConnection,
-    run: i64,
-    new: &NewSession,
-    created: &Event,
-    enrolment: Option<&Enrolment>,
-) -> Result<(), StoreError> {
-    let wall = new.stamp.wall.to_string();
-    let mut transaction = begin(connection).await?;
-    Insert::into("sessions")
-        .set("session", new.session.to_string())
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(new.stamp.at))
-        .set("participant", &new.participant)
-        .set("protocol", &new.protocol)
-        .set("protocol_toml", &new.protocol_toml)
-        .set("protocol_sha256", &new.protocol_sha256)
-        .set("practice", new.practice)
-        .set("algorithm", new.algorithm.name())
-        .set("seed", new.seed.to_hex())
-        .set("set_index", i64::try_from(new.set_index).unwrap_or(i64::MAX))
-        .set("commitment", &new.commitment)
-        .execute(&mut transaction)
-        .await?;
-
-    for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
-        Insert::into("segments")
-            .set("segment", segment.to_string())
-            .set("session", new.session.to_string())
-            .set("setting", setting)
-            .set("policy", policy.as_str())
-            .execute(&mut transaction)
-            .await?;
-    }
-
-    chain::append(&mut transaction, "session", &new.session.to_string(), &wall).await?;
-    if let Some(enrolment) = enrolment {
-        enrol(&mut transaction, new.session, enrolment, &wall).await?;
-    }
-    insert_event(&mut transaction, run, new.session, created).await?;
-    Ok(transaction.commit().await?)
-}
-
-#[boxed]
-async fn insert_events(
-    connection: &mut SqliteConnection,
-    run: i64,
-    session: SessionId,
-    events: &[Event],
-) -> Result<(), StoreError> {
-    let mut transaction = begin(connection).await?;
-    for event in events {
-        insert_event(&mut transaction, run, session, event).await?;
-    }
-    Ok(transaction.commit().await?)
 }
 
 impl Reader {

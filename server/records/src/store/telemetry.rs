@@ -10,7 +10,7 @@ use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::chain;
-use super::values::{begin, nanoseconds};
+use super::values::nanoseconds;
 use super::{Store, StoreError};
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
@@ -155,17 +155,15 @@ impl Writer {
             return Ok(());
         }
 
-        store.write_telemetry(async |connection| self.write_on(connection, store.run()).await).await
-    }
-
-    async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
-        let mut transaction = begin(connection).await?;
-        for (record, seen) in self.waiting.iter().zip(&self.seen) {
-            let segment = self.names.segment(&mut transaction, record.segment).await?;
-            let policy = self.names.policy(&mut transaction, record.policy.as_ref()).await?;
-            insert(&mut transaction, run, record, segment, policy, *seen).await?;
-        }
-        Ok(transaction.commit().await?)
+        let write = async |connection: &mut SqliteConnection| {
+            for (record, seen) in self.waiting.iter().zip(&self.seen) {
+                let segment = self.names.segment(connection, record.segment).await?;
+                let policy = self.names.policy(connection, record.policy.as_ref()).await?;
+                insert(connection, store.run(), record, segment, policy, *seen).await?;
+            }
+            Ok(())
+        };
+        store.write_telemetry(write).await
     }
 }
 
@@ -197,30 +195,26 @@ impl Store {
 
         Ok(up_to)
     }
-}
 
-impl Store {
     /// Chains the steps of these segments that are not chained yet. The latest of them was exposed at `latest`.
     async fn seal_telemetry(&self, segments: &BTreeSet<SegmentId>, latest: Moment) -> Result<(), StoreError> {
         let started = self.inner.started;
         let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
 
-        self.write(async |connection| seal(connection, segments, &wall).await).await
-    }
-}
+        self.write(async |connection| {
+            let mut sessions: BTreeSet<String> = BTreeSet::new();
+            for segment in segments {
+                let session = sqlx::query_scalar("SELECT session FROM segments WHERE segment = ?");
+                sessions.extend(session.bind(segment.to_string()).fetch_optional(&mut *connection).await?);
+            }
 
-async fn seal(connection: &mut SqliteConnection, segments: &BTreeSet<SegmentId>, wall: &str) -> Result<(), StoreError> {
-    let mut transaction = begin(connection).await?;
-    let mut sessions: BTreeSet<String> = BTreeSet::new();
-    for segment in segments {
-        let session = sqlx::query_scalar("SELECT session FROM segments WHERE segment = ?").bind(segment.to_string());
-        sessions.extend(session.fetch_optional(&mut *transaction).await?);
+            for session in sessions {
+                chain::seal(connection, &session, &wall).await?;
+            }
+            Ok(())
+        })
+        .await
     }
-
-    for session in sessions {
-        chain::seal(&mut transaction, &session, wall).await?;
-    }
-    Ok(transaction.commit().await?)
 }
 
 async fn insert(

@@ -1,8 +1,8 @@
 //! Values as the database keeps them.
 
 use jiff::Timestamp;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
-use sqlx::{Connection, Row, Sqlite, Transaction};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
 
 use super::{Stamp, StoreError};
 use parfocal_base::clock::Moment;
@@ -59,10 +59,4 @@ pub(super) fn status(row: &SqliteRow) -> Result<SessionStatus, StoreError> {
         (true, false) => SessionStatus::Completed,
         (false, false) => SessionStatus::UnderWay,
     })
-}
-
-/// Begins a transaction that has the right to write from its beginning, so that nobody else writes between its reads
-/// and its writes.
-pub(super) async fn begin(connection: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, StoreError> {
-    Ok(connection.begin_with("BEGIN IMMEDIATE").await?)
 }

@@ -7,11 +7,11 @@ use futures_util::TryStreamExt;
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::sqlite::SqliteRow;
 
 use super::insert::Insert;
 use super::remarks::is_erased;
-use super::values::{begin, nanoseconds, parsed, stamp};
+use super::values::{parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -134,74 +134,67 @@ impl Store {
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn keep_voice(&self, piece: &VoicePiece) -> Result<PieceKept, StoreError> {
-        self.write(async |connection| insert_piece(connection, self.inner.run, piece).await).await
-    }
-}
+    #[boxed]
+    #[must_use]
+    pub async fn keep_voice(&self, new: &VoicePiece) -> Result<PieceKept, StoreError> {
+        let comment = new.comment.to_string();
+        let sha256 = hex::encode(Sha256::digest(&new.audio));
 
-#[boxed]
-async fn insert_piece(connection: &mut SqliteConnection, run: i64, new: &VoicePiece) -> Result<PieceKept, StoreError> {
-    let comment = new.comment.to_string();
-    let sha256 = hex::encode(Sha256::digest(&new.audio));
-    let wall = new.stamp.wall.to_string();
+        self.write(async |connection| {
+            let known = "SELECT EXISTS (SELECT 1 FROM comments WHERE key = ? AND session = ? AND kind = 'voice')";
+            let known: bool = sqlx::query_scalar(known)
+                .bind(&comment)
+                .bind(new.session.to_string())
+                .fetch_one(&mut *connection)
+                .await?;
+            if !known {
+                return Ok(PieceKept::NoSuchComment);
+            }
 
-    let mut transaction = begin(connection).await?;
-    let known: bool =
-        sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM comments WHERE key = ? AND session = ? AND kind = 'voice')")
+            let before = "SELECT sha256, media_type, ended FROM voice_pieces WHERE comment = ? AND piece = ?";
+            let before = sqlx::query(before).bind(&comment).bind(new.piece).fetch_optional(&mut *connection).await?;
+            if let Some(row) = before {
+                let same = row.try_get::<String, _>("sha256")? == sha256
+                    && row.try_get::<String, _>("media_type")? == new.media_type.name()
+                    && row.try_get::<Option<String>, _>("ended")?.as_deref() == new.ended.map(Ending::name);
+                return Ok(if same { PieceKept::Kept } else { PieceKept::PlaceTaken });
+            }
+
+            let (bytes, others): (i64, i64) = sqlx::query_as(
+                "SELECT coalesce(sum(bytes), 0), coalesce(sum(media_type <> ?2), 0) FROM voice_pieces
+                 WHERE comment = ?1",
+            )
             .bind(&comment)
-            .bind(new.session.to_string())
-            .fetch_one(&mut *transaction)
+            .bind(new.media_type.name())
+            .fetch_one(&mut *connection)
             .await?;
-    if !known {
-        return Ok(PieceKept::NoSuchComment);
-    }
+            if others > 0 {
+                return Ok(PieceKept::PlaceTaken);
+            }
+            if usize::try_from(bytes).unwrap_or(usize::MAX).saturating_add(new.audio.len()) > LARGEST_RECORDING {
+                return Ok(PieceKept::TooLarge);
+            }
 
-    let before = sqlx::query("SELECT sha256, media_type, ended FROM voice_pieces WHERE comment = ? AND piece = ?")
-        .bind(&comment)
-        .bind(new.piece)
-        .fetch_optional(&mut *transaction)
-        .await?;
-    if let Some(row) = before {
-        let same = row.try_get::<String, _>("sha256")? == sha256
-            && row.try_get::<String, _>("media_type")? == new.media_type.name()
-            && row.try_get::<Option<String>, _>("ended")?.as_deref() == new.ended.map(Ending::name);
-        return Ok(if same { PieceKept::Kept } else { PieceKept::PlaceTaken });
-    }
+            let erased = is_erased(connection, "comment", &comment).await?;
+            let number = Insert::into("voice_pieces")
+                .set("comment", &comment)
+                .set("session", new.session.to_string())
+                .set("piece", new.piece)
+                .set("media_type", new.media_type.name())
+                .set("through_ms", new.through_ms)
+                .set("ended", new.ended.map(Ending::name))
+                .set("bytes", i64::try_from(new.audio.len()).unwrap_or(i64::MAX))
+                .set("sha256", &sha256)
+                .set("audio", (!erased).then_some(&new.audio))
+                .recorded(self.inner.run, new.stamp)
+                .execute(connection)
+                .await?;
 
-    let (bytes, others): (i64, i64) = sqlx::query_as(
-        "SELECT coalesce(sum(bytes), 0), coalesce(sum(media_type <> ?2), 0) FROM voice_pieces WHERE comment = ?1",
-    )
-    .bind(&comment)
-    .bind(new.media_type.name())
-    .fetch_one(&mut *transaction)
-    .await?;
-    if others > 0 {
-        return Ok(PieceKept::PlaceTaken);
+            chain::append(connection, "voice-piece", &number.to_string(), &new.stamp.wall.to_string()).await?;
+            Ok(PieceKept::Kept)
+        })
+        .await
     }
-    if usize::try_from(bytes).unwrap_or(usize::MAX).saturating_add(new.audio.len()) > LARGEST_RECORDING {
-        return Ok(PieceKept::TooLarge);
-    }
-
-    let erased = is_erased(&mut transaction, "comment", &new.comment).await?;
-    let done = Insert::into("voice_pieces")
-        .set("comment", &comment)
-        .set("session", new.session.to_string())
-        .set("piece", new.piece)
-        .set("media_type", new.media_type.name())
-        .set("through_ms", new.through_ms)
-        .set("ended", new.ended.map(Ending::name))
-        .set("bytes", i64::try_from(new.audio.len()).unwrap_or(i64::MAX))
-        .set("sha256", &sha256)
-        .set("audio", (!erased).then_some(&new.audio))
-        .set("run", run)
-        .set("wall", &wall)
-        .set("monotonic_ns", nanoseconds(new.stamp.at))
-        .execute(&mut transaction)
-        .await?;
-
-    chain::append(&mut transaction, "voice-piece", &done.last_insert_rowid().to_string(), &wall).await?;
-    transaction.commit().await?;
-    Ok(PieceKept::Kept)
 }
 
 impl Reader {

@@ -37,7 +37,7 @@ impl Writer {
         }
     }
 
-    /// Writes records. What `write` has committed is on disk when this returns.
+    /// Writes records in a transaction: all of them are on disk when this returns, or none is written if it fails.
     pub(super) async fn write<T>(
         &self,
         write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::histogram::Histogram;
+use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::MutexGuard;
 use tokio::time::Instant;
@@ -19,21 +20,14 @@ const BUCKETS: [f64; 12] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 
 /// Times of writing, by what was written: `records`, which are on disk when the time ends, or `telemetry`.
 pub type WriteTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 
-/// What is written in a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum WriteKind {
-    /// What people said and did, and what the chain needs.
-    Records,
-    /// A batch of the control loop's steps.
-    Telemetry,
-}
-
 /// How writing to the database went since the server's start.
 #[derive(Debug)]
 pub struct Writes {
     times: WriteTimes,
-    records: Histogram,
-    telemetry: Histogram,
+    /// Times of writing what people said and did, and what the chain needs.
+    pub(super) records: Histogram,
+    /// Times of writing batches of the control loop's steps.
+    pub(super) telemetry: Histogram,
     origin: Instant,
     /// When the write under way began.
     under_way: Mark,
@@ -100,10 +94,10 @@ impl Writes {
         }
     }
 
-    /// Begins a turn of writing. `guard` is the right to write.
-    pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, what: WriteKind) -> Turn<'a> {
+    /// Begins a turn of writing, whose time goes into `times`. `guard` is the right to write.
+    pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, times: &'a Histogram) -> Turn<'a> {
         self.under_way.set(self.now());
-        Turn { writes: self, what, began: Instant::now(), _guard: guard }
+        Turn { writes: self, times, began: Instant::now(), _guard: guard }
     }
 
     fn now(&self) -> Duration {
@@ -115,13 +109,13 @@ impl Writes {
 #[derive(Debug)]
 pub(super) struct Turn<'a> {
     writes: &'a Writes,
-    what: WriteKind,
+    times: &'a Histogram,
     began: Instant,
     _guard: MutexGuard<'a, ()>,
 }
 
 impl Turn<'_> {
-    /// Writes on a connection of `pool`, and notes how that went.
+    /// Writes in a transaction on a connection of `pool`, and notes how that went.
     pub(super) async fn write<T>(
         &self,
         pool: &SqlitePool,
@@ -135,28 +129,36 @@ impl Turn<'_> {
 
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
-        let times = match self.what {
-            WriteKind::Records => &self.writes.records,
-            WriteKind::Telemetry => &self.writes.telemetry,
-        };
-        times.observe(self.began.elapsed().as_secs_f64());
+        self.times.observe(self.began.elapsed().as_secs_f64());
         self.writes.under_way.clear();
     }
 }
 
-/// Writes on a connection of `pool`. If that fails, the connection is closed, and the pool opens another: a full disk can
-/// undo a transaction behind the driver's back or leave it half open, and a half-open one would keep all others from
-/// writing forever.
+/// Writes in a transaction on a connection of `pool`: all that `write` writes is committed when this returns, or
+/// nothing is if it fails. Then the connection is closed, and the pool opens another: a full disk can undo a
+/// transaction behind the driver's back or leave it half open, and a half-open one would keep all others from writing
+/// forever.
 pub(super) async fn write_on<T>(
     pool: &SqlitePool,
     write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
 ) -> Result<T, StoreError> {
     let mut connection = pool.acquire().await?;
-    let outcome = write(&mut connection).await;
+    let outcome = in_transaction(&mut connection, write).await;
     if outcome.is_err() {
         connection.close_on_drop();
     }
     outcome
+}
+
+async fn in_transaction<T>(
+    connection: &mut SqliteConnection,
+    write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
+) -> Result<T, StoreError> {
+    // It has the right to write from its beginning, so that nobody else writes between its reads and its writes.
+    let mut transaction = connection.begin_with("BEGIN IMMEDIATE").await?;
+    let written = write(&mut transaction).await?;
+    transaction.commit().await?;
+    Ok(written)
 }
 
 /// A time after the origin in milliseconds, plus one; 0 for none.
@@ -224,7 +226,7 @@ mod tests {
     async fn a_write_is_under_way_until_its_turn_ends() {
         let writes = Writes::default();
         let right = Mutex::new(());
-        let turn = writes.begin(right.lock().await, WriteKind::Records);
+        let turn = writes.begin(right.lock().await, &writes.records);
         assert!(writes.under_way_for().is_some());
         drop(turn);
         assert_eq!(writes.under_way_for(), None);

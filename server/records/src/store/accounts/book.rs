@@ -8,7 +8,7 @@ use sqlx::sqlite::SqliteConnection;
 use super::{AccountEvent, ChangedBy, PassphraseHash};
 use crate::store::insert::Insert;
 use crate::store::schema::DATABASE;
-use crate::store::values::{begin, nanoseconds};
+use crate::store::values::nanoseconds;
 use crate::store::writer::Writer;
 use crate::store::{Reader, Store, StoreError, chain};
 use parfocal_base::clock::Clock;
@@ -158,12 +158,11 @@ impl AccountBook {
         write: Write<'_>,
     ) -> Result<(), StoreError> {
         let wall = self.clock.wall().to_string();
-        let mut transaction = begin(connection).await?;
         if let Some(account) = account {
-            apply(&mut transaction, account, &wall, write).await?;
+            apply(connection, account, &wall, write).await?;
         }
 
-        let done = Insert::into("account_events")
+        let number = Insert::into("account_events")
             .set("run", run)
             .set("wall", &wall)
             .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
@@ -171,12 +170,11 @@ impl AccountBook {
             .set("kind", event.name())
             .set("done_by", by.map(AccountName::as_str))
             .set("detail", event.detail())
-            .execute(&mut transaction)
+            .execute(connection)
             .await?;
 
-        let number = done.last_insert_rowid().to_string();
-        chain::append(&mut transaction, "account-event", &number, &wall).await?;
-        Ok(transaction.commit().await?)
+        chain::append(connection, "account-event", &number.to_string(), &wall).await?;
+        Ok(())
     }
 }
 

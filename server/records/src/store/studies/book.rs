@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::writing::{change_study, insert_study};
+use super::writing::{insert_change, insert_study};
 use super::{NewStudy, StudyChange};
 use crate::store::lock::FolderLock;
 use crate::store::schema::DATABASE;
@@ -67,7 +67,7 @@ impl StudyBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
-        self.writer.write(async |connection| change_study(connection, self.run(), study, change).await).await
+        self.writer.write(async |connection| insert_change(connection, self.run(), study, change).await).await
     }
 
     /// Closes its connections, unless they are the server's.

@@ -6,13 +6,13 @@ use super::{Enrolment, NewStudy, StudyChange};
 use crate::store::actors::name_actor;
 use crate::store::insert::Insert;
 use crate::store::session_events::insert_event;
-use crate::store::values::{begin, nanoseconds};
+use crate::store::values::nanoseconds;
 use crate::store::{StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::study::definition::StudyName;
 
-/// Writes a new study with its first event, or nothing.
+/// Writes a new study with its first event.
 #[boxed]
 pub(super) async fn insert_study(
     connection: &mut SqliteConnection,
@@ -24,14 +24,13 @@ pub(super) async fn insert_study(
     let wall = new.wall.to_string();
     let sites = serde_json::to_string(&new.sites).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
-    let mut transaction = begin(connection).await?;
     Insert::into("studies")
         .set("study", study.as_str())
         .set("wall", &wall)
         .set("definition", &*new.definition.source)
         .set("definition_sha256", new.definition.sha256())
         .set("sites", sites)
-        .execute(&mut transaction)
+        .execute(connection)
         .await?;
 
     for protocol in &new.definition.protocols {
@@ -39,29 +38,17 @@ pub(super) async fn insert_study(
             .set("study", study.as_str())
             .set("protocol", &protocol.name)
             .set("protocol_toml", &*protocol.source)
-            .execute(&mut transaction)
+            .execute(connection)
             .await?;
     }
 
-    chain::append(&mut transaction, "study", study.as_str(), &wall).await?;
-    insert_change(&mut transaction, run, study, planned).await?;
-    Ok(transaction.commit().await?)
+    chain::append(connection, "study", study.as_str(), &wall).await?;
+    insert_change(connection, run, study, planned).await
 }
 
-/// Writes all of `change` of `study`, or nothing.
+/// Writes all of `change` of `study`.
 #[boxed]
-pub(super) async fn change_study(
-    connection: &mut SqliteConnection,
-    run: Option<i64>,
-    study: &StudyName,
-    change: &StudyChange,
-) -> Result<(), StoreError> {
-    let mut transaction = begin(connection).await?;
-    insert_change(&mut transaction, run, study, change).await?;
-    Ok(transaction.commit().await?)
-}
-
-async fn insert_change(
+pub(super) async fn insert_change(
     connection: &mut SqliteConnection,
     run: Option<i64>,
     study: &StudyName,
