@@ -175,7 +175,8 @@ pub(super) fn place_among(headers: &StringRecord, file: &str, column: &str) -> R
     place.ok_or_else(|| format!("{file} has no column {column}"))
 }
 
-fn is_long(file: &str) -> bool {
+/// Whether `file` has a long table, which is never kept.
+pub(super) fn is_long(file: &str) -> bool {
     file.strip_suffix(".csv").is_some_and(|name| LONG.contains(&name))
 }
 

@@ -17,16 +17,13 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 pub use files::ExportFiles;
+use files::is_long;
 pub use verdict::Verdict;
 
 use crate::store::Head;
-use crate::store::export::description::{
-    ALL, AccessRow, ActorRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow,
-    RecordingRow, RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, VoicePieceRow,
-    VoiceRow, WithdrawalRow,
-};
+use crate::store::export::description::ALL;
 use crate::store::export::folder::SUMS;
-use crate::store::export::table::{Row, Table};
+use crate::store::export::table::Table;
 use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
@@ -223,29 +220,10 @@ fn numbered(export: &ExportFiles, file: &str) -> Result<usize, String> {
 const UNBLINDED: [&str; 5] =
     ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv", "chain_salts.csv"];
 
-/// Tables that session.json repeats.
-const COPIED: [Table; 20] = [
-    RunRow::TABLE,
-    SessionRow::TABLE,
-    SegmentRow::TABLE,
-    CommentRow::TABLE,
-    AnswerRow::TABLE,
-    EventRow::TABLE,
-    DeviceRow::TABLE,
-    RecordingRow::TABLE,
-    AccessRow::TABLE,
-    ScoreRow::TABLE,
-    CorrectionRow::TABLE,
-    ConsentRow::TABLE,
-    ErasureRow::TABLE,
-    WithdrawalRow::TABLE,
-    StudyRow::TABLE,
-    StudySessionRow::TABLE,
-    StudyEventRow::TABLE,
-    ActorRow::TABLE,
-    VoiceRow::TABLE,
-    VoicePieceRow::TABLE,
-];
+/// The tables that session.json repeats: all but the long ones, and those that only an unblinded export has.
+fn copied() -> impl Iterator<Item = Table> {
+    ALL.into_iter().filter(|table| !is_long(&table.file()) && !UNBLINDED.contains(&table.file().as_str()))
+}
 
 fn copies(export: &ExportFiles) -> Outcome {
     let package = export.json("datapackage.json")?;
@@ -257,7 +235,7 @@ fn copies(export: &ExportFiles) -> Outcome {
     }
 
     let session = export.json("session.json")?;
-    for table in COPIED {
+    for table in copied() {
         let file = table.file();
         let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;
@@ -277,7 +255,7 @@ fn copies(export: &ExportFiles) -> Outcome {
     }
 
     // Nothing else either: what is not compared could say anything.
-    let compared = |name: &str| COPIED.iter().any(|table| table.name == name);
+    let compared = |name: &str| copied().any(|table| table.name == name);
     let tables = session.as_object().ok_or("session.json is not an object")?;
     if let Some(name) = tables.keys().find(|name| !compared(name)) {
         return Err(format!("session.json has '{name}', which is not a table of this format"));
