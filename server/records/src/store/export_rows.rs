@@ -9,20 +9,11 @@ use sqlx::{FromRow, Row as _};
 use super::chain::Entry;
 use super::export::{
     AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+    WithdrawalRow,
 };
 use super::values::{parsed, parsed_if_any};
 use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
-
-/// A study's plan, as the database has it.
-pub(super) struct PlannedStudy {
-    /// SHA-256 of its definition.
-    pub definition_sha256: String,
-    /// JSON: the sites that this database runs.
-    pub sites: String,
-    /// When it was planned.
-    pub wall: Timestamp,
-}
 
 impl Reader {
     /// The starts of the server that recorded something of `session`.
@@ -38,18 +29,11 @@ impl Reader {
         self.rows(sql, &session, run_row).await
     }
 
-    /// The plan of study `study`.
-    pub(super) async fn export_study(&self, study: &str) -> Result<PlannedStudy, StoreError> {
-        let row = sqlx::query("SELECT definition_sha256, sites, wall FROM studies WHERE study = ?")
-            .bind(study)
-            .fetch_one(self.pool())
-            .await?;
-
-        Ok(PlannedStudy {
-            definition_sha256: row.try_get("definition_sha256")?,
-            sites: row.try_get("sites")?,
-            wall: parsed(&row, "wall")?,
-        })
+    /// The sites of study `study` that this database runs, as JSON, and when it was planned.
+    pub(super) async fn export_study(&self, study: &str) -> Result<(String, Timestamp), StoreError> {
+        let row = sqlx::query("SELECT sites, wall FROM studies WHERE study = ?").bind(study);
+        let row = row.fetch_one(self.pool()).await?;
+        Ok((row.try_get("sites")?, parsed(&row, "wall")?))
     }
 
     /// The events of study `study` that are about the whole study or about `session`.
@@ -124,6 +108,17 @@ impl Reader {
         self.rows("SELECT * FROM accesses WHERE session = ? ORDER BY number", &session, access_row).await
     }
 
+    /// The withdrawn sessions of the protocol of `session`.
+    pub(super) async fn export_withdrawals(&self, session: SessionId) -> Result<Vec<WithdrawalRow>, StoreError> {
+        let sql = "SELECT s.session, s.protocol, s.place, e.wall, e.role
+             FROM (SELECT session, protocol, protocol_sha256,
+                     row_number() OVER (PARTITION BY protocol_sha256 ORDER BY rowid) AS place FROM sessions) AS s
+                 JOIN events AS e ON e.session = s.session AND e.kind = 'withdrawn'
+             WHERE s.protocol_sha256 = (SELECT protocol_sha256 FROM sessions WHERE session = ?)
+             ORDER BY s.place";
+        self.rows(sql, &session, withdrawal_row).await
+    }
+
     /// Passes every row of the chain to `take`, with all its columns.
     pub(super) async fn export_chain<E: From<StoreError>>(
         &self,
@@ -193,6 +188,16 @@ fn access_row(row: &SqliteRow) -> Result<AccessRow, StoreError> {
         kind: row.try_get("kind")?,
         session: parsed(row, "session")?,
         detail: row.try_get("detail")?,
+    })
+}
+
+fn withdrawal_row(row: &SqliteRow) -> Result<WithdrawalRow, StoreError> {
+    Ok(WithdrawalRow {
+        session: parsed(row, "session")?,
+        protocol: row.try_get("protocol")?,
+        place: row.try_get("place")?,
+        wall: parsed(row, "wall")?,
+        role: row.try_get("role")?,
     })
 }
 

@@ -66,5 +66,4 @@ pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
 pub use voice::{KeptVoice, PieceKept, StoredPiece, VoicePiece, VoiceRecording};
 pub use whole::{DatabaseState, database_state};
-pub use withdrawals::Withdrawal;
 pub use writes::{WriteTimes, Writes};

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::ExportError;
 use super::description::{
     AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
-    ScoreRow, SegmentRow, SessionRow, WithdrawalRow,
+    ScoreRow, SegmentRow, SessionRow,
 };
 use super::folder::Folder;
 use super::scores::Scored;
@@ -20,7 +20,7 @@ use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
     Answer, Comment, DeviceEvent, Erased, Head, LatestCorrections, Reader, RunClocks, SessionLine, StoreError,
-    StoredConsent, StoredCorrection, StoredErasure, VoiceRecording, Withdrawal, standings,
+    StoredConsent, StoredCorrection, StoredErasure, VoiceRecording, standings,
 };
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_base::{FocalPower, PatchPlace};
@@ -62,7 +62,6 @@ pub struct Blinded {
     consents: Vec<StoredConsent>,
     erasures: Vec<StoredErasure>,
     pub(super) erased: Erased,
-    withdrawals: Vec<Withdrawal>,
     clocks: RunClocks,
     grace: Grace,
     study: Option<ExportedStudy>,
@@ -101,7 +100,6 @@ impl Blinded {
             consents: reader.consents(session).await?,
             erased: Erased::by(&erasures),
             erasures,
-            withdrawals: reader.withdrawals(session).await?,
             study: ExportedStudy::of(reader, session).await?,
         })
     }
@@ -140,7 +138,7 @@ impl Blinded {
         copy(folder, &mut copies, &self.correction_rows()).await?;
         copy(folder, &mut copies, &self.consent_rows()).await?;
         copy(folder, &mut copies, &self.erasure_rows()).await?;
-        copy(folder, &mut copies, &self.withdrawal_rows()).await?;
+        copy(folder, &mut copies, &reader.export_withdrawals(self.session()).await?).await?;
         let study = self.study.as_ref();
         copy(folder, &mut copies, &ExportedStudy::study_rows(study)).await?;
         copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
@@ -404,17 +402,6 @@ impl Blinded {
             monotonic_ns: nanoseconds(erasure.stamp.at),
         };
         self.erasures.iter().map(row).collect()
-    }
-
-    fn withdrawal_rows(&self) -> Vec<WithdrawalRow> {
-        let row = |withdrawal: &Withdrawal| WithdrawalRow {
-            session: withdrawal.session,
-            protocol: withdrawal.protocol.clone(),
-            place: withdrawal.place,
-            wall: withdrawal.wall,
-            role: withdrawal.role.clone(),
-        };
-        self.withdrawals.iter().map(row).collect()
     }
 
     fn event_rows(&self) -> Vec<EventRow> {

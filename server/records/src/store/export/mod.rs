@@ -21,6 +21,7 @@ use serde::Serialize;
 pub use self::description::ALL as TABLES;
 pub(super) use self::description::{
     AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+    WithdrawalRow,
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;

@@ -22,14 +22,14 @@ impl ExportedStudy {
         let missing = || StoreError::Damaged(format!("study {} is not there", enrolment.study));
         let study = reader.study(&enrolment.study).await?.ok_or_else(missing)?;
 
-        let exported = reader.export_study(&enrolment.study).await?;
+        let (sites, wall) = reader.export_study(&enrolment.study).await?;
         let state = study.state();
         let row = StudyRow {
             study: enrolment.study.clone(),
             title: study.definition.title.clone(),
-            definition_sha256: exported.definition_sha256,
-            sites: exported.sites,
-            wall: exported.wall,
+            definition_sha256: enrolment.definition_sha256.clone(),
+            sites,
+            wall,
             stage: state.stage.name(),
             commitment: state.commitment,
         };
