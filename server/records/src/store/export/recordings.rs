@@ -7,48 +7,54 @@ use tokio::task::spawn_blocking;
 
 use super::description::RecordingRow;
 use parfocal_base::ids::SessionId;
-use parfocal_recording::{AnyRecording, FOLDER, FoundRecording, of_session};
+use parfocal_recording::{FOLDER, FoundRecording, of_session};
 
 /// A row for each recording of `session` in the data folder `data`. A recording that cannot be read has a row that says
 /// so. A broken recording must not prevent the export of comments.
 pub async fn rows(data: &Path, session: SessionId) -> Vec<RecordingRow> {
     let folder = data.join(FOLDER);
-    let look = move || of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(contents).collect());
-    let looked = spawn_blocking(look).await;
-
-    let found: Vec<RecordingContents> = match looked {
-        Ok(Ok(found)) => found,
-        Ok(Err(error)) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
-        Err(error) => vec![RecordingContents { name: String::new(), read: Err(error.to_string()) }],
+    let look = move || {
+        of_session(&folder, &session.to_string()).map(|found| found.into_iter().map(|one| row(session, one)).collect())
     };
-    found.into_iter().map(|contents| row(session, contents)).collect()
+
+    match spawn_blocking(look).await {
+        Ok(Ok(rows)) => rows,
+        Ok(Err(error)) => vec![unreadable(session, String::new(), error.to_string())],
+        Err(error) => vec![unreadable(session, String::new(), error.to_string())],
+    }
 }
 
-/// What was read from a recording's folder.
-struct RecordingContents {
-    name: String,
-    read: Result<Read, String>,
-}
+fn row(session: SessionId, (name, opened): FoundRecording) -> RecordingRow {
+    let read = opened.and_then(|recording| Ok((recording.description_sha256()?, recording)));
+    let (description_sha256, recording) = match read {
+        Ok(read) => read,
+        Err(error) => return unreadable(session, name, error.to_string()),
+    };
 
-struct Read {
-    recording: AnyRecording,
-    sha256: String,
-}
-
-fn contents((name, opened): FoundRecording) -> RecordingContents {
-    let read = opened.and_then(|recording| {
-        let sha256 = recording.description_sha256()?;
-        Ok(Read { recording, sha256 })
-    });
-    RecordingContents { name, read: read.map_err(|error| error.to_string()) }
-}
-
-fn row(session: SessionId, RecordingContents { name, read }: RecordingContents) -> RecordingRow {
-    let path = format!("{FOLDER}/{name}");
-    let mut row = RecordingRow {
+    let times = recording.times();
+    RecordingRow {
         session,
+        path: format!("{FOLDER}/{name}"),
         name,
-        path,
+        kind: Some(recording.kind().name()),
+        run: recording.clock().map(|(run, _)| run),
+        started: Some(recording.started()),
+        monotonic_ns: recording.clock().map(|(_, monotonic_ns)| monotonic_ns),
+        first_ns: times.first().copied(),
+        last_ns: times.last().copied(),
+        frames: Some(times.len()),
+        lost: recording.lost(),
+        ended: recording.ended().map(ToString::to_string),
+        description_sha256: Some(description_sha256),
+        problem: None,
+    }
+}
+
+fn unreadable(session: SessionId, name: String, problem: String) -> RecordingRow {
+    RecordingRow {
+        session,
+        path: format!("{FOLDER}/{name}"),
+        name,
         kind: None,
         run: None,
         started: None,
@@ -59,24 +65,6 @@ fn row(session: SessionId, RecordingContents { name, read }: RecordingContents) 
         lost: None,
         ended: None,
         description_sha256: None,
-        problem: None,
-    };
-
-    match read {
-        Ok(Read { recording, sha256 }) => {
-            let times = recording.times();
-            row.kind = Some(recording.kind().name());
-            row.run = recording.clock().map(|(run, _)| run);
-            row.started = Some(recording.started());
-            row.monotonic_ns = recording.clock().map(|(_, monotonic_ns)| monotonic_ns);
-            row.first_ns = times.first().copied();
-            row.last_ns = times.last().copied();
-            row.frames = Some(times.len());
-            row.lost = recording.lost();
-            row.ended = recording.ended().map(ToString::to_string);
-            row.description_sha256 = Some(sha256);
-        }
-        Err(problem) => row.problem = Some(problem),
+        problem: Some(problem),
     }
-    row
 }
