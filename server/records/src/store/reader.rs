@@ -124,9 +124,9 @@ impl Reader {
 
     /// Size of the database in bytes, without its log.
     pub(super) async fn bytes(&self) -> Result<u64, StoreError> {
-        let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&self.pool).await?;
-        let size: i64 = sqlx::query_scalar("PRAGMA page_size").fetch_one(&self.pool).await?;
-        Ok(u64::try_from(pages.saturating_mul(size)).unwrap_or(0))
+        let size = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
+        let bytes: i64 = sqlx::query_scalar(size).fetch_one(&self.pool).await?;
+        Ok(bytes.unsigned_abs())
     }
 
     /// Copies the database as it is now into `file`, which must be empty or must not exist.

@@ -56,9 +56,7 @@ async fn size_if_whole(snapshot: &Reader) -> Result<u64, StoreError> {
         Err(error) => return Err(error),
     }
 
-    let size = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
-    let bytes: i64 = sqlx::query_scalar(size).fetch_one(snapshot.pool()).await?;
-    Ok(bytes.unsigned_abs())
+    snapshot.bytes().await
 }
 
 impl Reader {
