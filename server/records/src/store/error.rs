@@ -117,6 +117,45 @@ impl StoreError {
     }
 }
 
+/// Why a check of a database failed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Wrong {
+    /// Something that was found is wrong, in words.
+    #[error("{0}")]
+    Found(String),
+    /// The database cannot be read.
+    #[error("{0}")]
+    Database(#[from] StoreError),
+}
+
+impl Wrong {
+    /// The same, where what was found is wrong with `what`.
+    pub(super) fn with(self, what: impl std::fmt::Display) -> Self {
+        match self {
+            Self::Found(problem) => Self::Found(format!("{what}: {problem}")),
+            Self::Database(error) => Self::Database(error),
+        }
+    }
+}
+
+impl From<String> for Wrong {
+    fn from(found: String) -> Self {
+        Self::Found(found)
+    }
+}
+
+impl From<&str> for Wrong {
+    fn from(found: &str) -> Self {
+        Self::Found(found.to_owned())
+    }
+}
+
+impl From<sqlx::Error> for Wrong {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Database(error.into())
+    }
+}
+
 /// `SQLITE_IOERR_SHMSIZE`: there is no room to enlarge the file that a database's connections share.
 const NO_ROOM_TO_SHARE: u32 = 4874;
 

@@ -7,7 +7,8 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain::check::{BlockToCheck, ChainCheck, FoundEntry, FoundRow};
-use super::chain::{Entry, Head, all, hashes, unsealed};
+use super::chain::{Head, all, entry, hashes, unsealed};
+use super::error::Wrong;
 use super::export::verify::{Check, Verdict};
 use super::schema::DATABASE;
 use super::studies::check_studies;
@@ -42,33 +43,10 @@ pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Che
     vec![
         check("database", whole(snapshot).await),
         check("chain", chain(snapshot, expected).await),
-        check("voice", voice(snapshot).await),
+        check("voice", snapshot.check_voice().await),
         check("commitments", commitments(snapshot).await),
-        check("studies", studies(snapshot).await),
+        check("studies", check_studies(snapshot).await),
     ]
-}
-
-/// Why a check failed.
-#[derive(Debug, thiserror::Error)]
-enum Wrong {
-    /// Something that was found is wrong, in words.
-    #[error("{0}")]
-    Found(String),
-    /// The database cannot be read.
-    #[error("{0}")]
-    Database(#[from] StoreError),
-}
-
-impl From<String> for Wrong {
-    fn from(found: String) -> Self {
-        Self::Found(found)
-    }
-}
-
-impl From<sqlx::Error> for Wrong {
-    fn from(error: sqlx::Error) -> Self {
-        Self::Database(error.into())
-    }
 }
 
 /// Checks that the file is undamaged, by SQLite's own checks.
@@ -113,23 +91,11 @@ async fn chain(snapshot: &Reader, expected: Option<Head>) -> Result<String, Wron
 }
 
 fn found(row: &SqliteRow) -> Result<FoundRow, StoreError> {
-    let text = |column: &str| row.try_get::<Option<String>, _>(column).map(Option::unwrap_or_default);
-    let entry = Entry {
-        wall: text("wall")?,
-        kind: text("kind")?,
-        key: text("key")?,
-        session: text("session")?,
-        place: row.try_get("place")?,
-        salt: text("salt")?,
-        sealed: text("sealed")?,
-        content: text("content")?,
-    };
-
     Ok(FoundRow {
         number: row.try_get::<i64, _>("number")?.to_string(),
-        previous: Some(text("previous")?),
-        entry: FoundEntry::Whole(entry, row.try_get("sealed_salt")?),
-        hash: text("hash")?,
+        previous: Some(row.try_get("previous")?),
+        entry: FoundEntry::Whole(entry(row)?, row.try_get("sealed_salt")?),
+        hash: row.try_get("hash")?,
     })
 }
 
@@ -160,16 +126,6 @@ async fn unchained(connection: &mut SqliteConnection, walk: &ChainCheck) -> Resu
         }
     }
     Ok(waiting)
-}
-
-/// Checks that the recordings of what surgeons said are as they were sent.
-async fn voice(snapshot: &Reader) -> Result<String, Wrong> {
-    Ok(snapshot.check_voice().await??)
-}
-
-/// Checks that each study is as it was planned, and that its sessions have the orders drawn for them.
-async fn studies(snapshot: &Reader) -> Result<String, Wrong> {
-    Ok(check_studies(snapshot).await??)
 }
 
 /// Checks that each session has the protocol and the order that it was made with.

@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
+use super::error::Wrong;
 use super::insert::Insert;
 use super::remarks::is_erased;
 use super::values::{parsed, stamp};
@@ -269,12 +270,9 @@ impl Reader {
         rows.iter().map(kept).collect()
     }
 
-    /// Checks the sound of every recording against the hashes of its pieces. The inner result says what was found or
-    /// what is wrong, in words. The hashes themselves are checked with the chain.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub(super) async fn check_voice(&self) -> Result<Result<String, String>, StoreError> {
+    /// Checks the sound of every recording against the hashes of its pieces. Says what was found, in words. The hashes
+    /// themselves are checked with the chain.
+    pub(super) async fn check_voice(&self) -> Result<String, Wrong> {
         let mut rows = sqlx::query(
             "SELECT comment, piece, bytes, sha256, audio, EXISTS (
                  SELECT 1 FROM erasures WHERE subject = 'comment' AND record = comment) AS erased
@@ -292,19 +290,19 @@ impl Reader {
 
             match (audio, row.try_get("erased")?) {
                 (None, true) => gone += 1,
-                (None, false) => return Ok(Err(named("has no sound, and nobody erased it"))),
-                (Some(_), true) => return Ok(Err(named("was erased, but has sound"))),
+                (None, false) => return Err(named("has no sound, and nobody erased it").into()),
+                (Some(_), true) => return Err(named("was erased, but has sound").into()),
                 (Some(audio), false) => {
                     let whole = i64::try_from(audio.len()) == Ok(row.try_get("bytes")?)
                         && hex::encode(Sha256::digest(&audio)) == row.try_get::<String, _>("sha256")?;
                     if !whole {
-                        return Ok(Err(named("was changed: its sound has another hash")));
+                        return Err(named("was changed: its sound has another hash").into());
                     }
                     checked += 1;
                 }
             }
         }
-        Ok(Ok(format!("{checked} pieces of recordings are as they were sent{}", erased_words(gone))))
+        Ok(format!("{checked} pieces of recordings are as they were sent{}", erased_words(gone)))
     }
 }
 

@@ -4,8 +4,8 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
 use super::form::{Entry, Head, link, sealed};
-use super::kinds::{RecordKind, kind};
-use super::records::{Record, one};
+use super::kinds::kind;
+use super::records::one;
 use crate::store::StoreError;
 use crate::store::insert::Insert;
 
@@ -36,17 +36,7 @@ pub async fn append(
 ) -> Result<Head, StoreError> {
     let kind = kind(name).ok_or_else(|| StoreError::Damaged(format!("no records are called '{name}'")))?;
     let record = one(connection, kind, key).await?;
-    append_record(connection, kind, key, &record, wall).await
-}
 
-/// Appends the row of `record`, which has this key.
-pub async fn append_record(
-    connection: &mut SqliteConnection,
-    kind: &RecordKind,
-    key: &str,
-    record: &Record,
-    wall: &str,
-) -> Result<Head, StoreError> {
     let mut sealed_salt = String::new();
     let mut hidden = String::new();
     if let Some(columns) = record.sealed.as_ref().filter(|columns| !columns.is_empty()) {

@@ -13,5 +13,6 @@ mod telemetry;
 pub use append::append;
 pub use form::{Entry, Fields, Head, begin_sealed, netstring};
 pub use kinds::{RecordKind, UNBLINDED, kinds};
+pub use reading::entry;
 pub use records::{Record, all};
 pub use telemetry::{Block, OPEN, SEALED, begin_open, hashes, seal, unsealed};

@@ -1,10 +1,28 @@
 //! Reads the chain.
 
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
 use super::append::head;
-use super::form::Head;
+use super::form::{Entry, Head};
 use super::telemetry::unsealed;
 use crate::store::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
+
+/// The entry of the chain's row `row`.
+pub fn entry(row: &SqliteRow) -> Result<Entry, StoreError> {
+    let session: Option<String> = row.try_get("session")?;
+    Ok(Entry {
+        wall: row.try_get("wall")?,
+        kind: row.try_get("kind")?,
+        key: row.try_get("key")?,
+        session: session.unwrap_or_default(),
+        place: row.try_get("place")?,
+        salt: row.try_get("salt")?,
+        sealed: row.try_get("sealed")?,
+        content: row.try_get("content")?,
+    })
+}
 
 impl Reader {
     /// The latest row of the chain.

@@ -5,6 +5,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::StoredStudy;
+use crate::store::error::Wrong;
 use crate::store::values::parsed;
 use crate::store::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
@@ -33,11 +34,10 @@ enum Change {
     Corrected(String),
 }
 
-/// Replays the events of `study`. The inner result is `Ok` if every session took the place that the rules gave it, and
-/// else says what is wrong.
-pub(super) async fn check_places(snapshot: &Reader, study: &StoredStudy) -> Result<Result<(), String>, StoreError> {
+/// Replays the events of `study`, and checks that every session took the place that the rules gave it.
+pub(super) async fn check_places(snapshot: &Reader, study: &StoredStudy) -> Result<(), Wrong> {
     let moments = moments(snapshot, study.definition.name.as_str()).await?;
-    Ok(replay(study, &moments))
+    Ok(replay(study, &moments)?)
 }
 
 fn replay(study: &StoredStudy, moments: &[Moment]) -> Result<(), String> {

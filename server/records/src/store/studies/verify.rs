@@ -5,47 +5,43 @@ use sqlx::Row;
 
 use super::StoredStudy;
 use super::replay::check_places;
-use crate::store::{Reader, StoreError};
+use crate::store::Reader;
+use crate::store::error::Wrong;
 use parfocal_base::PolicyName;
 use parfocal_trial::study::lists::Lists;
 use parfocal_trial::study::places::Enrolled;
 
-/// Checks every study in `snapshot`. The inner result says what was found or what is wrong, in words.
-pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<String, String>, StoreError> {
+/// Checks every study in `snapshot`. Says what was found, in words.
+pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<String, Wrong> {
     let names = snapshot.study_names().await?;
     let mut sessions = 0;
     for name in &names {
-        match check_study(snapshot, name).await? {
-            Ok(checked) => sessions += checked,
-            Err(problem) => return Ok(Err(format!("studies: study {name}: {problem}"))),
-        }
+        let checked = check_study(snapshot, name).await;
+        sessions += checked.map_err(|wrong| wrong.with(format_args!("studies: study {name}")))?;
     }
 
     let studies = names.len();
-    Ok(Ok(format!("studies as planned: {studies}; sessions with the next place and its order: {sessions}")))
+    Ok(format!("studies as planned: {studies}; sessions with the next place and its order: {sessions}"))
 }
 
-/// Checks study `name`. The inner result is the number of sessions that were checked, or what is wrong.
-async fn check_study(snapshot: &Reader, name: &str) -> Result<Result<usize, String>, StoreError> {
+/// Checks study `name`. Returns the number of sessions that were checked.
+async fn check_study(snapshot: &Reader, name: &str) -> Result<usize, Wrong> {
     // Reading it compares the protocols with the hashes in the definition.
-    let Some(study) = snapshot.study(name).await? else { return Ok(Err("it is not there".to_owned())) };
+    let study = snapshot.study(name).await?.ok_or("it is not there")?;
 
     let row = sqlx::query("SELECT definition_sha256 FROM studies WHERE study = ?").bind(name);
     let planned: String = row.fetch_one(snapshot.pool()).await?.try_get("definition_sha256")?;
     if planned != study.definition.sha256() || study.definition.name.as_str() != name {
-        return Ok(Err("its definition was changed since it was planned".to_owned()));
+        return Err("its definition was changed since it was planned".into());
     }
 
-    let lists = match committed_lists(&study) {
-        Ok(lists) => lists,
-        Err(problem) => return Ok(Err(problem)),
-    };
+    let lists = committed_lists(&study)?;
     for enrolled in &study.sessions {
-        if let Err(problem) = check_session(snapshot, lists.as_ref(), enrolled).await? {
-            return Ok(Err(format!("session {}: {problem}", enrolled.session)));
-        }
+        let checked = check_session(snapshot, lists.as_ref(), enrolled).await;
+        checked.map_err(|wrong| wrong.with(format_args!("session {}", enrolled.session)))?;
     }
-    Ok(check_places(snapshot, &study).await?.map(|()| study.sessions.len()))
+    check_places(snapshot, &study).await?;
+    Ok(study.sessions.len())
 }
 
 /// The orders of `study`, or an error if they are not those committed to; `None` if it was never opened.
@@ -64,18 +60,10 @@ fn committed_lists(study: &StoredStudy) -> Result<Option<Lists>, String> {
     Ok(Some(lists))
 }
 
-async fn check_session(
-    snapshot: &Reader,
-    lists: Option<&Lists>,
-    enrolled: &Enrolled,
-) -> Result<Result<(), String>, StoreError> {
-    let Some(stored) = snapshot.session(enrolled.session).await? else {
-        return Ok(Err("it is not there".to_owned()));
-    };
+async fn check_session(snapshot: &Reader, lists: Option<&Lists>, enrolled: &Enrolled) -> Result<(), Wrong> {
+    let stored = snapshot.session(enrolled.session).await?.ok_or("it is not there")?;
     let place = lists.and_then(|lists| lists.place(&enrolled.site, &enrolled.protocol, enrolled.place));
-    let Some(place) = place else {
-        return Ok(Err(format!("the list of {} has no place {}", enrolled.site, enrolled.place)));
-    };
+    let place = place.ok_or_else(|| format!("the list of {} has no place {}", enrolled.site, enrolled.place))?;
 
     let made = stored.made;
     let schedule: Vec<PolicyName> = made.segments.into_iter().map(|(_, policy)| policy).collect();
@@ -83,5 +71,5 @@ async fn check_session(
         && made.seed == place.seed
         && made.set_index == place.index
         && schedule == place.schedule;
-    Ok(if same { Ok(()) } else { Err(format!("its order is not that of place {} in its list", enrolled.place)) })
+    if same { Ok(()) } else { Err(format!("its order is not that of place {} in its list", enrolled.place).into()) }
 }
