@@ -6,14 +6,57 @@ use jiff::Timestamp;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _};
 
-use super::chain::Entry;
+use super::chain::entry;
 use super::export::{
-    AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
-    WithdrawalRow,
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, ExportError, Folder, PolicyStepRow, Row, RunRow, StudyEventRow,
+    TelemetryRow, WeightsRow, WithdrawalRow,
 };
 use super::values::{parsed, parsed_if_any};
 use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
+
+/// A row of a table that is written while it is read.
+pub(super) trait LongRow: Row + for<'r> FromRow<'r, SqliteRow> {
+    /// Selects the rows of a session, the only parameter.
+    const SQL: &'static str;
+}
+
+/// Holds caused by the policy are left out, because they would reveal it: only learned policies take time to start and
+/// to compute.
+impl LongRow for TelemetryRow {
+    const SQL: &'static str = concat!(
+        "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, ",
+        held_openly!(),
+        " AS held, t.optimal, t.picture_width, t.patch_x, t.patch_y
+         FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+         WHERE g.session = ? ORDER BY g.setting, t.number"
+    );
+}
+
+/// The part of the telemetry that reveals the policy.
+impl LongRow for PolicyStepRow {
+    const SQL: &'static str =
+        "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros, t.latency_micros, t.held
+         FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+              LEFT JOIN policies AS p ON p.number = t.policy
+         WHERE g.session = ? ORDER BY g.setting, t.number";
+}
+
+/// The weights of the session's learned policies, run by run.
+impl LongRow for WeightsRow {
+    const SQL: &'static str =
+        "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
+         WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
+             AND w.key IN (SELECT policy FROM segments WHERE session = ?1) ORDER BY r.run, w.key";
+}
+
+/// The salts that a blinded export withholds, except those of the server's starts.
+impl LongRow for ChainSaltRow {
+    const SQL: &'static str = "SELECT number, chain_salts.salt FROM chain_salts JOIN chain USING (number)
+         WHERE chain.session = ?1 AND (chain.kind = 'telemetry' OR chain.kind = 'event' AND chain.key IN (
+             SELECT session || '/' || number FROM events WHERE session = ?1 AND kind = 'unblinded'))
+         ORDER BY number";
+}
 
 impl Reader {
     /// The starts of the server that recorded something of `session`.
@@ -59,48 +102,18 @@ impl Reader {
         Ok(rows.bind(session.to_string()).fetch_all(self.pool()).await?)
     }
 
-    /// Passes the blinded telemetry of `session` to `take`, row by row.
-    pub(super) async fn export_telemetry<E: From<StoreError>>(
+    /// Writes the long table with the rows `R` of `session` into `folder`.
+    pub(super) async fn export_long<R: LongRow>(
         &self,
         session: SessionId,
-        take: impl AsyncFnMut(TelemetryRow) -> Result<(), E>,
-    ) -> Result<(), E> {
-        // Holds caused by the policy are left out, because they would reveal it: only learned policies take time to
-        // start and to compute.
-        let sql = concat!(
-            "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, ",
-            held_openly!(),
-            " AS held, t.optimal, t.picture_width, t.patch_x, t.patch_y
-             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
-             WHERE g.session = ? ORDER BY g.setting, t.number"
-        );
-        self.hand_out(session, sql, take).await
-    }
-
-    /// Passes the part of the telemetry of `session` that reveals the policy to `take`, row by row.
-    pub(super) async fn export_policy_steps<E: From<StoreError>>(
-        &self,
-        session: SessionId,
-        take: impl AsyncFnMut(PolicyStepRow) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let sql = "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros,
-                    t.latency_micros, t.held
-             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
-                  LEFT JOIN policies AS p ON p.number = t.policy
-             WHERE g.session = ? ORDER BY g.setting, t.number";
-        self.hand_out(session, sql, take).await
-    }
-
-    /// Passes the weights of the learned policies of `session` to `take`, run by run.
-    pub(super) async fn export_weights<E: From<StoreError>>(
-        &self,
-        session: SessionId,
-        take: impl AsyncFnMut(WeightsRow) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let sql = "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
-             WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
-                 AND w.key IN (SELECT policy FROM segments WHERE session = ?1) ORDER BY r.run, w.key";
-        self.hand_out(session, sql, take).await
+        folder: &mut Folder,
+    ) -> Result<(), ExportError> {
+        let mut file = folder.begin::<R>()?;
+        let mut rows = sqlx::query(R::SQL).bind(session.to_string()).fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            file.row(&R::from_row(&row).map_err(StoreError::from)?).await?;
+        }
+        file.end().await
     }
 
     /// The accesses to `session`.
@@ -120,46 +133,15 @@ impl Reader {
     }
 
     /// Passes every row of the chain to `take`, with all its columns.
-    pub(super) async fn export_chain<E: From<StoreError>>(
+    pub(super) async fn export_chain(
         &self,
-        mut take: impl AsyncFnMut(ChainRow) -> Result<(), E>,
-    ) -> Result<(), E> {
+        mut take: impl AsyncFnMut(ChainRow) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
         let sql = "SELECT chain.*, chain_salts.salt AS sealed_salt FROM chain LEFT JOIN chain_salts USING (number)
              ORDER BY number";
         let mut rows = sqlx::query(sql).fetch(self.pool());
         while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
             take(chain_row(&row)?).await?;
-        }
-        Ok(())
-    }
-
-    /// Passes the salts that a blinded export of `session` withholds to `take`, except those of the server's starts.
-    pub(super) async fn export_chain_salts<E: From<StoreError>>(
-        &self,
-        session: SessionId,
-        take: impl AsyncFnMut(ChainSaltRow) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let sql = "SELECT number, chain_salts.salt FROM chain_salts JOIN chain USING (number)
-             WHERE chain.session = ?1 AND (chain.kind = 'telemetry' OR chain.kind = 'event' AND chain.key IN (
-                 SELECT session || '/' || number FROM events WHERE session = ?1 AND kind = 'unblinded'))
-             ORDER BY number";
-        self.hand_out(session, sql, take).await
-    }
-
-    /// Passes the rows of `sql` to `take`. The only parameter of `sql` is `session`.
-    async fn hand_out<R, E>(
-        &self,
-        session: SessionId,
-        sql: &'static str,
-        mut take: impl AsyncFnMut(R) -> Result<(), E>,
-    ) -> Result<(), E>
-    where
-        R: for<'r> FromRow<'r, SqliteRow>,
-        E: From<StoreError>,
-    {
-        let mut rows = sqlx::query(sql).bind(session.to_string()).fetch(self.pool());
-        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
-            take(R::from_row(&row).map_err(StoreError::from)?).await?;
         }
         Ok(())
     }
@@ -202,18 +184,7 @@ fn withdrawal_row(row: &SqliteRow) -> Result<WithdrawalRow, StoreError> {
 }
 
 fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
-    let session: Option<String> = row.try_get("session")?;
-    let entry = Entry {
-        wall: row.try_get("wall")?,
-        kind: row.try_get("kind")?,
-        key: row.try_get("key")?,
-        session: session.unwrap_or_default(),
-        place: row.try_get("place")?,
-        salt: row.try_get("salt")?,
-        sealed: row.try_get("sealed")?,
-        content: row.try_get("content")?,
-    };
-
+    let entry = entry(row)?;
     Ok(ChainRow {
         number: row.try_get("number")?,
         entry: entry.hash(),

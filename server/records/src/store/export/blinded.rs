@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::ExportError;
 use super::description::{
     AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
-    ScoreRow, SegmentRow, SessionRow,
+    ScoreRow, SegmentRow, SessionRow, TelemetryRow,
 };
 use super::folder::Folder;
 use super::scores::Scored;
@@ -64,7 +64,7 @@ pub struct Blinded {
     pub(super) erased: Erased,
     clocks: RunClocks,
     grace: Grace,
-    study: Option<ExportedStudy>,
+    study: ExportedStudy,
 }
 
 impl Blinded {
@@ -139,10 +139,9 @@ impl Blinded {
         copy(folder, &mut copies, &self.consent_rows()).await?;
         copy(folder, &mut copies, &self.erasure_rows()).await?;
         copy(folder, &mut copies, &reader.export_withdrawals(self.session()).await?).await?;
-        let study = self.study.as_ref();
-        copy(folder, &mut copies, &ExportedStudy::study_rows(study)).await?;
-        copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
-        copy(folder, &mut copies, ExportedStudy::event_rows(study)).await?;
+        copy(folder, &mut copies, &self.study.rows).await?;
+        copy(folder, &mut copies, &self.study.places).await?;
+        copy(folder, &mut copies, &self.study.events).await?;
         copy(folder, &mut copies, &reader.export_actors(self.session()).await?).await?;
         let voice = self.write_voice(reader, folder).await?;
         copy(folder, &mut copies, &voice).await?;
@@ -150,22 +149,21 @@ impl Blinded {
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
-        if let Some(study) = study {
-            folder.file("study.toml", study.definition().as_bytes()).await?;
+        if let Some(definition) = &self.study.definition {
+            folder.file("study.toml", definition.as_bytes()).await?;
         }
 
         let mut chain = folder.begin()?;
         reader.export_chain(async |row| chain.row(&own.told_of(row)).await).await?;
         chain.end().await?;
 
-        let mut telemetry = folder.begin()?;
-        reader.export_telemetry(self.session(), async |row| telemetry.row(&row).await).await?;
-        telemetry.end().await
+        reader.export_long::<TelemetryRow>(self.session(), folder).await
     }
 
     /// The description of the whole export, without its tables.
     pub fn package(&self, unblinded: bool, head: &Head) -> Value {
         let name = super::folder::folder_name(self.session(), unblinded);
+        let study = self.study.rows.first();
         json!({
             "profile": "tabular-data-package",
             "name": name,
@@ -177,8 +175,8 @@ impl Blinded {
                 "practice": self.line.practice,
                 "blinded": !unblinded,
                 "unblinded": self.unblinded(),
-                "study": self.study.as_ref().map(ExportedStudy::name),
-                "study_definition_sha256": self.study.as_ref().map(ExportedStudy::definition_sha256),
+                "study": study.map(|study| &study.study),
+                "study_definition_sha256": study.map(|study| &study.definition_sha256),
                 "chain": { "number": head.number, "hash": head.hash },
             },
         })
@@ -193,7 +191,7 @@ impl Blinded {
             runs: runs.iter().map(|row| row.run.to_string()).collect(),
             devices: devices.iter().map(|(number, ..)| number.to_string()).collect(),
             unblindings: self.events.iter().filter(unblinding).map(key).collect(),
-            study: self.study.iter().flat_map(ExportedStudy::keys).collect(),
+            study: self.study.keys().collect(),
         }
     }
 

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::ExportError;
-use super::description::AllocationRow;
+use super::description::{AllocationRow, ChainSaltRow, PolicyStepRow, WeightsRow};
 use super::folder::Folder;
 use crate::store::sessions::StoredSession;
 use crate::store::{NewSession, Reader, StoreError};
@@ -75,19 +75,10 @@ impl Unblinded {
     /// Writes the files that an unblinded export has in addition.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
         folder.table(&self.rows()).await?;
-
-        let mut weights = folder.begin()?;
-        reader.export_weights(self.made.session, async |row| weights.row(&row).await).await?;
-        weights.end().await?;
-
-        let mut steps = folder.begin()?;
-        reader.export_policy_steps(self.made.session, async |row| steps.row(&row).await).await?;
-        steps.end().await?;
-
-        let mut salts = folder.begin()?;
-        reader.export_chain_salts(self.made.session, async |row| salts.row(&row).await).await?;
-        salts.end().await?;
-
+        let session = self.made.session;
+        reader.export_long::<WeightsRow>(session, folder).await?;
+        reader.export_long::<PolicyStepRow>(session, folder).await?;
+        reader.export_long::<ChainSaltRow>(session, folder).await?;
         folder.json("allocation.json", &self.json()).await
     }
 
