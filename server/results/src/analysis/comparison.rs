@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::outcomes::{Observation, Outcome};
+use super::outcomes::{Outcome, Value};
 use super::statistics::{
     Agreement, Friedman, Interval, PermutationMethod, Summary, Trend, agreement, concordance, friedman, median,
     summary, trend,
@@ -138,7 +138,7 @@ pub struct Position {
 
 /// Compares `outcome` between `policies`. Resamples and permutations are drawn from `seed`.
 #[must_use]
-pub fn compare(outcome: Outcome, policies: &[String], observations: &[Observation], seed: u64) -> Comparison {
+pub fn compare(outcome: Outcome, policies: &[String], observations: &[Value], seed: u64) -> Comparison {
     let surgeons = surgeon_means(policies, observations);
     let blocks: Vec<Vec<f64>> = surgeons.iter().filter_map(|line| line.means.iter().copied().collect()).collect();
     let sessions = complete_sessions(observations);
@@ -156,14 +156,14 @@ pub fn compare(outcome: Outcome, policies: &[String], observations: &[Observatio
     }
 }
 
-fn policy_summary(policy: &str, observations: &[Observation]) -> PolicySummary {
-    let own: Vec<&Observation> = observations.iter().filter(|one| one.policy == policy).collect();
+fn policy_summary(policy: &str, observations: &[Value]) -> PolicySummary {
+    let own: Vec<&Value> = observations.iter().filter(|one| one.policy == policy).collect();
     let values: Vec<f64> = own.iter().filter_map(|one| one.value).collect();
     PolicySummary { policy: policy.to_owned(), missing: own.len() - values.len(), summary: summary(&values) }
 }
 
 /// Each surgeon's mean of each policy over all its settings, or `None` if a value is missing.
-fn surgeon_means(policies: &[String], observations: &[Observation]) -> Vec<SurgeonMeans> {
+fn surgeon_means(policies: &[String], observations: &[Value]) -> Vec<SurgeonMeans> {
     let names: BTreeSet<&str> = observations.iter().map(|one| one.surgeon.as_str()).collect();
     let mean_of = |surgeon: &str, policy: &String| {
         let own = observations.iter().filter(|one| one.surgeon == surgeon && one.policy == *policy);
@@ -178,8 +178,8 @@ fn surgeon_means(policies: &[String], observations: &[Observation]) -> Vec<Surge
 }
 
 /// The observations of each session without a missing value, ordered by position.
-fn complete_sessions(observations: &[Observation]) -> Vec<Vec<&Observation>> {
-    let mut sessions: BTreeMap<SessionId, Vec<&Observation>> = BTreeMap::new();
+fn complete_sessions(observations: &[Value]) -> Vec<Vec<&Value>> {
+    let mut sessions: BTreeMap<SessionId, Vec<&Value>> = BTreeMap::new();
     for one in observations {
         sessions.entry(one.session).or_default().push(one);
     }
@@ -307,8 +307,8 @@ fn pair_words(pair: &Pair) -> String {
     )
 }
 
-fn repeats(policies: &[String], sessions: &[Vec<&Observation>]) -> Repeats {
-    let subject = |session: &Vec<&Observation>, policy: &String| -> Vec<f64> {
+fn repeats(policies: &[String], sessions: &[Vec<&Value>]) -> Repeats {
+    let subject = |session: &Vec<&Value>, policy: &String| -> Vec<f64> {
         let own = session.iter().filter(|one| one.policy == *policy);
         own.filter_map(|one| one.value).collect()
     };
@@ -341,8 +341,8 @@ fn repeats(policies: &[String], sessions: &[Vec<&Observation>]) -> Repeats {
 }
 
 /// Tests for a trend over positions. As in every test a surgeon is one unit, with the mean over its `sessions`.
-fn position(sessions: &[Vec<&Observation>]) -> Position {
-    let values = |session: &Vec<&Observation>| session.iter().filter_map(|one| one.value).collect::<Vec<f64>>();
+fn position(sessions: &[Vec<&Value>]) -> Position {
+    let values = |session: &Vec<&Value>| session.iter().filter_map(|one| one.value).collect::<Vec<f64>>();
     let all: Vec<Vec<f64>> = sessions.iter().map(values).collect();
     let means = mean_at_each_position(&all);
     let positions = means.len();

@@ -23,9 +23,9 @@ pub use comparison::{Comparison, Difference, LEVEL, Pair, PolicySummary, Positio
 pub use database::check;
 pub use error::AnalysisError;
 pub use figures::figure;
-pub use outcomes::{Observation, Outcome};
+pub use outcomes::{Outcome, Value};
 pub use report::{
-    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, Value, WholeSessions, Words,
+    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, WholeSessions, Words,
 };
 pub use study::{analyse, analyse_package};
 pub use tables::TABLES;

@@ -35,19 +35,22 @@ pub struct Outcome {
     pub highest: Option<f64>,
 }
 
-/// The value of an outcome in one setting of a session that counts.
+/// A value that was compared.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Observation {
+#[schema(as = AnalysedValue)]
+pub struct Value {
     /// The session.
     pub session: SessionId,
     /// The surgeon's code, corrected if it was.
     pub surgeon: String,
-    /// Position of the setting in the session, from 1.
+    /// The setting, from 1.
     pub setting: usize,
     /// The policy that ran.
     pub policy: String,
     /// Number of this setting among the policy's settings in the session, from 1.
     pub repeat: usize,
+    /// Name of the outcome.
+    pub outcome: String,
     /// The value; none if it is missing.
     pub value: Option<f64>,
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::comparison::Comparison;
-use super::outcomes::Outcome;
+use super::outcomes::{Outcome, Value};
 use super::statistics::Summary;
 use parfocal_base::ids::SessionId;
 
@@ -140,24 +140,4 @@ pub struct Words {
     pub late: bool,
     /// Whether its words were erased.
     pub erased: bool,
-}
-
-/// A value that was compared.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[schema(as = AnalysedValue)]
-pub struct Value {
-    /// The session.
-    pub session: SessionId,
-    /// The surgeon's code, corrected if it was.
-    pub surgeon: String,
-    /// The setting, from 1.
-    pub setting: usize,
-    /// The policy that ran.
-    pub policy: String,
-    /// Number of this setting among the policy's settings in the session, from 1.
-    pub repeat: usize,
-    /// Name of the outcome.
-    pub outcome: String,
-    /// The value; none if it is missing.
-    pub value: Option<f64>,
 }

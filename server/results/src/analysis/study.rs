@@ -6,10 +6,10 @@ use std::path::Path;
 use super::comparison::{Comparison, compare};
 use super::error::AnalysisError;
 use super::gathering::{GatheredSession, GatheredSetting, gather};
-use super::outcomes::{FOCAL_ERROR, IN_FOCUS, Observation, Outcome, asked, asked_of_session, driven};
+use super::outcomes::{FOCAL_ERROR, IN_FOCUS, Outcome, Value, asked, asked_of_session, driven};
 use super::records::{ProtocolRecords, StudyRecords};
 use super::report::{
-    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, Value, WholeSessions,
+    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, WholeSessions,
 };
 use super::statistics::summary;
 use super::words::counted;
@@ -93,10 +93,6 @@ fn analyse_protocol(records: ProtocolRecords, sites: &[String], seed: u64) -> Pr
     let compared: Vec<Outcome> = asked(&protocol).into_iter().chain(measured).collect();
     let whole: Vec<Outcome> = asked_of_session(&protocol);
     let all: Vec<&GatheredSession> = gathered.iter().collect();
-    let of_outcome = |outcome: &Outcome| {
-        let observations = observations(&all, &outcome.outcome);
-        observations.iter().map(|one| value(one, &outcome.outcome)).collect::<Vec<_>>()
-    };
 
     ProtocolAnalysis {
         protocol: protocol.name.clone(),
@@ -109,7 +105,7 @@ fn analyse_protocol(records: ProtocolRecords, sites: &[String], seed: u64) -> Pr
         by_site: by_site(sites, &gathered, &compared, &whole, &policies, seed),
         whole_sessions: whole_sessions(&whole, &all),
         words: words(&gathered),
-        values: compared.iter().flat_map(of_outcome).collect(),
+        values: compared.iter().flat_map(|outcome| values(&all, &outcome.outcome)).collect(),
         policies,
     }
 }
@@ -142,8 +138,7 @@ fn by_site(
 }
 
 fn comparisons(outcomes: &[Outcome], policies: &[String], sessions: &[&GatheredSession], seed: u64) -> Vec<Comparison> {
-    let of_outcome =
-        |outcome: &Outcome| compare(outcome.clone(), policies, &observations(sessions, &outcome.outcome), seed);
+    let of_outcome = |outcome: &Outcome| compare(outcome.clone(), policies, &values(sessions, &outcome.outcome), seed);
     outcomes.iter().map(of_outcome).collect()
 }
 
@@ -151,31 +146,21 @@ fn surgeons(sessions: &[&GatheredSession]) -> usize {
     sessions.iter().map(|session| &session.surgeon).collect::<BTreeSet<_>>().len()
 }
 
-fn observations(sessions: &[&GatheredSession], outcome: &str) -> Vec<Observation> {
+/// The values of `outcome` in every setting of `sessions`.
+fn values(sessions: &[&GatheredSession], outcome: &str) -> Vec<Value> {
     let of_session = |session: &&GatheredSession| {
-        let observation = |(setting, number): (&GatheredSetting, usize)| Observation {
+        let value = |(setting, number): (&GatheredSetting, usize)| Value {
             session: session.session,
             surgeon: session.surgeon.clone(),
             setting: number,
             policy: setting.policy.clone(),
             repeat: setting.repeat,
+            outcome: outcome.to_owned(),
             value: setting.values.get(outcome).copied(),
         };
-        session.settings.iter().zip(1..).map(observation).collect::<Vec<_>>()
+        session.settings.iter().zip(1..).map(value).collect::<Vec<_>>()
     };
     sessions.iter().flat_map(of_session).collect()
-}
-
-fn value(one: &Observation, outcome: &str) -> Value {
-    Value {
-        session: one.session,
-        surgeon: one.surgeon.clone(),
-        setting: one.setting,
-        policy: one.policy.clone(),
-        repeat: one.repeat,
-        outcome: outcome.to_owned(),
-        value: one.value,
-    }
 }
 
 fn whole_sessions(outcomes: &[Outcome], sessions: &[&GatheredSession]) -> Vec<WholeSessions> {
@@ -196,6 +181,7 @@ fn words(gathered: &[GatheredSession]) -> Vec<SurgeonWords> {
     let line = |(surgeon, settings): (&str, Vec<SettingWords>)| SurgeonWords { surgeon: surgeon.to_owned(), settings };
     surgeons.into_iter().map(line).filter(|line| !line.settings.is_empty()).collect()
 }
+
 fn notes() -> Vec<String> {
     [
         "Only sessions that were completed and not withdrawn count. Of several answers to a question, the one given \

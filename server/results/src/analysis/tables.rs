@@ -249,7 +249,7 @@ impl ProtocolAnalysis {
     }
 
     pub(super) fn value_rows(&self) -> Vec<ValueRow> {
-        let row = |value: &super::report::Value| ValueRow {
+        let row = |value: &super::Value| ValueRow {
             session: value.session,
             protocol: self.protocol.clone(),
             surgeon: value.surgeon.clone(),

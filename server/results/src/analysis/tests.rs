@@ -93,14 +93,15 @@ fn session(number: usize) -> SessionId {
     SessionId(Uuid::from_u128(number as u128))
 }
 
-fn observations(study: &Study) -> Vec<Observation> {
+fn observations(study: &Study) -> Vec<Value> {
     let of_session = |(number, own): (usize, &Session)| {
-        let observation = |(place, setting): (usize, &Setting)| Observation {
+        let observation = |(place, setting): (usize, &Setting)| Value {
             session: session(number),
             surgeon: own.surgeon.clone(),
             setting: place + 1,
             policy: setting.policy.clone(),
             repeat: 1 + own.settings[..place].iter().filter(|before| before.policy == setting.policy).count(),
+            outcome: rating().outcome,
             value: setting.value,
         };
         own.settings.iter().enumerate().map(observation).collect::<Vec<_>>()
@@ -191,14 +192,15 @@ fn an_effect_is_found_if_there_is_one_and_not_otherwise() {
 type Row<'a> = &'a [Option<f64>];
 
 /// Values of one outcome, a row per surgeon. Each surgeon has one session, in which each policy runs once.
-fn simple(rows: &[&[Option<f64>]]) -> (Vec<String>, Vec<Observation>) {
+fn simple(rows: &[&[Option<f64>]]) -> (Vec<String>, Vec<Value>) {
     let policies: Vec<String> = (0..rows[0].len()).map(|place| format!("policy-{place}")).collect();
-    let observation = |number: usize, place: usize, value: &Option<f64>| Observation {
+    let observation = |number: usize, place: usize, value: &Option<f64>| Value {
         session: session(number),
         surgeon: format!("S-{number}"),
         setting: place + 1,
         policy: policies[place].clone(),
         repeat: 1,
+        outcome: rating().outcome,
         value: *value,
     };
     let all = rows.iter().enumerate().flat_map(|(number, row)| {
