@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
-use super::making::{ExportProgress, ExportedStudy, export_study};
+use super::making::{ExportProgress, export_study};
 use parfocal_base::ids::SessionId;
 use parfocal_records::downloads::{Downloads, Stage};
 use parfocal_records::store::{AccessLog, Reader, StoreError};
@@ -123,42 +123,35 @@ impl StudyExports {
     /// export.
     #[must_use]
     pub fn start(&self, access_log: AccessLog, study: &str, unblinded: bool) -> StudyExportState {
-        let job = Job { exports: self.clone(), access_log, study: study.to_owned(), unblinded };
-        self.0.start(study, unblinded, async move { job.run().await.map_err(|error| error.to_string()) });
+        let making = make(self.clone(), access_log, study.to_owned(), unblinded);
+        self.0.start(study, unblinded, async { making.await.map_err(|error| error.to_string()) });
         self.latest(study)
     }
 }
 
-/// An export to make.
-struct Job {
-    exports: StudyExports,
+async fn make(
+    StudyExports(downloads): StudyExports,
     access_log: AccessLog,
     study: String,
     unblinded: bool,
-}
+) -> Result<FinishedExport, StudyExportError> {
+    let folder = downloads.folder().to_owned();
+    let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
+    std::fs::create_dir_all(&folder).map_err(unwritable)?;
+    let room = tempfile::Builder::new().prefix("export-").tempdir_in(&folder).map_err(unwritable)?;
+    let package = room.path().join(&study);
+    let taken_back = access_log.reader().taken_back(&study).await?;
 
-impl Job {
-    async fn run(self) -> Result<FinishedExport, StudyExportError> {
-        let Self { exports: StudyExports(downloads), access_log, study, unblinded } = self;
-        let folder = downloads.folder().to_owned();
-        let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
-        std::fs::create_dir_all(&folder).map_err(unwritable)?;
-        let room = tempfile::Builder::new().prefix("export-").tempdir_in(&folder).map_err(unwritable)?;
-        let package = room.path().join(&study);
-        let taken_back = access_log.reader().taken_back(&study).await?;
+    let name = study.clone();
+    let report = move |progress| downloads.report(&name, progress);
+    let exported = export_study(&access_log, &study, unblinded, &package, Arc::new(report)).await?;
 
-        let name = study.clone();
-        let report = move |progress| downloads.report(&name, progress);
-        let exported = export_study(&access_log, &study, unblinded, &package, Arc::new(report)).await?;
-        let ExportedStudy { sessions, .. } = exported;
-
-        Ok(FinishedExport {
-            unblinded,
-            folder: package,
-            sessions,
-            by: access_log.account().cloned(),
-            taken_back,
-            _room: Arc::new(room),
-        })
-    }
+    Ok(FinishedExport {
+        unblinded,
+        folder: package,
+        sessions: exported.sessions,
+        by: access_log.account().cloned(),
+        taken_back,
+        _room: Arc::new(room),
+    })
 }
