@@ -20,13 +20,12 @@ use parfocal_base::clock::Moment;
 use parfocal_base::files::make_private;
 use parfocal_base::{BlurRate, PolicyName};
 
-use super::counts::Counts;
 use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
 use super::values::nanoseconds;
-use super::writes::{Turn, Writes, write_on};
+use super::writes::{Counts, Turn, Writes, write_on};
 use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.

@@ -20,6 +20,17 @@ const BUCKETS: [f64; 12] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 
 /// Times of writing, by what was written: `records`, which are on disk when the time ends, or `telemetry`.
 pub type WriteTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 
+/// How much telemetry was written or lost since the start of the server.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Records written.
+    pub written: AtomicU64,
+    /// Failed attempts to write a batch.
+    pub failed_batches: AtomicU64,
+    /// Records dropped because the disk failed for too long.
+    pub lost: AtomicU64,
+}
+
 /// How writing to the database went since the server's start.
 #[derive(Debug)]
 pub struct Writes {

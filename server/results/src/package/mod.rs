@@ -8,7 +8,6 @@ mod check;
 mod description;
 mod error;
 mod join;
-mod labels;
 mod parquet;
 pub mod playable;
 mod r;

@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 
-use super::labels::label;
-use super::table::JoinedTable;
+use super::table::{JoinedTable, label};
 use parfocal_records::store::export::Type;
 
 /// Start of the script: how cells of each type are read.

@@ -7,9 +7,8 @@ use jiff::Timestamp;
 
 use super::error::PackageError;
 use super::join::rows;
-use super::labels::label;
 use super::source::PackageSource;
-use super::table::JoinedTable;
+use super::table::{JoinedTable, label};
 use parfocal_records::store::export::{Column, Type};
 
 /// Name of the field that identifies a record: REDCap's own default.

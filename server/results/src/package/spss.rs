@@ -12,9 +12,8 @@ use jiff::Timestamp;
 
 use super::error::PackageError;
 use super::join::rows;
-use super::labels::{cut, label};
 use super::source::PackageSource;
-use super::table::JoinedTable;
+use super::table::{JoinedTable, label};
 use parfocal_records::store::export::{Column, Type};
 
 /// Bytes per element of a case; an element is a number or eight characters.
@@ -274,6 +273,11 @@ fn extension(out: &mut Vec<u8>, subtype: usize, size: usize, data: &[u8]) {
 
 fn integer(out: &mut Vec<u8>, value: usize) {
     out.extend((value as i32).to_le_bytes());
+}
+
+/// `text` cut to at most `bytes` bytes, between two characters.
+fn cut(text: &str, bytes: usize) -> &str {
+    &text[..text.floor_char_boundary(bytes)]
 }
 
 /// `text`, padded with spaces to `bytes` bytes.

@@ -79,3 +79,10 @@ impl JoinedTable {
 pub fn joined_tables() -> impl Iterator<Item = JoinedTable> {
     TABLES.into_iter().filter(|table| !PROOFS.contains(&table.name)).map(JoinedTable::of)
 }
+
+/// The meaning and unit of a column in one line, as programs for statistics show it.
+pub fn label(column: &Column) -> String {
+    let words: Vec<&str> = column.description.split_whitespace().collect();
+    let description = words.join(" ");
+    if column.unit.is_empty() { description } else { format!("{description} ({})", column.unit) }
+}

@@ -15,7 +15,7 @@ use super::parquet::ParquetFile;
 use super::source::{LeftOut, PackageSource, SESSIONS, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, playable, r, redcap, spss};
-use parfocal_base::files::{files_below, is_new_or_empty, is_systems_own, put_folder, sync_folder_of, write_through};
+use parfocal_base::files::{files_below, is_new_or_empty, put_folder, sync_folder_of, write_through};
 use parfocal_records::store::export::{ExportFiles, SUMS};
 use parfocal_trial::voice::MediaType;
 
@@ -186,18 +186,11 @@ fn take(source: &PackageSource, sessions: Sessions, folder: &Path) -> Result<Pac
 }
 
 fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
-    fs::create_dir_all(to).map_err(PackageError::unwritable(to))?;
-    for entry in fs::read_dir(from).map_err(PackageError::unreadable(from))? {
-        let entry = entry.map_err(PackageError::unreadable(from))?;
-        if is_systems_own(&entry.file_name()) {
-            continue;
-        }
-        let copy = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy_folder(&entry.path(), &copy)?;
-        } else {
-            fs::copy(entry.path(), &copy).map_err(PackageError::unwritable(&copy))?;
-        }
+    for file in files_below(from).map_err(PackageError::unreadable(from))? {
+        let copy = to.join(&file);
+        let above = copy.parent().unwrap_or(to);
+        fs::create_dir_all(above).map_err(PackageError::unwritable(above))?;
+        fs::copy(from.join(&file), &copy).map_err(PackageError::unwritable(&copy))?;
     }
     Ok(())
 }

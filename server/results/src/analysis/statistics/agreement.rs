@@ -4,9 +4,8 @@
 //! number of subjects (Fleiss & Cohen 1973, Educational and Psychological Measurement 33:613).
 
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use utoipa::ToSchema;
-
-use super::distributions::f_quantile;
 
 /// Agreement of repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
@@ -88,4 +87,10 @@ impl MeanSquares {
         let high = n * (f_high * self.subjects - self.error) / (rest + n * f_high * self.subjects);
         (low, high)
     }
+}
+
+/// The value that F with `above` and `below` degrees of freedom exceeds with probability 1 - `share`; NaN where the
+/// degrees of freedom are none.
+fn f_quantile(share: f64, above: f64, below: f64) -> f64 {
+    FisherSnedecor::new(above, below).map_or(f64::NAN, |distribution| distribution.inverse_cdf(share))
 }

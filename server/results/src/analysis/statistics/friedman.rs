@@ -7,9 +7,9 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use utoipa::ToSchema;
 
-use super::distributions::chi_square_above;
 use super::ranks::doubled_ranks;
 
 /// Limit on the steps of the exact distribution; beyond it, permutations are drawn.
@@ -73,6 +73,11 @@ pub fn friedman(blocks: &[Vec<f64>], seed: u64) -> Option<Friedman> {
         kendalls_w: w,
         mean_ranks,
     })
+}
+
+/// The probability that chi-square with `df` degrees of freedom exceeds `x`; NaN where the degrees of freedom are none.
+fn chi_square_above(x: f64, df: f64) -> f64 {
+    ChiSquared::new(df).map_or(f64::NAN, |distribution| distribution.sf(x))
 }
 
 /// Kendall's W of `blocks`, corrected for ties (Kendall & Babington Smith 1939, Annals of Mathematical Statistics

@@ -3,9 +3,7 @@
 //! treatment.
 
 mod agreement;
-mod distributions;
 mod friedman;
-mod interval;
 mod ranks;
 mod summary;
 mod trend;
@@ -15,6 +13,5 @@ mod tests;
 
 pub use agreement::{Agreement, agreement};
 pub use friedman::{Friedman, PermutationMethod, concordance, friedman};
-pub use interval::Interval;
-pub use summary::{Summary, median, summary};
+pub use summary::{Interval, Summary, median, summary};
 pub use trend::{Trend, trend};

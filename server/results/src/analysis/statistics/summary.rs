@@ -16,6 +16,15 @@ pub struct Summary {
     pub sd: Option<f64>,
 }
 
+/// A 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
 /// The summary of `values`.
 #[must_use]
 pub fn summary(values: &[f64]) -> Summary {
