@@ -22,16 +22,6 @@ pub struct AccountBook {
     clock: Arc<dyn Clock>,
 }
 
-/// What is written with an event, in one transaction.
-enum Write<'a> {
-    Insert(&'a Account, &'a PassphraseHash),
-    Change(&'a AccountChange),
-    Passphrase(&'a PassphraseHash),
-    SignIn { token_sha256: &'a str },
-    SignOut { token_sha256: &'a str },
-    Nothing,
-}
-
 impl AccountBook {
     /// The account book of the server.
     #[must_use]
@@ -65,7 +55,21 @@ impl AccountBook {
     /// If the disk or database fails.
     pub async fn add(&self, account: &Account, hash: &PassphraseHash, by: ChangedBy<'_>) -> Result<(), StoreError> {
         let event = AccountEvent::Added(account.role);
-        self.write(Some(&account.account), &event, by, Write::Insert(account, hash)).await
+        self.write(Some(&account.account), &event, by, async |connection, _| {
+            Insert::into("accounts")
+                .set("account", account.account.as_str())
+                .set("display", &account.display)
+                .set("role", account.role.name())
+                .set("disabled", account.disabled)
+                .set("memory_kib", hash.memory_kib)
+                .set("passes", hash.passes)
+                .set("salt", hex::encode(&hash.salt))
+                .set("hash", hex::encode(&hash.hash))
+                .execute(connection)
+                .await?;
+            Ok(())
+        })
+        .await
     }
 
     /// Changes `account`. The change is on disk when this returns. `Disable` and `SignOut` also end its sign-ins.
@@ -78,7 +82,27 @@ impl AccountBook {
         change: &AccountChange,
         by: ChangedBy<'_>,
     ) -> Result<(), StoreError> {
-        self.write(Some(account), &AccountEvent::Changed(change.clone()), by, Write::Change(change)).await
+        let name = account.as_str();
+        self.write(Some(account), &AccountEvent::Changed(change.clone()), by, async |connection, _| {
+            match change {
+                AccountChange::Role(role) => {
+                    let query = sqlx::query("UPDATE accounts SET role = ? WHERE account = ?");
+                    query.bind(role.name()).bind(name).execute(connection).await?;
+                }
+                AccountChange::Disable => {
+                    let query = sqlx::query("UPDATE accounts SET disabled = 1 WHERE account = ?");
+                    query.bind(name).execute(&mut *connection).await?;
+                    end_sign_ins(connection, name).await?;
+                }
+                AccountChange::Enable => {
+                    let query = sqlx::query("UPDATE accounts SET disabled = 0 WHERE account = ?");
+                    query.bind(name).execute(connection).await?;
+                }
+                AccountChange::SignOut => end_sign_ins(connection, name).await?,
+            }
+            Ok(())
+        })
+        .await
     }
 
     /// Replaces the passphrase of `account`, and ends its sign-ins.
@@ -91,7 +115,18 @@ impl AccountBook {
         hash: &PassphraseHash,
         by: ChangedBy<'_>,
     ) -> Result<(), StoreError> {
-        self.write(Some(account), &AccountEvent::PassphraseReplaced, by, Write::Passphrase(hash)).await
+        self.write(Some(account), &AccountEvent::PassphraseReplaced, by, async |connection, _| {
+            sqlx::query("UPDATE accounts SET memory_kib = ?, passes = ?, salt = ?, hash = ? WHERE account = ?")
+                .bind(hash.memory_kib)
+                .bind(hash.passes)
+                .bind(hex::encode(&hash.salt))
+                .bind(hex::encode(&hash.hash))
+                .bind(account.as_str())
+                .execute(&mut *connection)
+                .await?;
+            end_sign_ins(connection, account.as_str()).await
+        })
+        .await
     }
 
     /// Records that a browser signed in to `account`. `token_sha256` is the SHA-256 of its token.
@@ -99,8 +134,17 @@ impl AccountBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn sign_in(&self, account: &AccountName, token_sha256: &str) -> Result<(), StoreError> {
-        let write = Write::SignIn { token_sha256 };
-        self.write(Some(account), &AccountEvent::SignedIn, Some(account), write).await
+        self.write(Some(account), &AccountEvent::SignedIn, Some(account), async |connection, wall| {
+            Insert::into("sign_ins")
+                .set("token_sha256", token_sha256)
+                .set("account", account.as_str())
+                .set("began", wall)
+                .set("used", wall)
+                .execute(connection)
+                .await?;
+            Ok(())
+        })
+        .await
     }
 
     /// Ends the sign-in of `account` whose token has this SHA-256.
@@ -108,8 +152,12 @@ impl AccountBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn sign_out(&self, account: &AccountName, token_sha256: &str) -> Result<(), StoreError> {
-        let write = Write::SignOut { token_sha256 };
-        self.write(Some(account), &AccountEvent::SignedOut, Some(account), write).await
+        self.write(Some(account), &AccountEvent::SignedOut, Some(account), async |connection, _| {
+            let query = sqlx::query("DELETE FROM sign_ins WHERE token_sha256 = ?");
+            query.bind(token_sha256).execute(connection).await?;
+            Ok(())
+        })
+        .await
     }
 
     /// Records `event`, a failed attempt on `account`; `None` if no account has the name that was given.
@@ -117,7 +165,7 @@ impl AccountBook {
     /// # Errors
     /// If the disk or database fails.
     pub async fn failed(&self, account: Option<&AccountName>, event: &AccountEvent) -> Result<(), StoreError> {
-        self.write(account, event, None, Write::Nothing).await
+        self.write(account, event, None, async |_, _| Ok(())).await
     }
 
     /// Notes that the sign-in with this token was used now.
@@ -137,109 +185,36 @@ impl AccountBook {
             .await
     }
 
+    /// Writes `event` of `account` with what `apply` writes, in one transaction. `apply` also gets the time.
     async fn write(
         &self,
         account: Option<&AccountName>,
         event: &AccountEvent,
         by: ChangedBy<'_>,
-        write: Write<'_>,
+        apply: impl AsyncFnOnce(&mut SqliteConnection, &str) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
         let run = self.writer.run();
-        self.writer.write(async |connection| self.write_on(connection, run, account, event, by, write).await).await
+        self.writer
+            .write(async |connection| {
+                let wall = self.clock.wall().to_string();
+                apply(connection, &wall).await?;
+
+                let number = Insert::into("account_events")
+                    .set("run", run)
+                    .set("wall", &wall)
+                    .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
+                    .set("account", account.map(AccountName::as_str))
+                    .set("kind", event.name())
+                    .set("done_by", by.map(AccountName::as_str))
+                    .set("detail", event.detail())
+                    .execute(connection)
+                    .await?;
+
+                chain::append(connection, "account-event", &number.to_string(), &wall).await?;
+                Ok(())
+            })
+            .await
     }
-
-    async fn write_on(
-        &self,
-        connection: &mut SqliteConnection,
-        run: Option<i64>,
-        account: Option<&AccountName>,
-        event: &AccountEvent,
-        by: ChangedBy<'_>,
-        write: Write<'_>,
-    ) -> Result<(), StoreError> {
-        let wall = self.clock.wall().to_string();
-        if let Some(account) = account {
-            apply(connection, account, &wall, write).await?;
-        }
-
-        let number = Insert::into("account_events")
-            .set("run", run)
-            .set("wall", &wall)
-            .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
-            .set("account", account.map(AccountName::as_str))
-            .set("kind", event.name())
-            .set("done_by", by.map(AccountName::as_str))
-            .set("detail", event.detail())
-            .execute(connection)
-            .await?;
-
-        chain::append(connection, "account-event", &number.to_string(), &wall).await?;
-        Ok(())
-    }
-}
-
-async fn apply(
-    connection: &mut SqliteConnection,
-    account: &AccountName,
-    wall: &str,
-    write: Write<'_>,
-) -> Result<(), StoreError> {
-    let name = account.as_str();
-    match write {
-        Write::Insert(new, hash) => {
-            Insert::into("accounts")
-                .set("account", name)
-                .set("display", &new.display)
-                .set("role", new.role.name())
-                .set("disabled", new.disabled)
-                .set("memory_kib", hash.memory_kib)
-                .set("passes", hash.passes)
-                .set("salt", hex::encode(&hash.salt))
-                .set("hash", hex::encode(&hash.hash))
-                .execute(connection)
-                .await?;
-        }
-        Write::Change(AccountChange::Role(role)) => {
-            let query = sqlx::query("UPDATE accounts SET role = ? WHERE account = ?");
-            query.bind(role.name()).bind(name).execute(connection).await?;
-        }
-        Write::Change(AccountChange::Disable) => {
-            let query = sqlx::query("UPDATE accounts SET disabled = 1 WHERE account = ?");
-            query.bind(name).execute(&mut *connection).await?;
-            end_sign_ins(connection, name).await?;
-        }
-        Write::Change(AccountChange::Enable) => {
-            let query = sqlx::query("UPDATE accounts SET disabled = 0 WHERE account = ?");
-            query.bind(name).execute(connection).await?;
-        }
-        Write::Change(AccountChange::SignOut) => end_sign_ins(connection, name).await?,
-        Write::Passphrase(hash) => {
-            sqlx::query("UPDATE accounts SET memory_kib = ?, passes = ?, salt = ?, hash = ? WHERE account = ?")
-                .bind(hash.memory_kib)
-                .bind(hash.passes)
-                .bind(hex::encode(&hash.salt))
-                .bind(hex::encode(&hash.hash))
-                .bind(name)
-                .execute(&mut *connection)
-                .await?;
-            end_sign_ins(connection, name).await?;
-        }
-        Write::SignIn { token_sha256 } => {
-            Insert::into("sign_ins")
-                .set("token_sha256", token_sha256)
-                .set("account", name)
-                .set("began", wall)
-                .set("used", wall)
-                .execute(connection)
-                .await?;
-        }
-        Write::SignOut { token_sha256 } => {
-            let query = sqlx::query("DELETE FROM sign_ins WHERE token_sha256 = ?");
-            query.bind(token_sha256).execute(connection).await?;
-        }
-        Write::Nothing => {}
-    }
-    Ok(())
 }
 
 async fn end_sign_ins(connection: &mut SqliteConnection, account: &str) -> Result<(), StoreError> {
