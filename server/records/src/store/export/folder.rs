@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::ExportError;
 use super::destination::{Destination, NewFolder, ZipStream};
-use super::table::{Row, Table};
+use super::table::Row;
 use parfocal_base::ids::SessionId;
 
 /// Name of the file of checksums, in the form of `sha256sum`.
@@ -23,12 +23,6 @@ pub struct Folder {
     /// Each file's name and SHA-256.
     files: Vec<(String, String)>,
     resources: Vec<Value>,
-}
-
-/// A file that was written.
-struct WrittenFile {
-    sha256: String,
-    bytes: usize,
 }
 
 impl Folder {
@@ -57,7 +51,6 @@ impl Folder {
     pub fn begin<R: Row>(&mut self) -> Result<CsvFile<'_, R>, ExportError> {
         let name = R::TABLE.file();
         self.destination.begin(&name)?;
-        let header: Vec<_> = R::TABLE.header().map(str::to_owned).collect();
 
         let mut file = CsvFile {
             folder: self,
@@ -70,7 +63,7 @@ impl Folder {
             rows: PhantomData,
         };
 
-        file.header(&header)?;
+        file.csv.write_record(R::TABLE.header()).map_err(|error| file.unwritable(error))?;
         Ok(file)
     }
 
@@ -128,23 +121,6 @@ impl Folder {
         self.destination.finish().await?;
         Ok(self.files.into_iter().map(|(file, _)| file).collect())
     }
-
-    fn tabulated(&mut self, table: &Table, file: WrittenFile) {
-        self.resources.push(json!({
-            "name": table.name,
-            "description": table.description,
-            "path": table.file(),
-            "profile": "tabular-data-resource",
-            "format": "csv",
-            "mediatype": "text/csv",
-            "encoding": "utf-8",
-            "bytes": file.bytes,
-            "hash": format!("sha256:{}", file.sha256),
-            "schema": table.schema(),
-        }));
-
-        self.files.push((table.file(), file.sha256));
-    }
 }
 
 /// A CSV file being written.
@@ -178,24 +154,32 @@ impl<R: Row> CsvFile<'_, R> {
     pub async fn end(mut self) -> Result<(), ExportError> {
         self.pass_on().await?;
         self.folder.destination.end(&self.name)?;
-        let written = WrittenFile { sha256: hex::encode(self.sha256.finalize()), bytes: self.bytes };
-        self.folder.tabulated(&R::TABLE, written);
+
+        let table = R::TABLE;
+        let sha256 = hex::encode(self.sha256.finalize());
+        self.folder.resources.push(json!({
+            "name": table.name,
+            "description": table.description,
+            "path": self.name,
+            "profile": "tabular-data-resource",
+            "format": "csv",
+            "mediatype": "text/csv",
+            "encoding": "utf-8",
+            "bytes": self.bytes,
+            "hash": format!("sha256:{sha256}"),
+            "schema": table.schema(),
+        }));
+        self.folder.files.push((self.name, sha256));
         Ok(())
     }
 
-    fn header(&mut self, names: &[String]) -> Result<(), ExportError> {
-        self.csv.write_record(names).map_err(|error| self.unwritable(error))
-    }
-
-    fn unwritable(&self, error: csv::Error) -> ExportError {
+    fn unwritable(&self, error: impl Into<std::io::Error>) -> ExportError {
         ExportError::Unwritable { path: Path::new(&self.name).to_owned(), error: error.into() }
     }
 
     async fn pass_on(&mut self) -> Result<(), ExportError> {
-        let block = std::mem::replace(&mut self.csv, new_block()).into_inner().map_err(|error| {
-            let error = std::io::Error::other(error.to_string());
-            ExportError::Unwritable { path: Path::new(&self.name).to_owned(), error }
-        })?;
+        let block = std::mem::replace(&mut self.csv, new_block()).into_inner();
+        let block = block.map_err(|error| self.unwritable(error.into_error()))?;
 
         self.gathered = 0;
         self.sha256.update(&block);

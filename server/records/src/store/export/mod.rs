@@ -173,15 +173,12 @@ async fn may_export(
         return Err(ExportError::Withdrawn { session, at, by: by.name() });
     }
 
-    // `None` unless the session was unblinded. Without an `Unblinded`, no policy can be written.
-    let telling = if unblinded { Some(Unblinded::of(reader, &stored).await?) } else { None };
-    let telling = match telling {
-        Some(None) => return Err(ExportError::StillBlinded(session)),
-        Some(Some(telling)) => Some(telling),
-        None => None,
-    };
-
-    Ok((stored, telling))
+    // Without an `Unblinded`, which only a session that was unblinded has, no policy can be written.
+    if !unblinded {
+        return Ok((stored, None));
+    }
+    let telling = Unblinded::of(reader, &stored).await?.ok_or(ExportError::StillBlinded(session))?;
+    Ok((stored, Some(telling)))
 }
 
 /// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or
