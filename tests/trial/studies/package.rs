@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use parfocal_results::package::{self, PackageSource, Sessions, exports_of};
 use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports};
 use parfocal_trial::erasure::{Erasable, NewErasure};
 use serde_json::Value;
@@ -425,6 +426,27 @@ async fn a_package_that_was_made_before_something_was_taken_back_is_handed_out_n
     trial.conductor.erase(Role::Researcher, kept, erasure).await.unwrap();
     given_up().await;
     assert_eq!(make().await, StudyExportState::Ready { unblinded: false, sessions: 1 });
+}
+
+#[tokio::test]
+async fn a_package_whose_place_is_taken_meanwhile_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = package(folder.path()).await;
+    let open = |export: &PathBuf| PackageSource::open(export).unwrap();
+    let sources: Vec<PackageSource> = exports_of(&made).unwrap().iter().map(open).collect();
+
+    let joined = folder.path().join("joined");
+    let out = joined.join("package");
+    let mut taken_meanwhile = |_, _| {
+        std::fs::create_dir_all(&out).unwrap();
+        std::fs::write(out.join("notes.txt"), "somebody else's").unwrap();
+    };
+    let refused = package::write(&sources, Sessions::Copied, &[], &out, &mut taken_meanwhile).unwrap_err();
+    assert!(refused.to_string().starts_with("cannot write "), "{refused}");
+
+    let left: Vec<_> = joined.read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["package"]);
+    assert_eq!(out.read_dir().unwrap().count(), 1, "what was there stays");
 }
 
 #[test]

@@ -73,7 +73,9 @@ pub fn write(
 
     fill(sources, sessions, left_out, temporary.path(), progress)?;
 
-    put_folder(&temporary.keep(), out).map_err(PackageError::unwritable(out))?;
+    put_folder(temporary.path(), out).map_err(PackageError::unwritable(out))?;
+    // It is at its place, and there is nothing to remove.
+    let _ = temporary.keep();
     sync_folder_of(out);
 
     let sites: BTreeSet<&String> = sources.iter().map(|source| &source.site).collect();

@@ -126,13 +126,10 @@ impl NewFolder {
 
     fn finish(self) -> Result<(), ExportError> {
         sync_folder_of(&self.temporary.path().join("any"));
-        let whole = self.temporary.keep();
-        put_folder(&whole, &self.out).map_err(|error| {
-            // Nothing else can be done for it. If this fails too, the folder stays.
-            let _ = std::fs::remove_dir_all(&whole);
-            ExportError::Unwritable { path: self.out.clone(), error }
-        })?;
-
+        let unwritable = |error| ExportError::Unwritable { path: self.out.clone(), error };
+        put_folder(self.temporary.path(), &self.out).map_err(unwritable)?;
+        // It is at its place, and there is nothing to remove.
+        let _ = self.temporary.keep();
         sync_folder_of(&self.out);
         Ok(())
     }
