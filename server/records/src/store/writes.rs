@@ -1,7 +1,8 @@
 //! How writing to the database goes: how long it takes, and whether it works. Reading these figures waits for no writer
 //! and no disk.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use prometheus_client::metrics::family::Family;
@@ -39,13 +40,17 @@ pub struct Writes {
     pub(super) records: Histogram,
     /// Times of writing batches of the control loop's steps.
     pub(super) telemetry: Histogram,
-    origin: Instant,
+    marks: Mutex<Marks>,
+}
+
+#[derive(Debug, Default)]
+struct Marks {
     /// When the write under way began.
-    under_way: Mark,
+    under_way: Option<Instant>,
     /// When the first write failed since the last one that worked.
-    failing: Mark,
+    failing: Option<Instant>,
     /// When a write failed last.
-    failed: Mark,
+    failed: Option<Instant>,
 }
 
 impl Default for Writes {
@@ -55,15 +60,7 @@ impl Default for Writes {
         let records = of("records");
         let telemetry = of("telemetry");
 
-        Self {
-            times,
-            records,
-            telemetry,
-            origin: Instant::now(),
-            under_way: Mark::default(),
-            failing: Mark::default(),
-            failed: Mark::default(),
-        }
+        Self { times, records, telemetry, marks: Mutex::default() }
     }
 }
 
@@ -77,29 +74,31 @@ impl Writes {
     /// How long the write under way has taken so far; `None` if there is none.
     #[must_use]
     pub fn under_way_for(&self) -> Option<Duration> {
-        self.under_way.age(self.now())
+        self.marks().under_way.map(|began| began.elapsed())
     }
 
     /// How long writes have been failing; `None` if the last one worked.
     #[must_use]
     pub fn failing_for(&self) -> Option<Duration> {
-        self.failing.age(self.now())
+        self.marks().failing.map(|since| since.elapsed())
     }
 
     /// How long ago a write last failed; `None` if none ever did.
     #[must_use]
     pub fn failed_ago(&self) -> Option<Duration> {
-        self.failed.age(self.now())
+        self.marks().failed.map(|last| last.elapsed())
     }
 
     /// Notes the outcome of a write. Only failures of the disk and the database count. A record that is refused is no
     /// reason to worry about the disk.
     pub(super) fn note<T>(&self, outcome: &Result<T, StoreError>) {
         match outcome {
-            Ok(_) => self.failing.clear(),
+            Ok(_) => self.marks().failing = None,
             Err(error) if error.is_of_the_disk() => {
-                self.failing.set_if_clear(self.now());
-                self.failed.set(self.now());
+                let now = Instant::now();
+                let mut marks = self.marks();
+                marks.failing.get_or_insert(now);
+                marks.failed = Some(now);
             }
             Err(_) => {}
         }
@@ -107,12 +106,13 @@ impl Writes {
 
     /// Begins a turn of writing, whose time goes into `times`. `guard` is the right to write.
     pub(super) fn begin<'a>(&'a self, guard: MutexGuard<'a, ()>, times: &'a Histogram) -> Turn<'a> {
-        self.under_way.set(self.now());
-        Turn { writes: self, times, began: Instant::now(), _guard: guard }
+        let began = Instant::now();
+        self.marks().under_way = Some(began);
+        Turn { writes: self, times, began, _guard: guard }
     }
 
-    fn now(&self) -> Duration {
-        self.origin.elapsed()
+    fn marks(&self) -> std::sync::MutexGuard<'_, Marks> {
+        self.marks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -141,7 +141,7 @@ impl Turn<'_> {
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
         self.times.observe(self.began.elapsed().as_secs_f64());
-        self.writes.under_way.clear();
+        self.writes.marks().under_way = None;
     }
 }
 
@@ -172,53 +172,11 @@ async fn in_transaction<T>(
     Ok(written)
 }
 
-/// A time after the origin in milliseconds, plus one; 0 for none.
-#[derive(Debug, Default)]
-struct Mark(AtomicU64);
-
-impl Mark {
-    fn value(at: Duration) -> u64 {
-        u64::try_from(at.as_millis()).unwrap_or(u64::MAX - 1) + 1
-    }
-
-    fn set(&self, at: Duration) {
-        self.0.store(Self::value(at), Ordering::Relaxed);
-    }
-
-    fn set_if_clear(&self, at: Duration) {
-        // If it is set already, it stays as it is.
-        let _ = self.0.compare_exchange(0, Self::value(at), Ordering::Relaxed, Ordering::Relaxed);
-    }
-
-    fn clear(&self) {
-        self.0.store(0, Ordering::Relaxed);
-    }
-
-    fn age(&self, now: Duration) -> Option<Duration> {
-        let at = self.0.load(Ordering::Relaxed).checked_sub(1)?;
-        Some(now.saturating_sub(Duration::from_millis(at)))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use tokio::sync::Mutex;
 
     use super::*;
-
-    #[test]
-    fn a_mark_has_an_age_until_it_is_cleared_and_is_not_set_twice() {
-        let at = Duration::from_secs;
-        let mark = Mark::default();
-        assert_eq!(mark.age(at(5)), None);
-        mark.set_if_clear(at(0));
-        mark.set_if_clear(at(3));
-        assert_eq!(mark.age(at(5)), Some(at(5)), "since the first time");
-        mark.set(at(3));
-        assert_eq!(mark.age(at(5)), Some(at(2)));
-        mark.clear();
-        assert_eq!(mark.age(at(5)), None);
-    }
 
     #[tokio::test]
     async fn writes_fail_from_a_failure_of_the_disk_until_one_works() {
@@ -227,7 +185,9 @@ mod tests {
         assert_eq!((writes.failing_for(), writes.failed_ago()), (None, None), "the disk works");
 
         writes.note(&Err::<(), _>(StoreError::Full));
-        assert!(writes.failing_for().is_some());
+        tokio::time::sleep(Duration::from_millis(2)).await;
+        writes.note(&Err::<(), _>(StoreError::Full));
+        assert!(writes.failing_for() > writes.failed_ago(), "since the first time, not the last");
         writes.note(&Ok(()));
         assert_eq!(writes.failing_for(), None);
         assert!(writes.failed_ago().is_some(), "it is remembered");
