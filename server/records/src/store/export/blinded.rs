@@ -9,18 +9,17 @@ use serde_json::{Map, Value, json};
 use super::ExportError;
 use super::description::{
     AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
-    ScoreRow, SegmentRow, SessionRow, TelemetryRow,
+    SegmentRow, SessionRow, TelemetryRow,
 };
 use super::folder::Folder;
-use super::scores::Scored;
 use super::study::ExportedStudy;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::store::remarks::{said_columns, withdrawn};
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
-    Answer, Comment, DeviceEvent, Erased, Head, LatestCorrections, Reader, RunClocks, SessionLine, StoreError,
-    StoredConsent, StoredCorrection, StoredErasure, VoiceRecording, standings,
+    Answer, Comment, DeviceEvent, Erased, Head, Reader, RunClocks, SessionLine, StoreError, StoredConsent,
+    StoredCorrection, StoredErasure, VoiceRecording, standings,
 };
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_base::{FocalPower, PatchPlace};
@@ -49,7 +48,7 @@ pub struct Blinded {
     protocol_toml: String,
     protocol_sha256: String,
     /// `None` if this version cannot read it. Then the questions have no text.
-    protocol: Option<Protocol>,
+    pub(super) protocol: Option<Protocol>,
     algorithm: &'static str,
     commitment: String,
     segments: Vec<SegmentId>,
@@ -57,12 +56,12 @@ pub struct Blinded {
     pub(super) comments: Vec<(i64, Comment)>,
     /// The recordings of voice comments.
     pub(super) voice: BTreeMap<IdempotencyKey, VoiceRecording>,
-    answers: Vec<(i64, Answer)>,
+    pub(super) answers: Vec<(i64, Answer)>,
     pub(super) corrections: Vec<StoredCorrection>,
     consents: Vec<StoredConsent>,
     erasures: Vec<StoredErasure>,
     pub(super) erased: Erased,
-    clocks: RunClocks,
+    pub(super) clocks: RunClocks,
     grace: Grace,
     study: ExportedStudy,
 }
@@ -336,20 +335,6 @@ impl Blinded {
         };
 
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
-    }
-
-    fn score_rows(&self) -> Vec<ScoreRow> {
-        // If this version cannot read the protocol, it cannot know the questions.
-        let Some(protocol) = &self.protocol else { return Vec::new() };
-        let scored = Scored {
-            session: self.session(),
-            protocol,
-            segments: &self.segments,
-            answers: &self.answers,
-            standings: &standings(&self.answers, &self.clocks),
-            corrections: &LatestCorrections::of(&self.corrections),
-        };
-        scored.rows()
     }
 
     fn correction_rows(&self) -> Vec<CorrectionRow> {

@@ -1,59 +1,38 @@
 //! The items and scores of a session's answers, as numbers. For each question, that is the answer that counts, with its
 //! correction applied.
 
+use super::blinded::Blinded;
 use super::description::ScoreRow;
-use crate::store::{Answer, LatestCorrections};
-use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_trial::instruments::{Measure, measures};
-use parfocal_trial::protocol::Protocol;
-use parfocal_trial::standing::AnswerStanding;
+use crate::store::{LatestCorrections, standings};
+use parfocal_trial::instruments::measures;
 
-/// What the scores of a session are computed from.
-pub struct Scored<'a> {
-    /// The session.
-    pub session: SessionId,
-    /// Its protocol, which says what was asked.
-    pub protocol: &'a Protocol,
-    /// Its segments, in order.
-    pub segments: &'a [SegmentId],
-    /// Its answers, each with the start of the server that kept it.
-    pub answers: &'a [(i64, Answer)],
-    /// The standing of each answer, in the same order: whether it counts, and its full value.
-    pub standings: &'a [AnswerStanding],
-    /// The corrections of the session.
-    pub corrections: &'a LatestCorrections,
-}
-
-impl Scored<'_> {
+impl Blinded {
     /// A row for each item and each score.
-    pub fn rows(&self) -> Vec<ScoreRow> {
-        let answers = self.answers.iter().map(|(_, answer)| answer).zip(self.standings);
-        answers
-            .filter(|(_, standing)| standing.counts)
-            .flat_map(|(answer, standing)| self.of(answer, standing))
-            .collect()
-    }
+    pub(super) fn score_rows(&self) -> Vec<ScoreRow> {
+        // If this version cannot read the protocol, it cannot know the questions.
+        let Some(protocol) = &self.protocol else { return Vec::new() };
+        let corrections = LatestCorrections::of(&self.corrections);
+        let standings = standings(&self.answers, &self.clocks);
 
-    fn of(&self, answer: &Answer, standing: &AnswerStanding) -> Vec<ScoreRow> {
-        let Some(question) = self.protocol.question(&answer.question, answer.segment.is_some()) else {
-            return Vec::new();
-        };
+        let mut rows = Vec::new();
+        for ((_, answer), standing) in self.answers.iter().zip(&standings).filter(|(_, standing)| standing.counts) {
+            let Some(question) = protocol.question(&answer.question, answer.segment.is_some()) else { continue };
+            let corrected = corrections.value(&answer.key);
+            let value = corrected.as_ref().unwrap_or(&standing.value);
 
-        let corrected = self.corrections.value(&answer.key);
-        let value = corrected.as_ref().unwrap_or(&standing.value);
-        let setting = self.segments.iter().position(|&known| Some(known) == answer.segment).map(|place| place + 1);
-        let row = |measure: Measure| ScoreRow {
-            session: self.session,
-            setting,
-            segment: answer.segment,
-            question: answer.question.clone(),
-            kind: question.kind.name(),
-            measure: measure.name,
-            label: measure.label,
-            value: measure.value,
-            computed: measure.score,
-            corrected: corrected.is_some(),
-        };
-        measures(&question.kind, value).into_iter().map(row).collect()
+            rows.extend(measures(&question.kind, value).into_iter().map(|measure| ScoreRow {
+                session: self.session(),
+                setting: self.setting(answer.segment),
+                segment: answer.segment,
+                question: answer.question.clone(),
+                kind: question.kind.name(),
+                measure: measure.name,
+                label: measure.label,
+                value: measure.value,
+                computed: measure.score,
+                corrected: corrected.is_some(),
+            }));
+        }
+        rows
     }
 }

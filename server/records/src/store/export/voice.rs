@@ -7,8 +7,7 @@ use super::blinded::Blinded;
 use super::description::{VoicePieceRow, VoiceRow};
 use super::folder::Folder;
 use crate::store::values::nanoseconds;
-use crate::store::{Comment, LatestCorrections, Reader, StoredPiece, VoiceRecording};
-use parfocal_base::ids::IdempotencyKey;
+use crate::store::{LatestCorrections, Reader, VoiceRecording};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
 use parfocal_trial::remark::CommentContent;
@@ -26,6 +25,7 @@ impl Blinded {
     /// Writes the recordings, one file each, and returns the rows of their table.
     pub(super) async fn write_voice(&self, reader: &Reader, folder: &mut Folder) -> Result<Vec<VoiceRow>, ExportError> {
         let typed = LatestCorrections::of(&self.corrections);
+        let nothing = VoiceRecording::default();
         let comments = self.comments.iter().map(|(_, comment)| comment);
         let mut rows = Vec::new();
 
@@ -36,61 +36,48 @@ impl Blinded {
                 folder.file(name, audio).await?;
             }
 
-            let sha256 = sound.map(|(_, audio)| hex::encode(Sha256::digest(audio)));
-            let transcript = typed.note(Subject::Comment, &comment.key).map(str::to_owned);
-            rows.push(VoiceRow { file, sha256, transcript, ..self.voice_row(comment) });
+            let recorded = self.voice.get(&comment.key).unwrap_or(&nothing);
+            let ended = recorded.ended();
+            rows.push(VoiceRow {
+                comment: comment.key,
+                session: comment.session,
+                setting: self.setting(comment.segment),
+                file,
+                media_type: recorded.media_type().map(MediaType::name),
+                seconds: recorded.seconds(),
+                pieces: recorded.pieces.len(),
+                missing: recorded.missing(),
+                bytes: recorded.bytes(),
+                sha256: sound.map(|(_, audio)| hex::encode(Sha256::digest(audio))),
+                ended: ended.map(Ending::name),
+                complete: ended.is_some() && recorded.missing() == 0,
+                transcript: typed.note(Subject::Comment, &comment.key).map(str::to_owned),
+                erased: self.erased.at(Erasable::Comment, &comment.key),
+            });
         }
         Ok(rows)
     }
 
-    /// The row of a recording, without file, hash and transcript.
-    fn voice_row(&self, comment: &Comment) -> VoiceRow {
-        let nothing = VoiceRecording::default();
-        let recorded = self.voice.get(&comment.key).unwrap_or(&nothing);
-        let ended = recorded.ended();
-
-        VoiceRow {
-            comment: comment.key,
-            session: comment.session,
-            setting: self.setting(comment.segment),
-            file: None,
-            media_type: recorded.media_type().map(MediaType::name),
-            seconds: recorded.seconds(),
-            pieces: recorded.pieces.len(),
-            missing: recorded.missing(),
-            bytes: recorded.bytes(),
-            sha256: None,
-            ended: ended.map(Ending::name),
-            complete: ended.is_some() && recorded.missing() == 0,
-            transcript: None,
-            erased: self.erased.at(Erasable::Comment, &comment.key),
-        }
-    }
-
     /// The pieces of all recordings, in the order they were kept.
     pub(super) fn voice_piece_rows(&self) -> Vec<VoicePieceRow> {
-        let rows_of = |(comment, recorded): (&IdempotencyKey, &VoiceRecording)| -> Vec<VoicePieceRow> {
-            recorded.pieces.iter().map(|piece| self.voice_piece_row(*comment, piece)).collect()
-        };
-        let mut rows: Vec<VoicePieceRow> = self.voice.iter().flat_map(rows_of).collect();
+        let mut rows = Vec::new();
+        for (comment, recorded) in &self.voice {
+            rows.extend(recorded.pieces.iter().map(|piece| VoicePieceRow {
+                number: piece.number,
+                session: self.session(),
+                comment: *comment,
+                piece: piece.piece,
+                media_type: piece.media_type.name(),
+                through_ms: piece.through_ms,
+                ended: piece.ended.map(Ending::name),
+                bytes: piece.bytes,
+                sha256: piece.sha256.clone(),
+                wall: piece.stamp.wall,
+                run: piece.run,
+                monotonic_ns: nanoseconds(piece.stamp.at),
+            }));
+        }
         rows.sort_by_key(|row| row.number);
         rows
-    }
-
-    fn voice_piece_row(&self, comment: IdempotencyKey, piece: &StoredPiece) -> VoicePieceRow {
-        VoicePieceRow {
-            number: piece.number,
-            session: self.session(),
-            comment,
-            piece: piece.piece,
-            media_type: piece.media_type.name(),
-            through_ms: piece.through_ms,
-            ended: piece.ended.map(Ending::name),
-            bytes: piece.bytes,
-            sha256: piece.sha256.clone(),
-            wall: piece.stamp.wall,
-            run: piece.run,
-            monotonic_ns: nanoseconds(piece.stamp.at),
-        }
     }
 }

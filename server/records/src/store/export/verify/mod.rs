@@ -241,7 +241,7 @@ fn copies(export: &ExportFiles) -> Outcome {
         let objects = session[table.name].as_array().ok_or_else(differs)?;
         let same = |object: &Value, row: &StringRecord| {
             row.len() == table.columns.len()
-                && table.columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
+                && table.columns.iter().zip(row).all(|(column, cell)| cell == column.csv(&object[column.name]))
         };
 
         let mut objects = objects.iter();
