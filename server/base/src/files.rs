@@ -138,12 +138,17 @@ fn fill_through(opened: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Res
     writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
 }
 
+/// The folder that `path` is in.
+#[must_use]
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Waits until the disk has the name of `path`. Otherwise a renamed file may have its old name after a power cut. The
 /// file is whole under either name, so it is not an error if the folder cannot be read or the file system cannot do
 /// this.
 pub fn sync_folder_of(path: &Path) {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
 }
 
 /// Removes all other accounts' access to the file or folder `path`.

@@ -18,7 +18,7 @@ use super::verify::checks;
 use super::{Access, AccessLog, Head, Reader, StoreError};
 use parfocal_base::boxed;
 use parfocal_base::clock::Clock;
-use parfocal_base::files::{make_private, sync_folder_of};
+use parfocal_base::files::{folder_of, make_private, sync_folder_of};
 
 /// What SQLite adds to a database's name for the files of its log.
 const LOG_SUFFIXES: [&str; 2] = ["-wal", "-shm"];
@@ -363,7 +363,7 @@ async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
 
 /// A temporary file beside `path`. It is removed unless it is renamed.
 fn temporary_beside(path: &Path) -> Result<NamedTempFile, BackupError> {
-    temporary_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+    temporary_in(folder_of(path))
 }
 
 /// A temporary file in `folder`. It is removed unless it is renamed.

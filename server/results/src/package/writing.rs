@@ -15,7 +15,7 @@ use super::parquet::ParquetFile;
 use super::source::{LeftOut, PackageSource, SESSIONS, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, playable, r, redcap, spss};
-use parfocal_base::files::{files_below, is_new_or_empty, put_folder, sync_folder_of, write_through};
+use parfocal_base::files::{files_below, folder_of, is_new_or_empty, put_folder, sync_folder_of, write_through};
 use parfocal_records::store::export::{ExportFiles, SUMS};
 use parfocal_trial::voice::MediaType;
 
@@ -66,7 +66,7 @@ pub fn write(
     agree(sources)?;
     check_new(out)?;
 
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = folder_of(out);
     fs::create_dir_all(parent).map_err(PackageError::unwritable(parent))?;
     let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
     let temporary = temporary.map_err(PackageError::unwritable(parent))?;

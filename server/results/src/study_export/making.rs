@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 use super::error::StudyExportError;
 use crate::package::{self, LeftOut, PackageSource, Sessions, Summary};
 use parfocal_base::boxed;
-use parfocal_base::files::files_below;
+use parfocal_base::files::{files_below, folder_of};
 use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
 use parfocal_recording::room;
@@ -140,7 +140,7 @@ struct Making {
 impl Making {
     /// Makes the package. Must not be called on a thread of `runtime`, because it blocks.
     fn run(&self, runtime: &Handle) -> Result<Summary, StudyExportError> {
-        let parent = self.out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let parent = folder_of(&self.out);
         let unwritable = |error| StudyExportError::Unwritable { path: parent.to_owned(), error };
         std::fs::create_dir_all(parent).map_err(unwritable)?;
         let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;

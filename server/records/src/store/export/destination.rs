@@ -15,7 +15,7 @@ use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, ZipWriter};
 
 use super::ExportError;
-use parfocal_base::files::{files_below, is_new_or_empty, put_folder, sync_folder_of};
+use parfocal_base::files::{files_below, folder_of, is_new_or_empty, put_folder, sync_folder_of};
 
 /// Pieces of a ZIP file that may wait to be downloaded.
 const PIECES: usize = 4;
@@ -100,7 +100,7 @@ impl NewFolder {
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
         check_new(out)?;
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let parent = folder_of(out);
         std::fs::create_dir_all(parent).map_err(unwritable)?;
         let temporary = tempfile::Builder::new().prefix(".parfocal-export-").tempdir_in(parent).map_err(unwritable)?;
         Ok(Self { out: out.to_owned(), temporary, file: None })
