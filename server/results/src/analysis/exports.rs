@@ -347,10 +347,8 @@ fn chained(export: &ExportFiles, session: SessionId) -> Result<(String, i64), St
 fn sites(sessions: &[ExportedSession]) -> Result<BTreeSet<String>, AnalysisError> {
     let mut sites = BTreeSet::new();
     for session in sessions {
-        let here: Vec<String> = serde_json::from_str(&session.study().sites).map_err(|error| {
-            PackageError::Unreadable { path: session.folder.join("studies.csv"), reason: error.to_string() }
-        })?;
-        sites.extend(here);
+        let here: Result<Vec<String>, _> = serde_json::from_str(&session.study().sites);
+        sites.extend(here.map_err(PackageError::unreadable(session.folder.join("studies.csv")))?);
     }
     Ok(sites)
 }
@@ -453,8 +451,7 @@ fn protocol_records(
 }
 
 fn text_of(folder: &Path, file: &str) -> Result<String, AnalysisError> {
-    let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
-    Ok(ExportFiles::of(folder).text(file).map_err(unreadable)?)
+    Ok(ExportFiles::of(folder).text(file).map_err(PackageError::unreadable(folder))?)
 }
 
 fn toml_of<T: serde::de::DeserializeOwned>(folder: &Path, file: &str) -> Result<T, AnalysisError> {
@@ -466,5 +463,5 @@ fn toml_of<T: serde::de::DeserializeOwned>(folder: &Path, file: &str) -> Result<
 fn protocol_of(folder: &Path) -> Result<Protocol, AnalysisError> {
     const FILE: &str = "protocol.toml";
     let protocol = Protocol::parse_kept(&text_of(folder, FILE)?, FILE);
-    Ok(protocol.map_err(|error| PackageError::Unreadable { path: folder.join(FILE), reason: error.to_string() })?)
+    Ok(protocol.map_err(PackageError::unreadable(folder.join(FILE)))?)
 }

@@ -159,13 +159,13 @@ fn of_question(question: &Question) -> Vec<Outcome> {
 
 /// Whether a measure is an outcome. Of a questionnaire only the scores are, not the items.
 fn is_outcome(kind: &QuestionKind, measure: &Measure) -> bool {
-    let questionnaire =
-        matches!(kind, QuestionKind::Sus { .. } | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. });
-    if questionnaire { measure.score && !measure.name.starts_with("weight-of-") } else { !is_order(kind) }
-}
-
-const fn is_order(kind: &QuestionKind) -> bool {
-    matches!(kind, QuestionKind::Ranking { .. })
+    match kind {
+        QuestionKind::Sus { .. } | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. } => {
+            measure.score && !measure.name.starts_with("weight-of-")
+        }
+        QuestionKind::Ranking { .. } => false,
+        _ => true,
+    }
 }
 
 fn outcome(question: &Question, measure: &Measure) -> Outcome {

@@ -72,7 +72,7 @@ pub enum PackageError {
 
 impl PackageError {
     /// Makes an error about reading `path`.
-    pub(super) fn unreadable<E: std::fmt::Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
+    pub(crate) fn unreadable<E: std::fmt::Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
         let path = path.into();
         move |error| Self::Unreadable { path, reason: error.to_string() }
     }

@@ -119,11 +119,8 @@ impl PackageSource {
 pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
     let sessions = path.join(SESSIONS);
     if !sessions.is_dir() {
-        return if is_export(path) {
-            Ok(vec![path.to_owned()])
-        } else {
-            Err(PackageError::NotAnExport(path.to_owned()))
-        };
+        let path = path.to_owned();
+        return if is_export(&path) { Ok(vec![path]) } else { Err(PackageError::NotAnExport(path)) };
     }
 
     let mut folders = Vec::new();
@@ -145,9 +142,8 @@ pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
     if !path.join(SESSIONS).is_dir() {
         return Ok(Vec::new());
     }
-    let unreadable = |reason: String| PackageError::Unreadable { path: path.to_owned(), reason };
-    let package = ExportFiles::of(path).json("datapackage.json").map_err(unreadable)?;
-    serde_json::from_value(package["parfocal"]["left_out"].clone()).map_err(|error| unreadable(error.to_string()))
+    let package = ExportFiles::of(path).json("datapackage.json").map_err(PackageError::unreadable(path))?;
+    Vec::deserialize(&package["parfocal"]["left_out"]).map_err(PackageError::unreadable(path))
 }
 
 /// Checks that `sources` belong together: one study with one definition, all blinded or none, no session twice, and one
