@@ -93,12 +93,12 @@ pub async fn insert(connection: &mut SqliteConnection, row: NewRow<'_>) -> Resul
     Ok(Head { number, hash })
 }
 
-/// The latest row; `Head::none` if there is no row.
+/// The latest row; `Head::default` if there is no row.
 pub async fn head(connection: &mut SqliteConnection) -> Result<Head, StoreError> {
     let latest = sqlx::query("SELECT number, hash FROM chain ORDER BY number DESC LIMIT 1");
     match latest.fetch_optional(connection).await? {
         Some(row) => Ok(Head { number: row.try_get("number")?, hash: row.try_get("hash")? }),
-        None => Ok(Head::none()),
+        None => Ok(Head::default()),
     }
 }
 

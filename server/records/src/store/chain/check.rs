@@ -31,6 +31,7 @@ pub enum FoundEntry {
 }
 
 /// The state of a check.
+#[derive(Default)]
 pub struct ChainCheck {
     /// Records whose row has not come yet, by kind and key.
     records: BTreeMap<(&'static str, String), Record>,
@@ -65,18 +66,7 @@ pub struct BlockToCheck {
 impl ChainCheck {
     /// Begins a check. `records` are all records except telemetry. `expected` is a head known from elsewhere.
     pub fn new(records: BTreeMap<(&'static str, String), Record>, expected: Option<Head>) -> Self {
-        Self {
-            erased: erased(&records),
-            records,
-            expected,
-            last: Head::none(),
-            whole: 0,
-            withheld: 0,
-            erased_rows: 0,
-            places: BTreeMap::new(),
-            orders: BTreeMap::new(),
-            steps: BTreeMap::new(),
-        }
+        Self { erased: erased(&records), records, expected, ..Self::default() }
     }
 
     /// Checks the next row and its record. Returns a block of telemetry, whose steps the caller has to check.

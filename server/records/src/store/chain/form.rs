@@ -139,13 +139,14 @@ pub struct Head {
     pub hash: String,
 }
 
-impl Head {
-    /// The head of a chain without a row.
-    #[must_use]
-    pub fn none() -> Self {
+/// The head of a chain without a row.
+impl Default for Head {
+    fn default() -> Self {
         Self { number: 0, hash: GENESIS.to_owned() }
     }
+}
 
+impl Head {
     /// Whether it is the row `number` with this hash.
     #[must_use]
     pub fn is(&self, number: i64, hash: &str) -> bool {
