@@ -22,7 +22,6 @@ use parfocal_records::store::StoreError;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::refusal::{Refusal, RefusalKind};
 use parfocal_trial::role::Role;
-use parfocal_trial::study::refusal::StudyRefusal;
 
 /// The reason why a request was not done. The text is written for people.
 #[derive(Debug, Clone)]
@@ -169,12 +168,6 @@ impl From<ConductError> for Error {
 
 impl From<Refusal> for Error {
     fn from(refusal: Refusal) -> Self {
-        ConductError::from(refusal).into()
-    }
-}
-
-impl From<StudyRefusal> for Error {
-    fn from(refusal: StudyRefusal) -> Self {
         ConductError::from(refusal).into()
     }
 }
