@@ -5,11 +5,10 @@
 //! what a real one would: the path through thread, wire and firmware, and dynamics that the driver does not know.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use super::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
 use super::optotune::{DriverSettings, OptotuneLens};
-use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, MILLIS, Optics};
+use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, take_millis};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
@@ -25,11 +24,10 @@ impl EmulatedLens {
     /// in dioptres, `temperature` in °C, and `fault`, which begins once the lens is connected.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let usual = Model::default();
-        let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
-        let latency = millis(options.take_within("latency", MILLIS, " ms")?, usual.latency);
+        let latency = take_millis(&mut options, "latency", usual.latency)?;
         let glass = LensDynamics {
-            delay: millis(options.take_within("delay", MILLIS, " ms")?, usual.glass.delay),
-            settling: millis(options.take_within("settling", MILLIS, " ms")?, usual.glass.settling),
+            delay: take_millis(&mut options, "delay", usual.glass.delay)?,
+            settling: take_millis(&mut options, "settling", usual.glass.settling)?,
         };
 
         let play = options.take("hysteresis")?.map_or(Ok(usual.play), play)?;

@@ -2,20 +2,12 @@
 
 use std::str::FromStr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::Duration;
-
-use serde::{Deserialize, Serialize};
 
 use super::response::Response;
-use super::{Lens, LensDynamics, LensError, LensHealth, LensInfo, MILLIS, Optics};
+use super::{DYNAMICS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, named, take_millis};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
-
-/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019). A command takes 2 ms through
-/// USB and driver.
-const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
 /// Half-width of the hysteresis, as a share of the range: 0.02 of 5 dioptres.
 const PLAY: f64 = 0.004;
@@ -31,14 +23,13 @@ pub struct SimulatedLens {
     glass: Arc<Response>,
     /// The focal power as a driver can know it. A driver cannot sense hysteresis, so this model has none.
     known: Response,
-    faults: SimulatedFaults,
+    fault: SimulatedFault,
     name: Arc<str>,
 }
 
 /// A fault of a simulated lens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SimulatedFault {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum SimulatedFault {
     /// No fault.
     #[default]
     None,
@@ -52,48 +43,18 @@ pub enum SimulatedFault {
     Gone,
 }
 
-impl SimulatedFault {
-    /// All faults, in the order of their numbers in [`SimulatedFaults`].
-    const ALL: [Self; 5] = [Self::None, Self::Drops, Self::Stalls, Self::Refuses, Self::Gone];
-
-    /// Name in the specification and in JSON.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Drops => "drops",
-            Self::Stalls => "stalls",
-            Self::Refuses => "refuses",
-            Self::Gone => "gone",
-        }
-    }
-}
-
 impl FromStr for SimulatedFault {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
-            format!("unknown fault '{name}': choose from {}", names.join(", "))
-        })
-    }
-}
-
-/// A switch for a simulated lens's faults. Clone it to set faults from any thread at any time.
-#[derive(Debug, Clone, Default)]
-pub struct SimulatedFaults(Arc<AtomicU8>);
-
-impl SimulatedFaults {
-    /// Switches to `fault`, which applies from the next call of the lens on.
-    pub fn set(&self, fault: SimulatedFault) {
-        self.0.store(fault as u8, Ordering::Relaxed);
-    }
-
-    /// The current fault.
-    #[must_use]
-    pub fn get(&self) -> SimulatedFault {
-        SimulatedFault::ALL.get(usize::from(self.0.load(Ordering::Relaxed))).copied().unwrap_or_default()
+        let known = [
+            ("none", Self::None),
+            ("drops", Self::Drops),
+            ("stalls", Self::Stalls),
+            ("refuses", Self::Refuses),
+            ("gone", Self::Gone),
+        ];
+        named("fault", &known, name)
     }
 }
 
@@ -112,7 +73,7 @@ impl SimulatedLens {
             dynamics,
             glass: Arc::new(Response::new(dynamics, PLAY, FocalPower::MIDDLE)),
             known: Response::new(dynamics, 0.0, FocalPower::MIDDLE),
-            faults: SimulatedFaults::default(),
+            fault: SimulatedFault::None,
             name: Arc::from("simulated lens"),
         }
     }
@@ -120,22 +81,18 @@ impl SimulatedLens {
     /// Opens the lens with a specification's `options`: `fault`, the initial fault; `delay` and `settling` in
     /// milliseconds.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
-        let fault = options.take::<SimulatedFault>("fault")?;
-        let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
-
+        let fault: Option<SimulatedFault> = options.take("fault")?;
         let dynamics = LensDynamics {
-            delay: millis(options.take_within("delay", MILLIS, " ms")?, DYNAMICS.delay),
-            settling: millis(options.take_within("settling", MILLIS, " ms")?, DYNAMICS.settling),
+            delay: take_millis(&mut options, "delay", DYNAMICS.delay)?,
+            settling: take_millis(&mut options, "settling", DYNAMICS.settling)?,
         };
         options.finish()?;
 
-        let lens = Self::moving(dynamics, clock);
-        lens.faults.set(fault.unwrap_or_default());
-        Ok(lens)
+        Ok(Self { fault: fault.unwrap_or_default(), ..Self::moving(dynamics, clock) })
     }
 
     fn failure(&self) -> Option<LensError> {
-        match self.faults.get() {
+        match self.fault {
             SimulatedFault::None | SimulatedFault::Drops => None,
             SimulatedFault::Stalls => Some(LensError::Stalled("commands pile up (simulated fault)".into())),
             SimulatedFault::Refuses => {
@@ -151,7 +108,7 @@ impl Lens for SimulatedLens {
         if let Some(failure) = self.failure() {
             return Err(failure);
         }
-        if self.faults.get() != SimulatedFault::Drops {
+        if self.fault != SimulatedFault::Drops {
             let now = self.clock.now();
             self.glass.command(now, target);
             self.known.command(now, target);
@@ -161,12 +118,12 @@ impl Lens for SimulatedLens {
     }
 
     fn measured(&self) -> Option<FocalPower> {
-        (self.faults.get() != SimulatedFault::Gone).then(|| self.known.focal_power_at(self.clock.now()))
+        (self.fault != SimulatedFault::Gone).then(|| self.known.focal_power_at(self.clock.now()))
     }
 
     fn health(&self) -> LensHealth {
         let failure = self.failure();
-        let message = match (&failure, self.faults.get()) {
+        let message = match (&failure, self.fault) {
             (Some(failure), _) => failure.to_string(),
             (None, SimulatedFault::Drops) => "commands get lost on the way (simulated fault)".into(),
             (None, _) => "follows commands; no real glass moves".into(),
@@ -201,14 +158,12 @@ impl Lens for SimulatedLens {
     fn optics(&self) -> Arc<dyn Optics> {
         self.glass.clone()
     }
-
-    fn faults(&self) -> Option<SimulatedFaults> {
-        Some(self.faults.clone())
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use parfocal_base::clock::ManualClock;
 
@@ -234,7 +189,7 @@ mod tests {
     #[test]
     fn drops_take_the_command_and_move_nothing() {
         let (mut lens, clock) = lens();
-        lens.faults().unwrap().set(SimulatedFault::Drops);
+        lens.fault = SimulatedFault::Drops;
 
         assert_eq!(lens.set(FocalPower::MAX), Ok(()));
         assert!((settled(&lens, &clock) - 0.5).abs() < 1e-9);
@@ -249,8 +204,7 @@ mod tests {
             (SimulatedFault::Gone, "the lens does not answer"),
         ] {
             let (mut lens, clock) = lens();
-            let faults = lens.faults().unwrap();
-            faults.set(fault);
+            lens.fault = fault;
 
             let error = lens.set(FocalPower::MAX).unwrap_err();
             assert!(error.to_string().starts_with(expected), "{error}");
@@ -259,7 +213,7 @@ mod tests {
             assert_eq!(lens.measured().is_none(), fault == SimulatedFault::Gone);
             assert_eq!(lens.info().is_err(), fault == SimulatedFault::Gone);
 
-            faults.set(SimulatedFault::None);
+            lens.fault = SimulatedFault::None;
             lens.set(FocalPower::MIN).unwrap();
             assert!((settled(&lens, &clock) - 0.004).abs() < 1e-9);
             assert!(lens.health().working);

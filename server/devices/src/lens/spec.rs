@@ -12,7 +12,7 @@ use parfocal_base::options::Options;
 
 /// Opens the lens that `spec` names:
 ///
-/// - `simulated`, with the options `fault` (see [`super::SimulatedFault`]), `delay` and `settling` (milliseconds);
+/// - `simulated`, with the options `fault` (`none`, `drops`, `stalls`, `refuses` or `gone`), `delay` and `settling` (milliseconds);
 /// - `emulated`, with the options `latency`, `delay`, `settling`, `hysteresis`, `temperature` and `fault` (see
 ///   [`super::emulator::Model`]);
 /// - `optotune:auto` or `optotune:/dev/...`, with the options `min` and `max`, the dioptres to use, and `low` and
@@ -59,7 +59,7 @@ fn opened(spec: &str, opening: Opening, clock: Arc<dyn Clock>) -> Result<Box<dyn
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::SimulatedFault;
+    use parfocal_base::FocalPower;
     use parfocal_base::clock::SystemClock;
 
     fn message(spec: &str) -> String {
@@ -68,9 +68,9 @@ mod tests {
 
     #[test]
     fn opens_a_simulated_lens_with_its_fault() {
-        let fault = |spec| open(spec, Arc::new(SystemClock)).unwrap().faults().unwrap().get();
-        assert_eq!(fault("simulated"), SimulatedFault::None);
-        assert_eq!(fault("simulated?fault=stalls"), SimulatedFault::Stalls);
+        let set = |spec| open(spec, Arc::new(SystemClock)).unwrap().set(FocalPower::MAX);
+        assert_eq!(set("simulated"), Ok(()));
+        assert!(matches!(set("simulated?fault=stalls"), Err(LensError::Stalled(_))));
         let slow = open("simulated?delay=20&settling=60", Arc::new(SystemClock)).unwrap().dynamics();
         assert_eq!((slow.delay.as_millis(), slow.settling.as_millis()), (20, 60));
     }

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use crate::lens::LensDynamics;
+use crate::lens::{LensDynamics, named};
 
 /// Range of the emulated lens, in dioptres.
 pub const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
@@ -49,55 +49,13 @@ pub enum Glitch {
 impl Glitch {
     /// Every kind.
     pub(super) const ALL: [Self; 3] = [Self::Noise, Self::Checksum, Self::Late];
-
-    /// Name on the command line.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Noise => "noise",
-            Self::Checksum => "checksum",
-            Self::Late => "late",
-        }
-    }
 }
 
 impl FromStr for Glitch {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|glitch| glitch.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|glitch| glitch.name()).collect();
-            format!("unknown glitch '{name}': choose from {}", names.join(", "))
-        })
-    }
-}
-
-impl Fault {
-    /// Every fault.
-    const ALL: [Self; 9] = [
-        Self::None,
-        Self::Garbage,
-        Self::WrongChecksum,
-        Self::WrongReadBack,
-        Self::Silent,
-        Self::Errors,
-        Self::DropsCommands,
-        Self::Stranger,
-        Self::NoisyLine,
-    ];
-
-    /// Name on the command line.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Garbage => "garbage",
-            Self::WrongChecksum => "wrong-checksum",
-            Self::WrongReadBack => "wrong-read-back",
-            Self::Silent => "silent",
-            Self::Errors => "errors",
-            Self::DropsCommands => "drops-commands",
-            Self::Stranger => "stranger",
-            Self::NoisyLine => "noisy-line",
-        }
+        named("glitch", &[("noise", Self::Noise), ("checksum", Self::Checksum), ("late", Self::Late)], name)
     }
 }
 
@@ -105,10 +63,18 @@ impl FromStr for Fault {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
-            format!("unknown fault '{name}': choose from {}", names.join(", "))
-        })
+        let known = [
+            ("none", Self::None),
+            ("garbage", Self::Garbage),
+            ("wrong-checksum", Self::WrongChecksum),
+            ("wrong-read-back", Self::WrongReadBack),
+            ("silent", Self::Silent),
+            ("errors", Self::Errors),
+            ("drops-commands", Self::DropsCommands),
+            ("stranger", Self::Stranger),
+            ("noisy-line", Self::NoisyLine),
+        ];
+        named("fault", &known, name)
     }
 }
 

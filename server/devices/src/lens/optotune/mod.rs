@@ -24,14 +24,11 @@ pub use handshake::DriverSettings;
 use port::Address;
 use shared::{Device, Shared};
 
-use super::{CELSIUS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use super::{CELSIUS, DYNAMICS, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Clock;
 use parfocal_base::options::Options;
 use parfocal_base::priority::{self, ThreadRole};
-
-/// The simulated lens's figures, used until the lens is measured on the bench.
-const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
 /// Dioptres that a specification may give: all that the driver has numbers for.
 const DIOPTRES: std::ops::RangeInclusive<f64> = -160.0..=160.0;
