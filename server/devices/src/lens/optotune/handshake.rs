@@ -7,7 +7,6 @@ use super::link::{Link, LinkError};
 use super::range::{Range, Scale};
 use super::shared::Device;
 use super::status::{FOCAL_POWER_MODE, Status, mode_name};
-use super::trouble::Trouble;
 use crate::lens::LensError;
 
 /// How to use the lens.
@@ -52,7 +51,7 @@ impl DriverSettings {
 }
 
 /// Prepares the device behind `link` for commands.
-pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Result<Device, Trouble> {
+pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Result<Device, LensError> {
     greet(link, path)?;
     if !settings.keep && !link.is_known() {
         let_go_first(link)?;
@@ -75,7 +74,7 @@ pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Resul
     let Reply::Mode(mode) = link.ask(Request::Mode)? else { return Err(confused()) };
     if mode != FOCAL_POWER_MODE {
         let mode = mode_name(mode);
-        return Err(LensError::Refused(format!("it stays in {mode} mode instead of focal power mode")).into());
+        return Err(LensError::Refused(format!("it stays in {mode} mode instead of focal power mode")));
     }
 
     let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
@@ -93,29 +92,25 @@ pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Resul
     })
 }
 
-fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
+fn greet(link: &mut Link, path: &Path) -> Result<(), LensError> {
     match link.greet() {
         Ok(true) => Ok(()),
-        Ok(false) if link.is_known() => {
-            Err(LensError::Gone("its replies are unreadable: check its USB cable".into()).into())
-        }
+        Ok(false) if link.is_known() => Err(LensError::Gone("its replies are unreadable: check its USB cable".into())),
         Ok(false) => Err(LensError::Refused(format!(
             "{} answers, but not as an Optotune Lens Driver 4: is this the right port?",
             path.display()
-        ))
-        .into()),
+        ))),
         Err(LinkError::Silent) => Err(LensError::Gone(format!(
             "nothing answers at {}: is it an Optotune Lens Driver 4, and is it powered?",
             path.display()
-        ))
-        .into()),
+        ))),
         Err(error) => Err(error.into()),
     }
 }
 
 /// Removes the lens's current first, because a process that was killed may have left it under current. The driver's
 /// answer does not matter: if the driver cannot be used, the next steps find out why.
-fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
+fn let_go_first(link: &mut Link) -> Result<(), LensError> {
     match link.relax() {
         Err(error @ (LinkError::Stopped | LinkError::Port(_))) => Err(error.into()),
         Err(error) => {
@@ -128,7 +123,7 @@ fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
 
 /// Sets the temperature limits, without which the driver refuses focal power mode, and then that mode. Returns the
 /// range of focal power from the last reply.
-fn control_focal_power(link: &mut Link, settings: &DriverSettings) -> Result<Limits, Trouble> {
+fn control_focal_power(link: &mut Link, settings: &DriverSettings) -> Result<Limits, LensError> {
     let (low, high) = settings.temperatures;
     let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };
     let Reply::TemperatureLimits(_) = link.ask(request).map_err(explain_incompatible)? else { return Err(confused()) };
@@ -139,10 +134,10 @@ fn control_focal_power(link: &mut Link, settings: &DriverSettings) -> Result<Lim
     }
 }
 
-fn explain_incompatible(error: LinkError) -> Trouble {
+fn explain_incompatible(error: LinkError) -> LensError {
     match error {
         LinkError::Wire(WireError::Device(DeviceError::LensIncompatible)) => {
-            LensError::Refused("the lens has no focal power calibration: plug in one with a memory".into()).into()
+            LensError::Refused("the lens has no focal power calibration: plug in one with a memory".into())
         }
         other => other.into(),
     }
@@ -156,8 +151,8 @@ fn check_lens(status: Status) -> Result<(), LensError> {
     Ok(())
 }
 
-fn confused() -> Trouble {
-    LensError::Refused("its reply does not match the request".into()).into()
+fn confused() -> LensError {
+    LensError::Refused("its reply does not match the request".into())
 }
 
 fn sixteenths(celsius: f64) -> i16 {

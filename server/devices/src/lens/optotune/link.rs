@@ -9,6 +9,7 @@ use super::codec::{self, DeviceError, READY, Reply, Request, START, WireError};
 use super::port::Port;
 use super::range::Range;
 use super::shared::Shared;
+use crate::lens::LensError;
 use parfocal_base::clock::Moment;
 
 /// Longest wait for a reply. A driver answers within a few milliseconds; USB hubs add some.
@@ -73,6 +74,15 @@ impl LinkError {
             Self::Silent | Self::Wire(WireError::Checksum | WireError::Garbage) => true,
             Self::Wire(WireError::Device(error)) => matches!(error, DeviceError::Checksum | DeviceError::Unknown),
             Self::Port(_) | Self::Stopped => false,
+        }
+    }
+}
+
+impl From<LinkError> for LensError {
+    fn from(error: LinkError) -> Self {
+        match error {
+            LinkError::Wire(WireError::Device(error)) => Self::Refused(error.to_string()),
+            other => Self::Gone(other.to_string()),
         }
     }
 }

@@ -12,7 +12,6 @@ mod port;
 mod range;
 mod shared;
 mod status;
-mod trouble;
 mod worker;
 
 use std::path::{Path, PathBuf};

@@ -37,22 +37,12 @@ impl Status {
         self.0 & Self::NO_LIMITS != 0
     }
 
-    /// Whether the lens is too hot or too cold for reliable focal power.
-    #[must_use]
-    pub const fn outside_temperature(self) -> bool {
-        self.0 & (Self::PRODUCT_TEMPERATURE | Self::GUARANTEED_RANGE | Self::USER_TEMPERATURE) != 0
-    }
-
-    /// Whether the lens cannot reach the focal power commanded.
-    #[must_use]
-    pub const fn unreachable(self) -> bool {
-        self.0 & Self::UNREACHABLE != 0
-    }
-
-    /// Whether the lens follows commands, but its focal power is unreliable.
+    /// Whether the lens follows commands, but its focal power is unreliable: it is too hot or too cold, or does not
+    /// reach as far.
     #[must_use]
     pub const fn doubtful(self) -> bool {
-        self.outside_temperature() || self.unreachable()
+        const TEMPERATURE: u32 = Status::PRODUCT_TEMPERATURE | Status::GUARANTEED_RANGE | Status::USER_TEMPERATURE;
+        self.0 & (TEMPERATURE | Self::UNREACHABLE) != 0
     }
 
     /// All conditions that are set, in words.
@@ -88,7 +78,7 @@ mod tests {
     #[test]
     fn bits_count_from_the_lowest() {
         assert_eq!(Status(0b1000_0001).words(), ["no lens is connected", "outside the temperature limits set"]);
-        assert!(Status(1).without_lens() && Status(4).restarted() && Status(0x80).outside_temperature());
+        assert!(Status(1).without_lens() && Status(4).restarted() && Status(0x80).doubtful());
         assert!(Status(0).words().is_empty());
     }
 }

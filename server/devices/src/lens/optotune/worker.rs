@@ -1,5 +1,6 @@
 //! The thread that talks to the driver: connects, sends commands, takes readings between them, and reconnects.
 
+use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,7 +11,6 @@ use super::handshake::{self, DriverSettings};
 use super::link::{Link, SentCommand};
 use super::port::{Address, Port};
 use super::shared::{Device, Shared};
-use super::trouble::Trouble;
 use crate::lens::LensError;
 use parfocal_base::clock::Moment;
 
@@ -39,13 +39,11 @@ pub fn run(shared: &Shared, address: &Address, settings: &DriverSettings) {
     let mut found = None;
     loop {
         let mut link = None;
-        let attempt = || match located(address, &mut found) {
-            Ok(path) => attend(shared, &path, settings, &mut link, &mut backoff),
-            Err(error) => error.into(),
-        };
-        let trouble = catch_unwind(AssertUnwindSafe(attempt))
-            .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
-        shared.lost(trouble.into());
+        let attempt = || attend(shared, &located(address, &mut found)?, settings, &mut link, &mut backoff);
+        match catch_unwind(AssertUnwindSafe(attempt)) {
+            Ok(Err(trouble)) => shared.lost(trouble),
+            Err(_) => shared.lost(LensError::Gone("its driver failed".into())),
+        }
 
         // If the end was requested while the port was open, the open connection is used to remove the current.
         if shared.stop_within(Duration::ZERO) {
@@ -68,25 +66,19 @@ fn located(address: &Address, found: &mut Option<PathBuf>) -> Result<PathBuf, Le
     Ok(found.insert(path).clone())
 }
 
-/// Connects and sends commands until that fails. Leaves the connection in `link`.
+/// Connects, sends commands and takes readings until that fails. Leaves the connection in `link`.
 fn attend<'a>(
     shared: &'a Shared,
     path: &Path,
     settings: &DriverSettings,
     link: &mut Option<Link<'a>>,
     backoff: &mut Duration,
-) -> Trouble {
-    let link = match Port::open(path) {
-        Ok(port) => link.insert(Link::new(port, shared)),
-        Err(error) => return error.into(),
-    };
-
-    match connect(shared, path, settings, link) {
-        Ok(mut session) => {
-            *backoff = BACKOFF_FIRST;
-            session.serve()
-        }
-        Err(trouble) => trouble,
+) -> Result<Infallible, LensError> {
+    let link = link.insert(Link::new(Port::open(path)?, shared));
+    let mut session = connect(shared, path, settings, link)?;
+    *backoff = BACKOFF_FIRST;
+    loop {
+        session.step()?;
     }
 }
 
@@ -120,7 +112,7 @@ fn connect<'a, 'b>(
     path: &Path,
     settings: &'b DriverSettings,
     link: &'b mut Link<'a>,
-) -> Result<Session<'a, 'b>, Trouble> {
+) -> Result<Session<'a, 'b>, LensError> {
     let mut device = handshake::perform(link, settings, path)?;
 
     // After a reconnection the lens goes to the latest command. A new lens stays where it is.
@@ -153,16 +145,8 @@ struct Session<'a, 'b> {
 }
 
 impl Session<'_, '_> {
-    /// Sends commands and takes readings until the connection ends.
-    fn serve(&mut self) -> Trouble {
-        loop {
-            if let Err(trouble) = self.step() {
-                return trouble;
-            }
-        }
-    }
-
-    fn step(&mut self) -> Result<(), Trouble> {
+    /// Sends commands until a reading is due, and takes it.
+    fn step(&mut self) -> Result<(), LensError> {
         let now = self.shared.clock.now();
         let due = now >= self.next_reading;
         self.link.pump(if due { self.next_reading + GAP_PATIENCE } else { self.next_reading })?;
@@ -182,7 +166,7 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    fn read_everything(&mut self) -> Result<(), Trouble> {
+    fn read_everything(&mut self) -> Result<(), LensError> {
         for request in KINDS {
             self.read(request)?;
         }
@@ -193,7 +177,7 @@ impl Session<'_, '_> {
     }
 
     /// Reads the value of `request`. If the lens is gone, or the driver lost its settings, the connection ends.
-    fn read(&mut self, request: Request) -> Result<(), Trouble> {
+    fn read(&mut self, request: Request) -> Result<(), LensError> {
         let sent = self.link.sent();
         if let Some(error) = self.link.stray_error() {
             tracing::warn!(%error, "the lens driver did not accept a command");
@@ -212,7 +196,7 @@ impl Session<'_, '_> {
 
         if self.device.status.without_lens() || self.device.status.restarted() {
             let why = "the driver lost its lens or was restarted, and is being set up again";
-            return Err(LensError::Gone(why.into()).into());
+            return Err(LensError::Gone(why.into()));
         }
         Ok(())
     }
