@@ -11,6 +11,7 @@ use rustix::termios::{
 };
 
 use crate::lens::LensError;
+use parfocal_base::files::LockedFile;
 
 /// Folder where Linux lists serial ports by the USB names of their devices.
 pub const BY_ID: &str = "/dev/serial/by-id";
@@ -20,7 +21,7 @@ const BAUD: u32 = 115_200;
 
 /// An open port: 115200 baud, 8 bits, no parity, no flow control, non-blocking, and exclusive until dropped.
 #[derive(Debug)]
-pub struct Port(File);
+pub struct Port(LockedFile);
 
 impl Port {
     /// Opens the port at `path`.
@@ -30,34 +31,32 @@ impl Port {
     pub fn open(path: &Path) -> Result<Self, LensError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| open_error(path, error))?;
-        let port = Self(File::from(fd));
 
         // The lock keeps out parfocal processes of all users. Exclusive mode keeps out all programs except root's.
-        match port.0.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(open_error(path, Errno::BUSY)),
-            Err(TryLockError::Error(error)) => return Err(gone(path, &error.to_string())),
-        }
+        let port = Self(LockedFile::of(File::from(fd)).map_err(|error| match error {
+            TryLockError::WouldBlock => open_error(path, Errno::BUSY),
+            TryLockError::Error(error) => gone(path, &error.to_string()),
+        })?);
 
         port.configure().map_err(|error| open_error(path, error))?;
         Ok(port)
     }
 
     fn configure(&self) -> Result<(), Errno> {
-        let mut settings = tcgetattr(&self.0)?;
+        let mut settings = tcgetattr(&*self.0)?;
         settings.make_raw();
         settings.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes -= ControlModes::CRTSCTS | ControlModes::CSTOPB;
         settings.set_speed(BAUD)?;
 
-        ioctl_tiocexcl(&self.0)?;
-        tcsetattr(&self.0, OptionalActions::Now, &settings)?;
-        tcflush(&self.0, QueueSelector::IOFlush)
+        ioctl_tiocexcl(&*self.0)?;
+        tcsetattr(&*self.0, OptionalActions::Now, &settings)?;
+        tcflush(&*self.0, QueueSelector::IOFlush)
     }
 
     /// The file to read, write and poll.
     #[must_use]
-    pub const fn file(&self) -> &File {
+    pub fn file(&self) -> &File {
         &self.0
     }
 }
@@ -66,11 +65,8 @@ impl Drop for Port {
     fn drop(&mut self) {
         // Without the flush, closing a port would wait half a minute for a device that accepts no bytes. Exclusive mode
         // would outlast this process if another one has the port open too.
-        let _ = tcflush(&self.0, QueueSelector::OFlush);
-        let _ = ioctl_tiocnxcl(&self.0);
-        // So would the lock, for a moment, in a program that this one is just starting: it has the port open until its
-        // own code replaces ours.
-        let _ = self.0.unlock();
+        let _ = tcflush(&*self.0, QueueSelector::OFlush);
+        let _ = ioctl_tiocnxcl(&*self.0);
     }
 }
 
