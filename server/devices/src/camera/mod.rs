@@ -6,18 +6,14 @@ pub mod footage;
 #[cfg(feature = "aravis")]
 pub mod gige;
 mod pace;
-pub mod phantom;
+mod phantom;
 mod playback;
 mod pool;
 pub mod recorded;
 mod replay;
-mod settings;
 mod spec;
 
 pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
-pub use pace::Pace;
-pub use pool::MosaicPool;
-pub use settings::CameraSettings;
 pub use spec::{open, open_or_await, own_calibration};
 
 use std::sync::Arc;
@@ -25,8 +21,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::lens::Optics;
 use parfocal_base::FocalPower;
-use parfocal_base::clock::Moment;
+use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::{MosaicFrame, RgbImage};
 
 /// A source of frames at its own pace.
@@ -62,6 +59,19 @@ pub trait Camera: Send {
     fn controls(&self) -> Option<Controls> {
         None
     }
+}
+
+/// The settings common to all cameras.
+#[derive(Clone)]
+pub struct CameraSettings {
+    /// The frame rate to aim at, frames per second.
+    pub fps: f64,
+    /// Seed of everything that a simulation draws at random.
+    pub seed: u64,
+    /// The lens's glass, for cameras that simulate looking through it.
+    pub optics: Arc<dyn Optics>,
+    /// The clock that stamps frames.
+    pub clock: Arc<dyn Clock>,
 }
 
 /// One exposure.

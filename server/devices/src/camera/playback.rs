@@ -1,29 +1,39 @@
-//! Pictures whose best focus is known, played as a live camera: the common part of footage and recorded
-//! scans.
+//! What is simulated or recorded, played as a live camera: the common part of the phantom, footage and recorded scans.
 
 use std::fmt::Display;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Camera, CameraError, CameraHealth, CameraSettings, Frame, FrameImage, Pace, Truth};
+use super::pace::Pace;
+use super::{Camera, CameraError, CameraHealth, CameraSettings, Frame, FrameImage, Truth};
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
-use parfocal_imaging::RgbImage;
 
 /// Something that can be looked at through a lens.
 pub trait PlayedScene: Send {
     /// Why there may be no picture.
     type Error: Display;
 
-    /// The picture `time` after the start at `focal_power`, and the optimal focal power.
+    /// Picture `number`, from 1, `time` after the start at `focal_power`, and the optimal focal power, if there is one.
     ///
     /// # Errors
     /// If a picture cannot be read.
-    fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), Self::Error>;
+    fn look(
+        &mut self,
+        number: u64,
+        time: Duration,
+        focal_power: FocalPower,
+    ) -> Result<(FrameImage, Option<FocalPower>), Self::Error>;
+
+    /// As [`Camera::mosaic_size`].
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        None
+    }
 }
 
 /// A view, played in real time. It counts as simulated: even a recording of the real world is not the
-/// real world now.
+/// real world now. The exposure takes place while the picture is being computed: it is centred on the computation's
+/// start, when the lens is looked through, and ends when the frame is handed over.
 pub struct Playback<V> {
     name: Arc<str>,
     view: V,
@@ -47,7 +57,7 @@ impl<V: PlayedScene> Camera for Playback<V> {
         let looked = self.settings.clock.now();
         let exposed = self.settings.optics.focal_power_at(looked);
 
-        let seen = self.view.look(looked.since(self.start), exposed);
+        let seen = self.view.look(number, looked.since(self.start), exposed);
         self.fault = seen.as_ref().err().map(|error| Arc::from(error.to_string()));
         let (image, optimal) = seen.map_err(|error| CameraError::Failed(error.to_string()))?;
 
@@ -58,9 +68,13 @@ impl<V: PlayedScene> Camera for Playback<V> {
             number,
             exposed_at,
             exposure: exposed_at.since(looked) * 2,
-            image: FrameImage::Rgb(Arc::new(image)),
-            truth: Some(Truth { optimal, exposed }),
+            image,
+            truth: optimal.map(|optimal| Truth { optimal, exposed }),
         })
+    }
+
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        self.view.mosaic_size()
     }
 
     fn computes(&self) -> bool {

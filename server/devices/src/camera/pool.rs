@@ -3,8 +3,7 @@
 
 use std::sync::Arc;
 
-use super::CameraError;
-use parfocal_imaging::MosaicFrame;
+use parfocal_imaging::{FrameError, MosaicFrame};
 
 /// Most mosaics that are remembered. The camera fills one. The control loop, the imaging thread and the threads of the
 /// two larger sizes each work on one while their slots hold the next. A recorder that falls behind holds about ten. If
@@ -37,9 +36,8 @@ impl MosaicPool {
     ///
     /// # Errors
     /// If the number of samples is not that of a frame.
-    pub fn frame(&mut self, samples: Vec<u16>) -> Result<Arc<MosaicFrame>, CameraError> {
-        let frame = MosaicFrame::new(self.width, self.height, samples);
-        let frame = Arc::new(frame.map_err(|error| CameraError::Failed(error.to_string()))?);
+    pub fn frame(&mut self, samples: Vec<u16>) -> Result<Arc<MosaicFrame>, FrameError> {
+        let frame = Arc::new(MosaicFrame::new(self.width, self.height, samples)?);
         if self.given.len() < MOST {
             self.given.push(Arc::clone(&frame));
         }

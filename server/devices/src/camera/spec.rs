@@ -1,9 +1,9 @@
 //! From `--camera SPEC` to a camera.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use super::phantom::{PhantomCamera, PhantomScene};
-use super::{Camera, CameraError, CameraSettings, footage, recorded, replay};
+use super::{Camera, CameraError, CameraSettings, footage, phantom, recorded, replay};
 use parfocal_recording::CALIBRATION;
 
 /// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a
@@ -14,22 +14,9 @@ use parfocal_recording::CALIBRATION;
 /// [`CameraError::BadSource`] if the camera is unknown, or its source cannot be used.
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     match spec.split_once(':') {
-        None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
-        Some(("phantom", name)) if PhantomScene::named(name).is_some() => {
-            Ok(Box::new(PhantomCamera::looking(PhantomScene::named(name).unwrap_or(PhantomScene::Hand), settings)))
-        }
-        Some(("footage", path)) if !path.is_empty() => match footage::open(Path::new(path), settings) {
-            Ok(camera) => Ok(Box::new(camera)),
-            Err(error) => Err(CameraError::BadSource(error.to_string())),
-        },
-        Some(("scan", path)) if !path.is_empty() => match recorded::play(Path::new(path), settings) {
-            Ok(camera) => Ok(Box::new(camera)),
-            Err(error) => Err(CameraError::BadSource(error.to_string())),
-        },
-        Some(("recording", path)) if !path.is_empty() => match replay::open(Path::new(path), settings) {
-            Ok(camera) => Ok(Box::new(camera)),
-            Err(error) => Err(CameraError::BadSource(error.to_string())),
-        },
+        Some(("footage", path)) if !path.is_empty() => played(footage::open(Path::new(path), settings)),
+        Some(("scan", path)) if !path.is_empty() => played(recorded::play(Path::new(path), settings)),
+        Some(("recording", path)) if !path.is_empty() => played(replay::open(Path::new(path), settings)),
         #[cfg(feature = "aravis")]
         Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
         #[cfg(not(feature = "aravis"))]
@@ -38,12 +25,14 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
              `--features aravis`"
                 .into(),
         )),
-        _ => Err(CameraError::BadSource(format!(
-            "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and \
+        _ => played(phantom::open(spec, settings).ok_or_else(|| {
+            format!(
+                "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and \
              `phantom:dark` to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), \
              `scan:DIR` (a recorded scan), `recording:DIR` (a hyperspectral recording) or `gige:ID` (`gige:list` lists \
              them)"
-        ))),
+            )
+        })),
     }
 }
 
@@ -58,6 +47,14 @@ pub fn open_or_await(spec: &str, settings: CameraSettings) -> Result<Box<dyn Cam
         return Ok(Box::new(super::gige::GigeCamera::open_or_await(source, settings)?));
     }
     open(spec, settings)
+}
+
+/// The opened camera, or why it could not be opened.
+fn played(opened: Result<impl Camera + 'static, impl Display>) -> Result<Box<dyn Camera>, CameraError> {
+    match opened {
+        Ok(camera) => Ok(Box::new(camera)),
+        Err(error) => Err(CameraError::BadSource(error.to_string())),
+    }
 }
 
 /// The calibration that comes with the camera `spec`: a recording's own. `None` for all other cameras.

@@ -15,17 +15,17 @@ pub use pnm::{PnmError, next_pnm};
 pub use reel::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
 pub use video::{FootageError, SQUARE_PIXELS, Video, ffmpeg};
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::playback::{Playback, PlayedScene, base_name};
-use super::{Camera, CameraSettings};
+use super::{Camera, CameraSettings, FrameImage};
 use crate::simulation::path::{Habit, Path};
 use defocus::Defocus;
 use parfocal_base::FocalPower;
-use parfocal_imaging::RgbImage;
 use reel::Reel;
 
 /// Share of the footage's width and height that the window shows.
@@ -66,7 +66,12 @@ pub fn open(path: &std::path::Path, settings: CameraSettings) -> Result<impl Cam
 impl PlayedScene for Footage {
     type Error = FootageError;
 
-    fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), FootageError> {
+    fn look(
+        &mut self,
+        _number: u64,
+        time: Duration,
+        focal_power: FocalPower,
+    ) -> Result<(FrameImage, Option<FocalPower>), FootageError> {
         let [optimal, x, y] = self.walk.at(time);
         let picture = self.reel.at(time)?;
         let (window, room) = window(picture.width, picture.height);
@@ -74,7 +79,7 @@ impl PlayedScene for Footage {
 
         let optimal = FocalPower::nearest(optimal);
         let seen = self.defocus.see(picture, corner, window, self.blur * optimal.distance(focal_power));
-        Ok((seen, optimal))
+        Ok((FrameImage::Rgb(Arc::new(seen)), Some(optimal)))
     }
 }
 

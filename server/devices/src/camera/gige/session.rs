@@ -9,7 +9,8 @@ use super::device::{Arrival, Device};
 use super::numbers::steps;
 use super::shared::{Shared, words};
 use super::timestamps::{Timestamps, arrival};
-use crate::camera::{Frame, FrameImage, MosaicPool, Setting};
+use crate::camera::pool::MosaicPool;
+use crate::camera::{Frame, FrameImage, Setting};
 use parfocal_imaging::MosaicFrame;
 
 /// The thread checks for requests at least this often.

@@ -2,11 +2,12 @@
 //! picks the picture.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Pose, ScanError, ScanFolder};
 use crate::camera::playback::{Playback, PlayedScene, base_name};
-use crate::camera::{Camera, CameraSettings};
+use crate::camera::{Camera, CameraSettings, FrameImage};
 use parfocal_base::FocalPower;
 use parfocal_imaging::{GrayImage, RgbImage};
 
@@ -26,7 +27,12 @@ pub fn open(path: &Path, settings: CameraSettings) -> Result<impl Camera + use<>
 impl PlayedScene for ScanFolder {
     type Error = ScanError;
 
-    fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), ScanError> {
+    fn look(
+        &mut self,
+        _number: u64,
+        time: Duration,
+        focal_power: FocalPower,
+    ) -> Result<(FrameImage, Option<FocalPower>), ScanError> {
         let number = there_and_back(time.as_nanos() * RATE / 1_000_000_000, self.poses().len());
         let missing = || ScanError::Missing { path: self.path().to_owned(), missing: vec![number], of: number };
         let pose: &Pose = self.poses().get(&number).ok_or_else(missing)?;
@@ -35,7 +41,7 @@ impl PlayedScene for ScanFolder {
         let nearest = pose.images.iter().min_by(|a, b| distance(a.focal_power).total_cmp(&distance(b.focal_power)));
         let picture = self.picture(pose, nearest.ok_or_else(missing)?)?;
 
-        Ok((in_colour(&picture), pose.optimum))
+        Ok((FrameImage::Rgb(Arc::new(in_colour(&picture))), Some(pose.optimum)))
     }
 }
 
