@@ -80,7 +80,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &filters])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
-        .map_err(footage::FootageError::NoDecoder)?;
+        .map_err(|error| footage::FootageError::no_decoder(&error))?;
 
     let complaint = String::from_utf8_lossy(&output.stderr);
     let complaint = complaint.lines().last();

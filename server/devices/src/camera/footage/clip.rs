@@ -12,8 +12,7 @@ use bytes::Bytes;
 use turbojpeg::{Decompressor, Image, PixelFormat};
 
 use super::coverage::cut_off;
-use super::size::{HEIGHT, WIDTH, large_enough};
-use super::video::{FootageError, Video};
+use super::video::{FootageError, HEIGHT, Video, WIDTH, large_enough};
 use parfocal_base::notices::tell;
 use parfocal_imaging::{JpegEncoder, RgbImage};
 
@@ -190,9 +189,7 @@ impl Loader {
             video = again;
         }
     }
-}
 
-impl Loader {
     /// Says how many pictures of a damaged video could be read.
     fn tell_damage(&self, video: &mut Video, count: u64) {
         if let Some(damage) = video.damage() {

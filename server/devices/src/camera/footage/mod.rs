@@ -7,11 +7,10 @@ mod coverage;
 mod defocus;
 mod pnm;
 mod reel;
-mod size;
 mod video;
 
 pub use coverage::{CutOff, cut_off};
-pub use pnm::{PnmError, next_pnm};
+pub use pnm::next_pnm;
 pub use reel::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
 pub use video::{FootageError, SQUARE_PIXELS, Video, ffmpeg};
 

@@ -3,38 +3,24 @@
 use std::io::BufRead;
 
 use image::codecs::pnm::PnmDecoder;
-use image::{DynamicImage, ImageDecoder, ImageError};
+use image::error::{LimitError, LimitErrorKind};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageResult};
 
 /// Most bytes of a picture. One that claims more is implausible: the stream is damaged.
 const MOST_BYTES: u64 = 1 << 28;
-
-/// Why the next picture of a stream cannot be read, although the stream has not ended.
-#[derive(Debug, thiserror::Error)]
-pub enum PnmError {
-    /// The stream broke off or failed.
-    #[error(transparent)]
-    Stream(#[from] std::io::Error),
-    /// What follows is not a PNM picture, or not a whole one.
-    #[error(transparent)]
-    Damaged(#[from] ImageError),
-    /// The picture claims to be larger than any that ffmpeg was asked for.
-    #[error("a picture of {0} bytes is too large")]
-    TooLarge(u64),
-}
 
 /// Reads the next picture of `stream` and not a byte more; `None` at the stream's end.
 ///
 /// # Errors
 /// If the stream fails, or what follows is not a whole picture.
-pub fn next_pnm(stream: &mut impl BufRead) -> Result<Option<DynamicImage>, PnmError> {
+pub fn next_pnm(stream: &mut impl BufRead) -> ImageResult<Option<DynamicImage>> {
     if stream.fill_buf()?.is_empty() {
         return Ok(None);
     }
 
     let decoder = PnmDecoder::new(stream)?;
-    let bytes = decoder.total_bytes();
-    if bytes > MOST_BYTES {
-        return Err(PnmError::TooLarge(bytes));
+    if decoder.total_bytes() > MOST_BYTES {
+        return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
     }
 
     Ok(Some(DynamicImage::from_decoder(decoder)?))

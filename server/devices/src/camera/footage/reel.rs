@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::clip::Clip;
-use super::size::{HEIGHT, WIDTH, large_enough};
-use super::video::FootageError;
+use super::video::{FootageError, HEIGHT, WIDTH, large_enough};
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{DecodeError, Picture, PictureFile, PixelFormat, RgbImage, decode_raw, is_mosaic};
@@ -172,7 +171,10 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
 
     files.retain(|file| is_picture(file) && !file.file_name().is_some_and(is_systems_own));
     files.sort();
-    if files.is_empty() { Err(FootageError::Empty(folder.to_owned())) } else { Ok(files) }
+    if files.is_empty() {
+        return Err(FootageError(format!("there is no picture (PNG, JPEG or TIFF) in {}", folder.display())));
+    }
+    Ok(files)
 }
 
 #[cfg(test)]

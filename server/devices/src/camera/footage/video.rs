@@ -3,49 +3,47 @@
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use super::pnm::next_pnm;
 use parfocal_imaging::RgbImage;
 
-/// Why footage cannot be used.
+/// Largest width of a picture in pixels: the blur can keep up with it in real time.
+pub(super) const WIDTH: usize = 1024;
+/// Largest height in pixels, for the same reason.
+pub(super) const HEIGHT: usize = 384;
+/// Least width and height in pixels, to hold a patch and a window that moves.
+const LEAST: usize = 64;
+
+/// Why footage cannot be used. The message names the file, and says what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum FootageError {
-    /// The file or folder does not exist, or may not be read.
-    #[error("cannot read {}: {reason}", path.display())]
-    Unreadable {
-        /// The file or folder.
-        path: PathBuf,
-        /// The reason, in words.
-        reason: String,
-    },
-    /// The decoder is missing.
-    #[error("cannot start `ffmpeg`, which decodes videos ({0}); install it, on Debian with `apt install ffmpeg`")]
-    NoDecoder(std::io::Error),
-    /// The folder holds no pictures.
-    #[error("there is no picture (PNG, JPEG or TIFF) in {}", .0.display())]
-    Empty(PathBuf),
-    /// The pictures are too small to hold a patch and a window that moves.
-    #[error("{} is {width}x{height} pixels, but at least {least}x{least} are needed", path.display())]
-    TooSmall {
-        /// The file.
-        path: PathBuf,
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// Least width and height.
-        least: usize,
-    },
-}
+#[error("{0}")]
+pub struct FootageError(pub(super) String);
 
 impl FootageError {
-    /// The picture or video `path` cannot be read, for `reason`.
+    /// The file or folder `path` cannot be read, for `reason`.
     #[must_use]
     pub fn unreadable(path: &Path, reason: impl std::fmt::Display) -> Self {
-        Self::Unreadable { path: path.to_owned(), reason: reason.to_string() }
+        Self(format!("cannot read {}: {reason}", path.display()))
     }
+
+    /// The decoder cannot be started.
+    #[must_use]
+    pub fn no_decoder(error: &std::io::Error) -> Self {
+        Self(format!(
+            "cannot start `ffmpeg`, which decodes videos ({error}); install it, on Debian with `apt install ffmpeg`"
+        ))
+    }
+}
+
+/// Refuses pictures of fewer than [`LEAST`] pixels either way.
+pub(super) fn large_enough(path: &Path, width: usize, height: usize) -> Result<(), FootageError> {
+    if width >= LEAST && height >= LEAST {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(FootageError(format!("{path} is {width}x{height} pixels, but at least {LEAST}x{LEAST} are needed")))
 }
 
 /// Filter of ffmpeg that makes pixels square, as players do: wide pixels become several, narrow ones fewer.
@@ -81,7 +79,7 @@ impl Video {
             .stdout(Stdio::piped())
             .stderr(errors.try_clone().map_err(failed)?)
             .spawn()
-            .map_err(FootageError::NoDecoder)?;
+            .map_err(|error| FootageError::no_decoder(&error))?;
 
         let Some(pictures) = decoder.stdout.take() else {
             return Err(FootageError::unreadable(path, "ffmpeg gives no output"));
@@ -125,7 +123,7 @@ impl Drop for Video {
 fn check(path: &Path) -> Result<(), FootageError> {
     std::fs::File::open(path).map_err(|error| FootageError::unreadable(path, error))?;
     let tried = ffmpeg(path).args(["-an", "-frames:v", "1", "-f", "null", "-"]).output();
-    let tried = tried.map_err(FootageError::NoDecoder)?;
+    let tried = tried.map_err(|error| FootageError::no_decoder(&error))?;
     if tried.status.success() {
         return Ok(());
     }
