@@ -38,7 +38,7 @@ impl ScanFolder {
     pub fn open(path: &Path) -> Result<Self, ScanError> {
         let file = path.join(HEADER);
         if !file.is_file() {
-            return Err(ScanError::NoScan(path.to_owned()));
+            return Err(ScanError(format!("{} is not a recorded scan: it has no {HEADER}", path.display())));
         }
 
         let text = fs::read_to_string(&file).map_err(ScanError::unreadable(&file))?;
@@ -143,10 +143,7 @@ impl ScanFolder {
     /// If a pose is missing.
     pub fn whole(self) -> Result<Self, ScanError> {
         let missing = self.missing();
-        if missing.is_empty() {
-            return Ok(self);
-        }
-        Err(ScanError::Missing { path: self.path, missing, of: self.header.poses })
+        if missing.is_empty() { Ok(self) } else { Err(ScanError::missing(&self.path, &missing, self.header.poses)) }
     }
 
     /// Reads a picture of `pose`. Its gray levels are whole numbers.
@@ -157,9 +154,13 @@ impl ScanFolder {
         let path = self.path.join(&image.file);
         let bytes = fs::read(&path).map_err(ScanError::unreadable(&path))?;
         if hex::encode(Sha256::digest(&bytes)) != image.sha256 {
-            return Err(ScanError::Checksum(path));
+            return Err(ScanError(format!(
+                "{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again",
+                path.display()
+            )));
         }
 
+        let undecodable = |error: DecodeError| ScanError(format!("{}: {error}", path.display()));
         // Never a mosaic, not even at the sensor's size.
         let read = PictureFile::open(&bytes).and_then(PictureFile::single).and_then(|file| file.read_any(0));
         let size = (pose.width, pose.height);
@@ -170,9 +171,9 @@ impl ScanFolder {
             }
             Ok(_) => {
                 let error = DecodeError::OtherPixels(format!("not {}x{} gray of 8 bit", pose.width, pose.height));
-                Err(ScanError::Picture { path, error })
+                Err(undecodable(error))
             }
-            Err(error) => Err(ScanError::Picture { path, error }),
+            Err(error) => Err(undecodable(error)),
         }
     }
 

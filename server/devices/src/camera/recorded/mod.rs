@@ -10,12 +10,12 @@ pub use player::open as play;
 pub use writing::{ScanRecording, TakenPose};
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use parfocal_base::FocalPower;
-use parfocal_imaging::{DecodeError, PATCH_SIDE, PatchArea};
+use parfocal_imaging::{PATCH_SIDE, PatchArea};
 
 /// Name of the file that says what was to be recorded.
 pub const HEADER: &str = "scan.json";
@@ -108,97 +108,50 @@ pub struct Image {
     pub sha256: String,
 }
 
-/// Why a scan cannot be read or written.
+/// Why a scan cannot be read or written. The message names the file or folder, and says what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum ScanError {
-    /// There is no scan there.
-    #[error("{} is not a recorded scan: it has no {HEADER}", .0.display())]
-    NoScan(PathBuf),
-    /// A file cannot be read.
-    #[error("cannot read {}: {error}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        error: io::Error,
-    },
-    /// The description of the scan is invalid.
-    #[error("{} does not describe a scan: {reason}", path.display())]
-    Nonsense {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// Poses have not been recorded yet.
-    #[error("the scan {} is not complete: {} of {of} {} missing; run the command that began it again to continue",
-        path.display(), poses(missing), if missing.len() == 1 { "is" } else { "are" })]
-    Missing {
-        /// The scan's folder.
-        path: PathBuf,
-        /// Numbers of the missing poses.
-        missing: Vec<usize>,
-        /// Number of poses it should have.
-        of: usize,
-    },
-    /// A picture is not the one that was stored.
-    #[error(
-        "{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again",
-        .0.display()
-    )]
-    Checksum(PathBuf),
-    /// A picture cannot be decoded.
-    #[error("{}: {error}", path.display())]
-    Picture {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        error: DecodeError,
-    },
-    /// The folder holds something else.
-    #[error("{} is not empty and is not a scan; choose a new folder", .0.display())]
-    Occupied(PathBuf),
-    /// The folder holds a scan that was begun with other arguments.
-    #[error(
-        "{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder",
-        path.display()
-    )]
-    Other {
-        /// The folder.
-        path: PathBuf,
-        /// The difference, in words.
-        difference: String,
-    },
-    /// Another process records there.
-    #[error("another parfocal is recording into {}", .0.display())]
-    Busy(PathBuf),
-    /// The disk is full.
-    #[error("no space is left on the disk of {}: {kept} poses are saved; free some space and run the same command \
-        again to continue", path.display())]
-    Full {
-        /// The folder.
-        path: PathBuf,
-        /// Poses that are stored.
-        kept: usize,
-    },
-    /// A file cannot be written.
-    #[error("cannot write {}: {error}", path.display())]
-    Unwritable {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        error: io::Error,
-    },
-}
+#[error("{0}")]
+pub struct ScanError(String);
 
 impl ScanError {
     fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_owned();
-        move |error| Self::Unreadable { path, error }
+        move |error| Self(format!("cannot read {}: {error}", path.display()))
     }
 
+    /// The description in `path` is invalid.
     fn nonsense(path: &Path, reason: impl std::fmt::Display) -> Self {
-        Self::Nonsense { path: path.to_owned(), reason: reason.to_string() }
+        Self(format!("{} does not describe a scan: {reason}", path.display()))
+    }
+
+    /// The poses with the numbers in `missing` have not been recorded yet; there should be `of` poses.
+    fn missing(path: &Path, missing: &[usize], of: usize) -> Self {
+        let are = if missing.len() == 1 { "is" } else { "are" };
+        Self(format!(
+            "the scan {} is not complete: {} of {of} {are} missing; run the command that began it again to continue",
+            path.display(),
+            poses(missing)
+        ))
+    }
+
+    /// A file cannot be written, after `kept` poses were stored.
+    fn unwritable(path: &Path, kept: usize, error: &io::Error) -> Self {
+        let path = path.display();
+        Self(match error.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => format!(
+                "no space is left on the disk of {path}: {kept} poses are saved; free some space and run the same \
+                 command again to continue"
+            ),
+            _ => format!("cannot write {path}: {error}"),
+        })
+    }
+
+    /// The folder `path` holds a scan that was begun with other arguments: `difference` says how they differ.
+    #[must_use]
+    pub fn other(path: &Path, difference: &str) -> Self {
+        Self(format!(
+            "{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder",
+            path.display()
+        ))
     }
 }
 

@@ -34,7 +34,7 @@ impl PlayedScene for ScanFolder {
         focal_power: FocalPower,
     ) -> Result<(FrameImage, Option<FocalPower>), ScanError> {
         let number = there_and_back(time.as_nanos() * RATE / 1_000_000_000, self.poses().len());
-        let missing = || ScanError::Missing { path: self.path().to_owned(), missing: vec![number], of: number };
+        let missing = || ScanError::missing(self.path(), &[number], number);
         let pose: &Pose = self.poses().get(&number).ok_or_else(missing)?;
 
         let distance = |power: FocalPower| power.distance(focal_power);

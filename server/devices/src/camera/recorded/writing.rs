@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::{HEADER, Header, Image, POSES, Pose, ScanError, ScanFolder};
 use parfocal_base::FocalPower;
-use parfocal_base::files::{LockedFile, is_systems_own, replace, write_through};
+use parfocal_base::files::{LockedFile, is_new_or_empty, replace, write_through};
 use parfocal_imaging::{GrayImage, PatchArea};
 
 /// A scan that is being recorded, by one process at a time.
@@ -46,28 +46,25 @@ impl ScanRecording {
     /// # Errors
     /// If the folder holds anything else, another process records into it, or it cannot be written.
     pub fn open(path: &Path, header: &Header) -> Result<Self, ScanError> {
-        fs::create_dir_all(path).map_err(|error| unwritable(path, 0, error))?;
-
-        let occupied = || -> io::Result<bool> {
-            let mut entries = fs::read_dir(path)?.filter_map(Result::ok);
-            Ok(entries.any(|entry| !is_systems_own(&entry.file_name())))
-        };
+        let unwritable = |error: io::Error| ScanError::unwritable(path, 0, &error);
+        fs::create_dir_all(path).map_err(unwritable)?;
 
         if !path.join(HEADER).exists() {
-            if occupied().map_err(|error| unwritable(path, 0, error))? {
-                return Err(ScanError::Occupied(path.to_owned()));
+            if !is_new_or_empty(path).map_err(unwritable)? {
+                let path = path.display();
+                return Err(ScanError(format!("{path} is not empty and is not a scan; choose a new folder")));
             }
-            replace(&path.join(HEADER), &pretty(header)).map_err(|error| unwritable(path, 0, error))?;
+            replace(&path.join(HEADER), &pretty(header)).map_err(unwritable)?;
         }
 
-        let journal = path.join(POSES);
-        let journal =
-            File::options().create(true).append(true).open(&journal).map_err(|e| unwritable(&journal, 0, e))?;
-        let journal = LockedFile::of(journal).map_err(|_| ScanError::Busy(path.to_owned()))?;
+        let lines = path.join(POSES);
+        let journal = File::options().create(true).append(true).open(&lines);
+        let journal = journal.map_err(|error| ScanError::unwritable(&lines, 0, &error))?;
+        let busy = |_| ScanError(format!("another parfocal is recording into {}", path.display()));
+        let journal = LockedFile::of(journal).map_err(busy)?;
 
         let folder = ScanFolder::open(path)?;
-        same(folder.header(), header)
-            .map_err(|difference| ScanError::Other { path: path.to_owned(), difference: difference.to_owned() })?;
+        same(folder.header(), header).map_err(|difference| ScanError::other(path, difference))?;
 
         let recording = Self { folder, journal };
         recording.tidy_up()?;
@@ -93,7 +90,7 @@ impl ScanRecording {
             let _ = fs::remove_dir_all(&partial);
         }
 
-        let pose = stored.map_err(|error| self.unwritable(error))?;
+        let pose = stored.map_err(|error| self.unwritable(&error))?;
         self.folder.insert(pose);
         Ok(())
     }
@@ -145,7 +142,7 @@ impl ScanRecording {
 
     /// Removes what a killed recording left unfinished.
     fn tidy_up(&self) -> Result<(), ScanError> {
-        let unwritable = |error| self.unwritable(error);
+        let unwritable = |error: io::Error| self.unwritable(&error);
         self.journal.set_len(self.folder.whole_bytes).map_err(unwritable)?;
 
         for entry in fs::read_dir(self.folder.path()).map_err(unwritable)?.filter_map(Result::ok) {
@@ -156,16 +153,8 @@ impl ScanRecording {
         Ok(())
     }
 
-    fn unwritable(&self, error: io::Error) -> ScanError {
-        unwritable(self.folder.path(), self.folder.poses().len(), error)
-    }
-}
-
-fn unwritable(path: &Path, kept: usize, error: io::Error) -> ScanError {
-    let path = path.to_owned();
-    match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => ScanError::Full { path, kept },
-        _ => ScanError::Unwritable { path, error },
+    fn unwritable(&self, error: &io::Error) -> ScanError {
+        ScanError::unwritable(self.folder.path(), self.folder.poses().len(), error)
     }
 }
 

@@ -123,7 +123,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         if recording.folder().poses().contains_key(&pose) {
             if !shows(recording.folder(), pose, &pictures)? {
                 let difference = format!("with other pictures of pose {pose}");
-                return Err(ScanError::Other { path: out.to_owned(), difference }.into());
+                return Err(ScanError::other(out, &difference).into());
             }
         } else {
             let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
