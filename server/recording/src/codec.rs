@@ -43,12 +43,11 @@ impl Coder {
     /// # Errors
     /// If a codec is unknown, or a dimension has no elements.
     pub fn new(data_type: DataType, fill: FillValue, shape: &[usize], codecs: Value) -> Result<Self, RecordingError> {
-        let failed = |problem: String| RecordingError::Codec(problem);
-        let metadata: Vec<MetadataV3> = serde_json::from_value(codecs).map_err(|error| failed(error.to_string()))?;
-        let chain = CodecChain::from_metadata(&metadata).map_err(|error| failed(error.to_string()))?;
+        let metadata: Vec<MetadataV3> = serde_json::from_value(codecs).map_err(RecordingError::codec)?;
+        let chain = CodecChain::from_metadata(&metadata).map_err(RecordingError::codec)?;
 
         let shape: Option<Vec<NonZeroU64>> = shape.iter().map(|&length| NonZeroU64::new(length as u64)).collect();
-        let shape = shape.ok_or_else(|| failed("a chunk has no elements".to_owned()))?;
+        let shape = shape.ok_or_else(|| RecordingError::codec("a chunk has no elements"))?;
         let options = CodecOptions::default().with_concurrent_target(1).with_validate_checksums(true);
         Ok(Self { chain, data_type, fill, shape, options })
     }
@@ -67,9 +66,9 @@ impl Coder {
     /// # Errors
     /// If the number of elements is not that of a chunk.
     pub fn encode<T: Element>(&self, elements: &[T]) -> Result<Vec<u8>, RecordingError> {
-        let bytes = T::to_array_bytes(&self.data_type, elements).map_err(|error| failed(&error))?;
+        let bytes = T::to_array_bytes(&self.data_type, elements).map_err(RecordingError::codec)?;
         let encoded = self.chain.encode(bytes, &self.shape, &self.data_type, &self.fill, &self.options);
-        encoded.map(ArrayBytesRaw::into_owned).map_err(|error| failed(&error))
+        encoded.map(ArrayBytesRaw::into_owned).map_err(RecordingError::codec)
     }
 
     /// The elements of a stored chunk.
@@ -78,11 +77,7 @@ impl Coder {
     /// If it is damaged.
     pub fn decode<T: ElementOwned>(&self, stored: Vec<u8>) -> Result<Vec<T>, RecordingError> {
         let bytes = self.chain.decode(stored.into(), &self.shape, &self.data_type, &self.fill, &self.options);
-        let bytes = bytes.map_err(|error| failed(&error))?;
-        T::from_array_bytes(&self.data_type, bytes).map_err(|error| failed(&error))
+        let bytes = bytes.map_err(RecordingError::codec)?;
+        T::from_array_bytes(&self.data_type, bytes).map_err(RecordingError::codec)
     }
-}
-
-fn failed(error: &dyn std::fmt::Display) -> RecordingError {
-    RecordingError::Codec(error.to_string())
 }

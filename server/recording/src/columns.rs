@@ -8,7 +8,7 @@ use zarrs::array::data_type::{float64, int64, uint64};
 use zarrs::array::{Element, ElementOwned, FillValue};
 
 use super::codec::{Coder, plain_codecs};
-use super::error::{Damage, RecordingError};
+use super::error::RecordingError;
 use super::layout::{COLUMN_CHUNK, Column};
 
 /// What is known about a frame besides its mosaic.
@@ -131,7 +131,11 @@ fn column<T: ElementOwned>(
 
     for file in 0..frames.div_ceil(COLUMN_CHUNK) {
         let path = folder.join(column.name()).join(format!("c/{file}"));
-        let damaged = || RecordingError::Damaged { path: path.clone(), damage: Damage::Column(column.name()) };
+        let damaged = || {
+            let name = column.name();
+            let damage = format!("the values of `{name}` are missing or do not match their checksum");
+            RecordingError::damaged(&path, damage)
+        };
         let stored = fs::read(&path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => damaged(),
             _ => RecordingError::unreadable(&path)(error),

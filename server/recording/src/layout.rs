@@ -238,7 +238,7 @@ pub fn band_arrays(calibration: &Calibration) -> Vec<BandArray> {
 /// # Errors
 /// If the header cannot be put into JSON, which would be an error of the program.
 pub fn group(header: &Header, arrays: &Map<String, Value>) -> Result<Value, RecordingError> {
-    let mut attributes = serde_json::to_value(header).map_err(|error| RecordingError::Codec(error.to_string()))?;
+    let mut attributes = serde_json::to_value(header).map_err(RecordingError::codec)?;
 
     // Here xarray looks for the names of coordinates.
     let beside =

@@ -17,7 +17,7 @@ mod writing;
 
 pub use columns::{FrameRow, PatchRow};
 pub use disk::{Room, room};
-pub use error::{Damage, RecordingError};
+pub use error::RecordingError;
 pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
 pub use layout::{SHARD_FRAMES, by_wavelength};
 pub use reading::Recording;

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::codec::Coder;
 use super::columns::{Columns, FrameRow};
-use super::error::{Damage, RecordingError};
+use super::error::RecordingError;
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
 use super::layout::{DESCRIPTION, MOSAIC, SHARD_FRAMES};
 use super::shard::Index;
@@ -51,7 +51,7 @@ impl Recording {
         }
         match attributes["version"].as_u64() {
             Some(VERSION) => {}
-            Some(found) => return Err(RecordingError::OtherVersion { path: folder.to_owned(), found }),
+            Some(found) => return Err(RecordingError::other_version(folder, found)),
             None => return Err(RecordingError::nonsense(&path, "it has no version")),
         }
 
@@ -139,25 +139,30 @@ impl Recording {
 
         let shard = number / SHARD_FRAMES;
         let path = self.shard(shard);
-        let damaged = |damage| RecordingError::Damaged { path: path.clone(), damage };
+        let damaged = |damage: String| RecordingError::damaged(&path, damage);
         let first = shard * SHARD_FRAMES;
         let last = (first + SHARD_FRAMES).min(self.rows.len()) - 1;
 
         let mut file = File::open(&path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => damaged(Damage::NoShard { first, last }),
+            ErrorKind::NotFound => damaged(format!("the file is missing, so frames {first} to {last} are lost")),
             _ => RecordingError::unreadable(&path)(error),
         })?;
         let places = self.index.read(&mut file).map_err(RecordingError::unreadable(&path))?;
-        let places = places.ok_or_else(|| damaged(Damage::Index { first, last }))?;
+        let places = places.ok_or_else(|| {
+            damaged(format!(
+                "its index is cut off or does not match its checksum, so frames {first} to {last} cannot be found in it"
+            ))
+        })?;
         let place = places.get(number - first).copied().flatten();
-        let (offset, length) = place.ok_or_else(|| damaged(Damage::Absent(number)))?;
+        let (offset, length) = place.ok_or_else(|| damaged(format!("frame {number} is not in it")))?;
 
         let mut stored = vec![0; length as usize];
         file.seek(SeekFrom::Start(offset)).map_err(RecordingError::unreadable(&path))?;
         file.read_exact(&mut stored).map_err(RecordingError::unreadable(&path))?;
 
-        let samples = self.coder.decode::<u16>(stored).map_err(|_| damaged(Damage::Frame(number)))?;
-        MosaicFrame::new(self.size.0, self.size.1, samples).map_err(|_| damaged(Damage::Frame(number)))
+        let mosaic = self.coder.decode::<u16>(stored).ok();
+        let mosaic = mosaic.and_then(|samples| MosaicFrame::new(self.size.0, self.size.1, samples).ok());
+        mosaic.ok_or_else(|| damaged(format!("frame {number} does not match its checksum")))
     }
 
     /// Reads every frame, and returns what is wrong with those that cannot be read. Damage of a whole file is reported

@@ -114,7 +114,7 @@ impl Recorder {
     /// If the codecs do not work, or the system has no thread left.
     pub fn start(writer: Writer, start: Moment) -> Result<Self, RecordingError> {
         let folder = writer.folder().to_owned();
-        let no_thread = |error: io::Error| RecordingError::unwritable(&folder, 0, error);
+        let no_thread = |error: io::Error| RecordingError::unwritable(&folder, 0, &error);
 
         let (intake, frames) = Intake::new(WAITING);
         let (sender, compressed) = sync_channel(COMPRESSED);
@@ -213,7 +213,11 @@ impl Compressor {
     fn compress(&self, shot: &CapturedFrame) -> Compressed {
         let found = (shot.mosaic.width(), shot.mosaic.height());
         if found != self.size {
-            return Err(RecordingError::OtherSize { of: self.size, found });
+            let (width, height) = self.size;
+            return Err(RecordingError::Failed(format!(
+                "the camera's frames changed from {width}x{height} to {}x{}; start another recording",
+                found.0, found.1
+            )));
         }
         Ok((shot.row(self.start), self.coder.encode(shot.mosaic.samples())?))
     }

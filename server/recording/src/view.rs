@@ -2,7 +2,7 @@
 //! pictures one after another, and a table of their places. `docs/recordings.md` describes them.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
@@ -67,7 +67,7 @@ impl ViewWriter {
     /// If the folder exists or cannot be written.
     pub fn create(folder: &Path, header: ViewHeader) -> Result<Self, RecordingError> {
         make_folder(folder)?;
-        let failed = |error| RecordingError::unwritable(folder, 0, error);
+        let failed = |error: io::Error| RecordingError::unwritable(folder, 0, &error);
         let pictures = File::create_new(folder.join(PICTURES)).map_err(failed)?;
         let mut index = File::create_new(folder.join(INDEX)).map_err(failed)?;
         index.write_all(COLUMNS.as_bytes()).map_err(failed)?;
@@ -98,7 +98,7 @@ impl ViewWriter {
         // The picture is written first, so that every line of the index has its picture.
         let line = format!("{number},{time},{},{},{width},{height}\n", self.bytes, jpeg.len());
         let written = self.pictures.write_all(jpeg).and_then(|()| self.index.write_all(line.as_bytes()));
-        written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, error))?;
+        written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, &error))?;
 
         self.bytes += jpeg.len() as u64;
         self.stored += 1;
@@ -112,15 +112,14 @@ impl ViewWriter {
     pub fn finish(mut self, ended: Ended) -> Result<(), RecordingError> {
         self.header.ended = Some(ended);
         let synced = self.pictures.sync_data().and_then(|()| self.index.sync_data());
-        synced.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, error))?;
+        synced.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, &error))?;
         self.describe()
     }
 
     fn describe(&self) -> Result<(), RecordingError> {
-        let mut text =
-            serde_json::to_vec_pretty(&self.header).map_err(|error| RecordingError::Codec(error.to_string()))?;
+        let mut text = serde_json::to_vec_pretty(&self.header).map_err(RecordingError::codec)?;
         text.push(b'\n');
         let written = replace(&self.folder.join(HEADER), &text);
-        written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, error))
+        written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, &error))
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::error::{Damage, RecordingError};
+use super::error::RecordingError;
 use super::view::{HEADER, INDEX, PICTURES, VIEW_FORMAT, VIEW_VERSION, ViewHeader};
 
 /// The first and the last two bytes of a JPEG picture.
@@ -56,7 +56,7 @@ impl ViewRecording {
             return Err(RecordingError::NoRecording(folder.to_owned()));
         }
         if header.version != VIEW_VERSION {
-            return Err(RecordingError::OtherVersion { path: folder.to_owned(), found: header.version });
+            return Err(RecordingError::other_version(folder, header.version));
         }
 
         let rows = read_index(folder)?;
@@ -99,7 +99,6 @@ impl ViewRecording {
         };
 
         let path = self.folder.join(PICTURES);
-        let damaged = || RecordingError::Damaged { path: path.clone(), damage: Damage::Picture(number) };
         let mut file = File::open(&path).map_err(RecordingError::unreadable(&path))?;
         file.seek(SeekFrom::Start(row.offset)).map_err(RecordingError::unreadable(&path))?;
 
@@ -107,7 +106,11 @@ impl ViewRecording {
         file.take(row.length).read_to_end(&mut jpeg).map_err(RecordingError::unreadable(&path))?;
 
         let whole = jpeg.len() as u64 == row.length && jpeg.starts_with(&JPEG_BEGINS) && jpeg.ends_with(&JPEG_ENDS);
-        if whole { Ok(jpeg) } else { Err(damaged()) }
+        if whole {
+            return Ok(jpeg);
+        }
+        let damage = format!("picture {number} is cut off, or is not a JPEG picture");
+        Err(RecordingError::damaged(&path, damage))
     }
 
     /// Reads every picture, and returns what is wrong with those that are not whole.

@@ -2,7 +2,7 @@
 //! longer. So however the program ends, what was stored before can be opened.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -162,7 +162,7 @@ impl Writer {
 
     fn store_shard(&self, frames: &[Vec<u8>], index: &[u8]) -> Result<(), RecordingError> {
         let path = self.folder.join(MOSAIC).join(format!("c/{}/0/0", self.sharded / SHARD_FRAMES));
-        let failed = |error| RecordingError::unwritable(&self.folder, self.sharded, error);
+        let failed = |error: io::Error| RecordingError::unwritable(&self.folder, self.sharded, &error);
         make_parent(&path).map_err(failed)?;
         replace_with(&path, |out| shard::write(out as &mut dyn Write, frames, index)).map_err(failed)
     }
@@ -190,21 +190,23 @@ impl Writer {
 /// # Errors
 /// If it exists or cannot be made.
 pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
-    let failed = |error| RecordingError::unwritable(folder, 0, error);
+    let failed = |error: io::Error| RecordingError::unwritable(folder, 0, &error);
     make_parent(folder).map_err(failed)?;
     fs::create_dir(folder).map_err(|error| match error.kind() {
-        std::io::ErrorKind::AlreadyExists => RecordingError::Exists(folder.to_owned()),
+        io::ErrorKind::AlreadyExists => {
+            RecordingError::Failed(format!("{} exists; choose a new folder for the recording", folder.display()))
+        }
         _ => failed(error),
     })
 }
 
-fn make_parent(path: &Path) -> std::io::Result<()> {
+fn make_parent(path: &Path) -> io::Result<()> {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).map_or(Ok(()), fs::create_dir_all)
 }
 
 fn put(path: &Path, kept: usize, bytes: &[u8]) -> Result<(), RecordingError> {
     let written = make_parent(path).and_then(|()| replace(path, bytes));
-    written.map_err(|error| RecordingError::unwritable(path, kept, error))
+    written.map_err(|error| RecordingError::unwritable(path, kept, &error))
 }
 
 fn pretty(description: &Value) -> Vec<u8> {

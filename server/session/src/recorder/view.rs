@@ -38,7 +38,7 @@ impl ViewRecorder {
             runtime.block_on(worker.run());
         });
 
-        let thread = thread.map_err(|error| RecordingError::unwritable(&folder, 0, error))?;
+        let thread = thread.map_err(|error| RecordingError::unwritable(&folder, 0, &error))?;
         Ok(Self { folder, progress, stop, thread: Some(thread) })
     }
 
