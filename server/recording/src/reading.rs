@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::codec::Coder;
-use super::columns::{Columns, FrameRow};
+use super::columns::{Coders, FrameRow};
 use super::error::RecordingError;
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
-use super::layout::{DESCRIPTION, MOSAIC, SHARD_FRAMES};
-use super::shard::Index;
+use super::layout::{DESCRIPTION, MOSAIC};
+use super::shard::{Index, SHARD_FRAMES};
 use super::view;
 use parfocal_imaging::{CELL, MosaicFrame};
 
@@ -59,9 +59,9 @@ impl Recording {
             serde_json::from_value(attributes.clone()).map_err(|e| RecordingError::nonsense(&path, e))?;
         let (frames, size) = extent(&described).map_err(|reason| RecordingError::nonsense(&path, reason))?;
 
-        let rows = Columns::new()?.read(folder, frames)?;
+        let rows = Coders::new()?.read(folder, frames)?;
         let coder = Coder::of_frames(size.0, size.1)?;
-        Ok(Self { folder: folder.to_owned(), header, size, rows, coder, index: Index::new(SHARD_FRAMES)? })
+        Ok(Self { folder: folder.to_owned(), header, size, rows, coder, index: Index::new()? })
     }
 
     /// Its folder.

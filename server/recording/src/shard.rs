@@ -3,7 +3,7 @@
 //! shard is stored whole.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use zarrs::array::FillValue;
 use zarrs::array::data_type::uint64;
@@ -11,6 +11,8 @@ use zarrs::array::data_type::uint64;
 use super::codec::{Coder, plain_codecs};
 use super::error::RecordingError;
 
+/// Frames in a shard, which is one file: a second at 25 frames a second.
+pub const SHARD_FRAMES: usize = 25;
 /// Offset and length of a chunk that is absent.
 const ABSENT: u64 = u64::MAX;
 /// Bytes of the index's checksum.
@@ -19,35 +21,34 @@ const CHECKSUM: usize = 4;
 /// Offset and length of a frame in its shard, bytes.
 pub type ByteRange = (u64, u64);
 
-/// Encodes and reads the index of shards with a given number of frames.
+/// Encodes and reads the index of shards of [`SHARD_FRAMES`] frames.
 pub struct Index {
     coder: Coder,
-    frames: usize,
 }
 
 impl Index {
-    /// An index for shards of `frames` frames.
+    /// An index.
     ///
     /// # Errors
     /// If the codecs do not work.
-    pub fn new(frames: usize) -> Result<Self, RecordingError> {
-        let coder = Coder::new(uint64(), FillValue::from(ABSENT), &[frames, 1, 1, 2], plain_codecs())?;
-        Ok(Self { coder, frames })
+    pub fn new() -> Result<Self, RecordingError> {
+        let coder = Coder::new(uint64(), FillValue::from(ABSENT), &[SHARD_FRAMES, 1, 1, 2], plain_codecs())?;
+        Ok(Self { coder })
     }
 
     /// The index of a shard that begins with these frames, given their stored lengths.
     ///
     /// # Errors
-    /// If there are more than `frames` of them.
+    /// If there are more than [`SHARD_FRAMES`] of them.
     pub fn encode(&self, lengths: &[usize]) -> Result<Vec<u8>, RecordingError> {
-        let mut places = Vec::with_capacity(2 * self.frames);
+        let mut places = Vec::with_capacity(2 * SHARD_FRAMES);
         let mut offset = 0;
         for &length in lengths {
             places.extend([offset, length as u64]);
             offset += length as u64;
         }
 
-        places.resize((2 * self.frames).max(places.len()), ABSENT);
+        places.resize((2 * SHARD_FRAMES).max(places.len()), ABSENT);
         self.coder.encode(&places)
     }
 
@@ -57,7 +58,7 @@ impl Index {
     /// # Errors
     /// If the file cannot be read.
     pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<ByteRange>>>> {
-        let length = 16 * self.frames + CHECKSUM;
+        let length = 16 * SHARD_FRAMES + CHECKSUM;
         let whole = shard.metadata()?.len();
         let Some(start) = whole.checked_sub(length as u64) else { return Ok(None) };
 
@@ -72,15 +73,4 @@ impl Index {
         };
         Ok(Some(places.chunks_exact(2).map(place).collect()))
     }
-}
-
-/// Writes a shard: its frames, then its index.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write(out: &mut dyn Write, frames: &[Vec<u8>], index: &[u8]) -> io::Result<()> {
-    for frame in frames {
-        out.write_all(frame)?;
-    }
-    out.write_all(index)
 }

@@ -1,22 +1,19 @@
 //! Writes a recording. Each shard is written under another name and then renamed. Only after that do the arrays become
 //! longer. So however the program ends, what was stored before can be opened.
 
-use std::fs;
-use std::io::{self, Write};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use zarrs::array::FillValue;
-use zarrs::array::data_type::{float64, int64};
 
-use super::codec::{Coder, plain_codecs};
-use super::columns::{Columns, FrameRow};
+use super::columns::{COLUMN_CHUNK, COLUMNS, Coders, FrameRow};
 use super::error::RecordingError;
 use super::header::{Ended, Header};
-use super::layout::{BandValues, COLUMN_CHUNK, Column, DESCRIPTION, MOSAIC, SHARD_FRAMES, band_arrays, group, growing};
-use super::shard::{self, Index};
+use super::layout::{BandArray, DESCRIPTION, MOSAIC, band_arrays, group, growing};
+use super::shard::{Index, SHARD_FRAMES};
 use parfocal_base::files::{replace, replace_with};
-use parfocal_imaging::{BANDS, Calibration};
+use parfocal_imaging::Calibration;
 
 /// A recording under way.
 pub struct Writer {
@@ -26,7 +23,7 @@ pub struct Writer {
     /// Descriptions of the arrays that do not grow.
     fixed: Vec<(String, Value)>,
     index: Index,
-    columns: Columns,
+    coders: Coders,
     /// Rows of each column's last file, which is not full yet. Includes the rows of frames that wait for their shard.
     rows: Vec<FrameRow>,
     /// Compressed frames that wait for their shard to be full.
@@ -51,19 +48,10 @@ impl Writer {
         make_folder(folder)?;
 
         let mut fixed = Vec::new();
-        for array in band_arrays(calibration) {
-            let stored = match &array.values {
-                BandValues::Numbers(values) => {
-                    Coder::new(float64(), FillValue::from(f64::NAN), &[BANDS], plain_codecs())?.encode(values)?
-                }
-                BandValues::Places(values) => {
-                    Coder::new(int64(), FillValue::from(0_i64), &[BANDS], plain_codecs())?.encode(values)?
-                }
-            };
-            let description = array.description();
-            put(&folder.join(array.name).join("c/0"), 0, &stored)?;
-            put(&folder.join(array.name).join(DESCRIPTION), 0, &pretty(&description))?;
-            fixed.push((array.name.to_owned(), description));
+        for BandArray { name, description, stored } in band_arrays(calibration)? {
+            put(&folder.join(name).join("c/0"), 0, &stored)?;
+            put(&folder.join(name).join(DESCRIPTION), 0, &pretty(&description))?;
+            fixed.push((name.to_owned(), description));
         }
 
         let mut writer = Self {
@@ -71,8 +59,8 @@ impl Writer {
             header,
             size,
             fixed,
-            index: Index::new(SHARD_FRAMES)?,
-            columns: Columns::new()?,
+            index: Index::new()?,
+            coders: Coders::new()?,
             rows: Vec::new(),
             waiting: Vec::new(),
             sharded: 0,
@@ -117,7 +105,8 @@ impl Writer {
         self.header.frames_lost = frames;
     }
 
-    /// Adds a frame, compressed by [`Coder::of_frames`] of this size. Every [`SHARD_FRAMES`] frames become a file.
+    /// Adds a frame, compressed by [`super::codec::Coder::of_frames`] of this size. Every [`SHARD_FRAMES`] frames
+    /// become a file.
     ///
     /// # Errors
     /// If it cannot be written. Then the frames of this shard are lost, and those before it are kept.
@@ -148,9 +137,9 @@ impl Writer {
             return Err(error);
         }
 
-        for column in Column::ALL {
-            let file = self.folder.join(column.name()).join("c").join((self.sharded / COLUMN_CHUNK).to_string());
-            put(&file, self.sharded, &self.columns.encode(column, &self.rows)?)?;
+        for column in &COLUMNS {
+            let file = self.folder.join(column.name).join("c").join((self.sharded / COLUMN_CHUNK).to_string());
+            put(&file, self.sharded, &self.coders.encode(column, &self.rows)?)?;
         }
 
         self.sharded += frames.len();
@@ -164,7 +153,11 @@ impl Writer {
         let path = self.folder.join(MOSAIC).join(format!("c/{}/0/0", self.sharded / SHARD_FRAMES));
         let failed = |error: io::Error| RecordingError::unwritable(&self.folder, self.sharded, &error);
         make_parent(&path).map_err(failed)?;
-        replace_with(&path, |out| shard::write(out as &mut dyn Write, frames, index)).map_err(failed)
+        let write = |out: &mut BufWriter<File>| {
+            frames.iter().try_for_each(|frame| out.write_all(frame))?;
+            out.write_all(index)
+        };
+        replace_with(&path, write).map_err(failed)
     }
 
     /// Describes what is stored now: first all arrays in the group's file, then each array for readers that do not look
