@@ -73,8 +73,8 @@ impl Stills {
     fn at(&mut self, time: Duration) -> Result<&RgbImage, FootageError> {
         let turn = (time.as_nanos() / STILL.as_nanos() % self.files.len() as u128) as usize;
         if turn != self.shown {
-            self.shown = turn;
             self.picture = still(&self.files[turn])?;
+            self.shown = turn;
         }
         Ok(&self.picture)
     }
@@ -188,6 +188,23 @@ mod tests {
         std::fs::write(&raw, [0; 100]).unwrap();
         let error = Reel::open(&raw).err().unwrap().to_string();
         assert!(error.contains("frame.RAW: it is a sensor's mosaic: look at it with `parfocal inspect`"), "{error}");
+    }
+
+    #[test]
+    fn a_still_that_cannot_be_read_is_an_error_as_long_as_its_turn_lasts() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "b.png"] {
+            image::RgbImage::new(64, 64).save(folder.path().join(name)).unwrap();
+        }
+        let mut reel = Reel::open(folder.path()).unwrap();
+        let gone = folder.path().join("b.png");
+        std::fs::remove_file(&gone).unwrap();
+
+        assert!(reel.at(Duration::ZERO).is_ok());
+        for moment in [STILL, STILL.mul_f64(1.5), STILL.mul_f64(1.9)] {
+            assert!(reel.at(moment).unwrap_err().to_string().contains("b.png"), "{moment:?}");
+        }
+        assert!(reel.at(2 * STILL).is_ok());
     }
 
     #[test]
