@@ -233,25 +233,7 @@ pub fn put_folder(whole: &Path, out: &Path) -> io::Result<()> {
 /// # Errors
 /// If a folder cannot be read.
 pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    let mut folders = vec![PathBuf::new()];
-    while let Some(within) = folders.pop() {
-        for entry in fs::read_dir(folder.join(&within))? {
-            let entry = entry?;
-            if is_systems_own(&entry.file_name()) {
-                continue;
-            }
-            let name = within.join(entry.file_name());
-            if entry.path().is_dir() {
-                folders.push(name);
-            } else {
-                files.push(name);
-            }
-        }
-    }
-
-    files.sort();
-    Ok(files)
+    Ok(below(folder)?.0)
 }
 
 /// The files of operating systems below `folder`, at any depth: their paths relative to `folder`, sorted. Of a hidden
@@ -260,22 +242,31 @@ pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// # Errors
 /// If a folder cannot be read.
 pub fn systems_own_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
+    Ok(below(folder)?.1)
+}
+
+/// People's files below `folder`, and those of operating systems.
+fn below(folder: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let mut files = Vec::new();
+    let mut systems_own = Vec::new();
     let mut folders = vec![PathBuf::new()];
     while let Some(within) = folders.pop() {
         for entry in fs::read_dir(folder.join(&within))? {
             let entry = entry?;
             let name = within.join(entry.file_name());
             if is_systems_own(&entry.file_name()) {
-                found.push(name);
+                systems_own.push(name);
             } else if entry.path().is_dir() {
                 folders.push(name);
+            } else {
+                files.push(name);
             }
         }
     }
 
-    found.sort();
-    Ok(found)
+    files.sort();
+    systems_own.sort();
+    Ok((files, systems_own))
 }
 
 /// Whether `name` is that of a file which a process killed in [`replace`] may have left.
