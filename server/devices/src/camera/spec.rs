@@ -44,7 +44,7 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
 pub fn open_or_await(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     #[cfg(feature = "aravis")]
     if let Some(source) = spec.strip_prefix("gige:") {
-        return Ok(Box::new(super::gige::GigeCamera::open_or_await(source, settings)?));
+        return Ok(Box::new(super::gige::GigeCamera::open_as(source, settings, true)?));
     }
     open(spec, settings)
 }

@@ -10,7 +10,7 @@ use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, GvDevice, Stream, gl
 
 use gio::prelude::*;
 
-use crate::camera::{Adjustable, CameraError, Setting};
+use crate::camera::{Adjustable, Setting};
 use parfocal_base::options::{BadOptions, Options};
 use parfocal_imaging::{CELL, PixelFormat};
 
@@ -50,21 +50,20 @@ pub struct Setup {
 
 impl Setup {
     /// Parses `source`, with `fps` as the rate.
-    pub fn parse(source: &str, fps: f64) -> Result<Self, CameraError> {
-        let bad = |error: BadOptions| CameraError::BadSource(format!("camera gige: {error}"));
-        let (id, mut options) = Options::split(source).map_err(bad)?;
+    pub fn parse(source: &str, fps: f64) -> Result<Self, BadOptions> {
+        let (id, mut options) = Options::split(source)?;
         let setup = Self {
             id: id.to_owned(),
-            format: options.take("format").map_err(bad)?,
-            width: options.take_within("width", SIDES, " pixels").map_err(bad)?,
-            height: options.take_within("height", SIDES, " pixels").map_err(bad)?,
-            packet: options.take_within("packet", PACKETS, " bytes").map_err(bad)?,
-            exposure: options.take_within("exposure", EXPOSURES, " microseconds").map_err(bad)?,
-            gain: options.take_within("gain", GAINS, "").map_err(bad)?,
+            format: options.take("format")?,
+            width: options.take_within("width", SIDES, " pixels")?,
+            height: options.take_within("height", SIDES, " pixels")?,
+            packet: options.take_within("packet", PACKETS, " bytes")?,
+            exposure: options.take_within("exposure", EXPOSURES, " microseconds")?,
+            gain: options.take_within("gain", GAINS, "")?,
             fps,
         };
 
-        options.finish().map_err(bad)?;
+        options.finish()?;
         Ok(setup)
     }
 

@@ -4,11 +4,9 @@
 //! [`Camera::next_frame`], and looks for the camera again when it is lost.
 
 mod device;
-mod numbers;
 mod session;
 mod shared;
 mod timestamps;
-mod worker;
 
 use std::sync::{Arc, OnceLock, mpsc};
 use std::thread::JoinHandle;
@@ -38,20 +36,14 @@ impl GigeCamera {
     /// [`CameraError::BadSource`], with the reason, if it cannot be used right now. It recovers from later failures by
     /// itself.
     pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
-        Self::opened(source, settings, false)
+        Self::open_as(source, settings, false)
     }
 
-    /// The same, except that a camera that does not answer is treated like one that was lost: it is looked for until it
-    /// is there.
-    ///
-    /// # Errors
-    /// [`CameraError::BadSource`], with the reason, if the source is invalid, or the camera answers and cannot be used.
-    pub fn open_or_await(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
-        Self::opened(source, settings, true)
-    }
-
-    fn opened(source: &str, settings: CameraSettings, patient: bool) -> Result<Self, CameraError> {
-        let setup = Setup::parse(source, settings.fps)?;
+    /// The same, except that if `patient` is set, a camera that does not answer is treated like one that was lost: it
+    /// is looked for until it is there.
+    pub(super) fn open_as(source: &str, settings: CameraSettings, patient: bool) -> Result<Self, CameraError> {
+        let setup = Setup::parse(source, settings.fps);
+        let setup = setup.map_err(|error| CameraError::BadSource(format!("camera gige: {error}")))?;
         if setup.id == "list" {
             return Err(CameraError::BadSource(listing()));
         }
@@ -81,7 +73,7 @@ impl GigeCamera {
                     tracing::warn!("{trouble}; looking for it");
                 }
                 let _ = sender.send(Ok((size, Arc::clone(&shared))));
-                worker::run(&shared, &setup, device, size);
+                session::run(&shared, &setup, device, size);
             })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
 

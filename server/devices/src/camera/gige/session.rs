@@ -1,12 +1,12 @@
-//! Streaming from a camera until it is lost: unpacks frames, counts lost ones, changes settings.
+//! The camera's thread: streams from a camera until it is lost, and looks for one that is lost or not there yet.
+//! Unpacks frames, counts lost ones, changes settings.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use ::aravis::Buffer;
 
-use super::device::{Arrival, Device};
-use super::numbers::steps;
+use super::device::{Arrival, Device, Setup};
 use super::shared::{Shared, words};
 use super::timestamps::{Timestamps, arrival};
 use crate::camera::pool::MosaicPool;
@@ -18,9 +18,42 @@ const LOOK: Duration = Duration::from_millis(50);
 /// A camera that sends nothing for this long, beyond its exposure, counts as lost. A slow one may take the time of
 /// three frames.
 const SILENCE: Duration = Duration::from_millis(1500);
+/// Time between two attempts to find a camera that is lost or not there yet.
+const RETRY: Duration = Duration::from_millis(300);
+/// GigE Vision counts frames from 1 to this number, and then again from 1.
+const LAST_NUMBER: u64 = 65_535;
+
+/// Streams from `device` until asked to stop. If the camera is lost, or not there yet, opens it again. Every picture
+/// must be of `size`, for which everything else was set up.
+pub fn run(shared: &Shared, setup: &Setup, device: Option<Device>, size: (usize, usize)) {
+    let mut number = 0;
+    let mut changes = Vec::new();
+    let mut connected = device;
+
+    while !shared.stopping() {
+        let trouble = match connected.take().map_or_else(|| Device::open(setup), Ok) {
+            Ok(device) if (device.width, device.height) != size => format!(
+                "the camera's picture is {}x{}, but the server was started for {}x{}: start it again while the camera \
+                 is on, or give width and height",
+                device.width, device.height, size.0, size.1
+            ),
+            Ok(device) => {
+                shared.found(&device);
+                Session::new(shared, device, &mut number, &mut changes).stream()
+            }
+            Err(error) => error.to_string(),
+        };
+
+        shared.controls.offer(Vec::new());
+        shared.set_condition(Err(trouble.into()));
+        if shared.stop_within(RETRY) {
+            return;
+        }
+    }
+}
 
 /// Streaming from a camera until it is lost.
-pub(super) struct Session<'a> {
+struct Session<'a> {
     shared: &'a Shared,
     device: Device,
     /// Our number of the latest frame.
@@ -43,7 +76,7 @@ pub(super) struct Session<'a> {
 impl<'a> Session<'a> {
     /// Prepares streaming from `device`. Our frame numbers continue from `number`, and the earlier `changes` of
     /// settings are made again.
-    pub fn new(shared: &'a Shared, device: Device, number: &'a mut u64, changes: &'a mut Vec<(Setting, f64)>) -> Self {
+    fn new(shared: &'a Shared, device: Device, number: &'a mut u64, changes: &'a mut Vec<(Setting, f64)>) -> Self {
         let pool = MosaicPool::new(device.width, device.height);
         let mut session = Self {
             shared,
@@ -67,7 +100,7 @@ impl<'a> Session<'a> {
     }
 
     /// Streams until the camera is lost or the thread should end; returns the reason.
-    pub fn stream(mut self) -> String {
+    fn stream(mut self) -> String {
         let mut last = self.shared.clock.now();
         let mut whole = last;
         while !self.shared.stopping() {
@@ -193,5 +226,31 @@ impl<'a> Session<'a> {
         }
         self.exposure = exposure;
         self.shared.controls.offer(offers);
+    }
+}
+
+/// Frames from the camera's number `seen` to `now`; 1 if its counting was interrupted.
+const fn steps(seen: Option<u64>, now: u64) -> u64 {
+    match seen {
+        Some(seen) if now > seen => now - seen,
+        // The number rolled over, unless that would be an absurd gap.
+        Some(seen) if seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
+        _ => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cameras_numbers_roll_over_and_leave_gaps() {
+        assert_eq!(steps(None, 17), 1);
+        assert_eq!(steps(Some(17), 18), 1);
+        assert_eq!(steps(Some(17), 20), 3);
+        assert_eq!(steps(Some(65_535), 1), 1);
+        assert_eq!(steps(Some(65_534), 2), 3);
+        assert_eq!(steps(Some(5000), 1), 1, "the camera restarted");
+        assert_eq!(steps(Some(1 << 40), 3), 1);
     }
 }
