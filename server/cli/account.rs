@@ -202,6 +202,7 @@ fn line(prompt: &str) -> Result<String, Failure> {
 }
 
 /// Hides what is typed on the terminal, until it is dropped.
+#[must_use]
 struct HiddenInput {
     before: Termios,
 }

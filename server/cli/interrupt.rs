@@ -85,7 +85,6 @@ impl Interrupt {
     }
 
     /// Whether Ctrl-C was pressed, so that the command should stop.
-    #[must_use]
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }

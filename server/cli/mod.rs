@@ -91,7 +91,6 @@ enum Command {
 }
 
 /// Runs the command that the process's arguments name. Exit code 0 success, 1 failure, 2 wrong usage.
-#[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = run(arguments.command);

@@ -46,7 +46,6 @@ pub fn for_serving(clock: &Arc<dyn Clock>) -> ProcessSettings {
 }
 
 /// Adds the policy of a file or a command to `registry`, if `name` is one.
-#[must_use]
 pub fn with_outside(registry: Registry, name: &PolicyName, settings: &ProcessSettings) -> Registry {
     exec::with_command(scripted::with_file(registry, name), name, settings)
 }

@@ -146,7 +146,6 @@ impl Frame {
 
 impl Trace {
     /// An empty trace. `blur` is the blur rate of the optics, if known.
-    #[must_use]
     pub fn knowing(blur: Option<BlurRate>) -> Self {
         Self { blur, ..Self::default() }
     }
@@ -193,7 +192,6 @@ impl Trace {
 
     /// Where to go from `focal_power` under `belief` (see [`target`]). Stays while the latest frame shows nothing to
     /// judge focus by, such as a glove or glare.
-    #[must_use]
     pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
         let blind = self.last.as_ref().is_some_and(|frame| !frame.shows_detail());
         if blind {
@@ -248,7 +246,6 @@ static WORTH: LazyLock<[f32; 2 * PLACES - 1]> = LazyLock::new(|| {
 /// The focal power with the highest expected `worth` under `belief`, whose bin `i` of [`BINS`] stands for
 /// `i / (BINS - 1)`. Compared with the belief's median, it reverses less often and is in focus at least as often: if
 /// the belief has two peaks, it goes to one of them.
-#[must_use]
 pub fn best(belief: &[f32]) -> f64 {
     let mut values = [0.0f32; PLACES];
     for (bin, share) in belief.iter().enumerate().take(BINS) {
@@ -278,7 +275,6 @@ pub struct Sides {
 
 impl Sides {
     /// The sides of `belief` around the focal power `place`. Value `i` of `n` stands for the focal power `i / (n - 1)`.
-    #[must_use]
     pub fn of(belief: &[f32], place: f64) -> Self {
         let last = belief.len().saturating_sub(1).max(1) as f64;
         let mut sides = Self { below: 0.0, here: 0.0, above: 0.0 };
@@ -317,7 +313,6 @@ fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
 /// all for less than [`LEAST_MOVE`]. If the tracker is not sure enough of being in focus and that place is nearer than
 /// [`NEAR`], it moves by [`LOOK`] instead: on the `way` that it went last, or to the other side if that is much
 /// likelier.
-#[must_use]
 fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
     if step.abs() < NEAR {

@@ -21,7 +21,6 @@ pub struct HillClimber {
 
 impl HillClimber {
     /// A climber on `metric`, which must be greater the sharper a patch is.
-    #[must_use]
     pub const fn new(metric: fn(&Patch) -> f64) -> Self {
         Self { metric, last_metric: f64::NEG_INFINITY, direction: 1.0 }
     }

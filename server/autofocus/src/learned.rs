@@ -21,7 +21,6 @@ pub enum Input {
 
 impl Input {
     /// Numbers per frame in the head's input, without the focal power.
-    #[must_use]
     pub const fn width(self) -> usize {
         match self {
             Self::Mgm | Self::Mlr => 1,
@@ -30,7 +29,6 @@ impl Input {
     }
 
     /// The focus metric of `patch`; `None` if this input is the whole patch.
-    #[must_use]
     pub fn metric(self, patch: &Patch) -> Option<f64> {
         match self {
             Self::Mgm => Some(mgm(patch)),
@@ -40,7 +38,6 @@ impl Input {
     }
 
     /// A metric as an input of the network: its logarithm, centred and scaled to the order of 1.
-    #[must_use]
     pub fn scaled(self, metric: f64) -> f32 {
         match self {
             Self::Mgm => ((metric + 0.5).ln() - 3.5) as f32,
@@ -50,7 +47,6 @@ impl Input {
 }
 
 /// The change of focal power of an action: 0 is a step down, 1 none, 2 a step up.
-#[must_use]
 pub const fn action_step(action: usize) -> f64 {
     match action {
         0 => -STEP,
@@ -60,7 +56,6 @@ pub const fn action_step(action: usize) -> f64 {
 }
 
 /// A focal power as an input of the networks: from -1 to 1.
-#[must_use]
 pub const fn scaled_focal_power(focal_power: f64) -> f32 {
     2.0 * (focal_power as f32 - 0.5)
 }
@@ -77,7 +72,6 @@ pub struct ValueNetwork {
 
 impl ValueNetwork {
     /// A network with random weights under `path`.
-    #[must_use]
     pub fn new(path: &nn::Path<'_>, input: Input) -> Self {
         let encoder = (input == Input::Patch).then(|| Encoder::new(&(path / "encoder")));
         let head = ValueHead::new(&(path / "head"), HISTORY * (input.width() + 1));
@@ -180,7 +174,6 @@ impl Policy for Learned {
 }
 
 /// The action of highest value. Standing still wins a tie with a move.
-#[must_use]
 pub fn best_action(values: &[f32]) -> usize {
     [1, 0, 2].into_iter().reduce(|best, other| if values[other] > values[best] { other } else { best }).unwrap_or(1)
 }

@@ -23,14 +23,12 @@ type Square = [Row; PATCH_SIDE];
 
 /// Mean gradient magnitude: mean over the patch of `sqrt(Ix² + Iy²)`, where `Ix` and `Iy` are the responses of the 3x3
 /// Sobel operators, not normalised (a slope of 1 per pixel gives 8). In gray levels; 0 for a flat patch.
-#[must_use]
 pub fn mgm(patch: &Patch) -> f64 {
     mean(&gradient_magnitude_sums(&patch.0))
 }
 
 /// Mean local ratio: mean over the patch of `max((G+1)/(I+1), (I+1)/(G+1))`, where `G` is `I` blurred by a Gaussian of
 /// sigma 4, truncated at 4 sigma. Without unit; 1 for a flat patch, else above 1. Gray values must not be negative.
-#[must_use]
 pub fn mlr(patch: &Patch) -> f64 {
     let blur = &*BLUR;
     mean(&local_ratio_sums(&patch.0, &blur.rows, &blur.columns))

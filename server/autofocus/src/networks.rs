@@ -47,7 +47,6 @@ pub struct ValueHead {
 
 impl ValueHead {
     /// A head with random weights under `path`.
-    #[must_use]
     pub fn new(path: &nn::Path<'_>, input: usize) -> Self {
         let input = i64::try_from(input).unwrap_or(i64::MAX);
         let dense = |name, from, to| nn::linear(path / name, from, to, nn::LinearConfig::default());
@@ -70,7 +69,6 @@ pub struct Encoder {
 
 impl Encoder {
     /// An encoder with random weights under `path`.
-    #[must_use]
     pub fn new(path: &nn::Path<'_>) -> Self {
         let config = nn::ConvConfig { stride: 2, ..Default::default() };
         let layer = |name, from| nn::conv2d(path / name, from, ENCODING as i64, 3, config);
@@ -107,7 +105,6 @@ pub struct BeliefNetwork {
 
 impl BeliefNetwork {
     /// A network with `inputs` inputs per frame and random weights under `path`.
-    #[must_use]
     pub fn new(path: &nn::Path<'_>, inputs: usize) -> Self {
         let units = MEMORY as i64;
         let dense = |name, from, to| nn::linear(path / name, from, to, nn::LinearConfig::default());

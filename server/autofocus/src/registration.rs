@@ -32,7 +32,6 @@ type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];
 
 /// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive if sharper now; then the
 /// correlation of the patches in their overlap, and the overlap's share of a patch. Each is of the order of 1.
-#[must_use]
 pub fn changes(before: (&Patch, &PatchTransform), now: (&Patch, &PatchTransform)) -> [f32; CHANGES] {
     let (dx, dy) = displacement(before.1, now.1);
     let moved = shifted(before.0, dx, dy);

@@ -146,7 +146,6 @@ impl Registry {
     }
 
     /// Whether there is a policy `name`, whether it can run or not.
-    #[must_use]
     pub fn has(&self, name: &PolicyName) -> bool {
         self.policies.iter().any(|policy| policy.entry.name == *name)
     }
@@ -159,14 +158,12 @@ impl Registry {
     }
 
     /// The SHA-256 of each learned policy's weights, and of the files of each that runs in another process.
-    #[must_use]
     pub fn weights(&self) -> BTreeMap<PolicyName, String> {
         let entries = self.policies.iter().map(|policy| &policy.entry);
         entries.filter_map(|entry| Some((entry.name.clone(), entry.weights.clone()?))).collect()
     }
 
     /// Every policy, in the order in which they were added.
-    #[must_use]
     pub fn entries(&self) -> Vec<PolicyEntry> {
         self.policies.iter().map(|policy| policy.entry.clone()).collect()
     }

@@ -22,7 +22,6 @@ const SIDE: i64 = PATCH_SIDE as i64;
 
 /// Adds the policy in a file to `registry`, if `name` begins with [`PREFIX`]. A file that cannot be used is listed as
 /// unavailable, with the reason.
-#[must_use]
 pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     const SUMMARY: &str = "action values from a TorchScript file";
     let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };

@@ -53,7 +53,6 @@ const SHIPPED: [Shipped; 4] = [
 
 impl Registry {
     /// All policies that ship, in the order of docs/scripting.md.
-    #[must_use]
     pub fn standard() -> Self {
         let classical = Self::default()
             .with("fixed", "the lens stays where it is", || Box::new(Fixed::default()))
@@ -70,13 +69,11 @@ impl Registry {
 }
 
 /// The design of the learned policy `name`; `None` if no learned policy has that name.
-#[must_use]
 pub fn design(name: &str) -> Option<Design> {
     SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| shipped.design)
 }
 
 /// Adds all learned policies to `registry`. One with damaged weights is listed but unavailable.
-#[must_use]
 pub fn with_shipped(registry: Registry) -> Registry {
     SHIPPED.iter().fold(registry, |registry, shipped| {
         let &Shipped { name, summary, design, weights } = shipped;

@@ -100,7 +100,6 @@ fn band(ky: usize, kx: usize) -> usize {
 }
 
 /// A patch's features, each of the order of 1.
-#[must_use]
 pub fn features(patch: &Patch, spectrum: &PatchTransform) -> [f32; FEATURES] {
     let energy = &spectrum.energy;
     let mut out = [0.0; FEATURES];
@@ -118,14 +117,12 @@ pub fn features(patch: &Patch, spectrum: &PatchTransform) -> [f32; FEATURES] {
 
 impl PatchTransform {
     /// Standard deviation of the patch, in gray levels.
-    #[must_use]
     pub fn contrast(&self) -> f32 {
         self.variance.sqrt()
     }
 
     /// Whether the patch shows more than noise. Tissue, however sharp, has far more energy at low frequencies than at
     /// high ones. The sensor's noise and rounding have equal energy at all.
-    #[must_use]
     pub fn shows_detail(&self) -> bool {
         let mean = |bands: Range<usize>| {
             self.energy[bands.clone()].iter().sum::<f32>() / TABLES.count[bands].iter().sum::<f32>() + ROUNDING
@@ -135,7 +132,6 @@ impl PatchTransform {
 }
 
 /// Computes the transform of a patch.
-#[must_use]
 pub fn spectrum(patch: &Patch) -> PatchTransform {
     let mean = column_sums(patch, |value| value).iter().sum::<f32>() / patch.0.len() as f32;
     let variance = column_sums(patch, |value| (value - mean).powi(2)).iter().sum::<f32>() / patch.0.len() as f32;

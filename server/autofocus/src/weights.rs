@@ -77,7 +77,6 @@ fn raw(tensor: &Tensor) -> (Vec<usize>, Vec<u8>) {
 }
 
 /// The values of a float tensor on any device, row by row.
-#[must_use]
 pub fn floats(tensor: &Tensor) -> Vec<f32> {
     let mut values = vec![0.0f32; tensor.numel()];
     tensor.to_device(tch::Device::Cpu).contiguous().view([-1]).copy_data(&mut values, tensor.numel());

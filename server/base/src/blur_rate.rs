@@ -10,13 +10,11 @@ impl BlurRate {
     pub const RANGE: std::ops::RangeInclusive<f64> = 0.1..=200.0;
 
     /// A rate of `pixels` per unit of focal power; `None` outside [`BlurRate::RANGE`].
-    #[must_use]
     pub fn new(pixels: f64) -> Option<Self> {
         Self::RANGE.contains(&pixels).then_some(Self(pixels))
     }
 
     /// The rate in pixels per unit of focal power.
-    #[must_use]
     pub const fn get(self) -> f64 {
         self.0
     }

@@ -15,19 +15,16 @@ pub struct Moment(u64);
 
 impl Moment {
     /// The moment `nanoseconds` after the clock's start.
-    #[must_use]
     pub const fn from_nanos(nanoseconds: u64) -> Self {
         Self(nanoseconds)
     }
 
     /// Nanoseconds since the clock's start.
-    #[must_use]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
     /// Time from `earlier` to this moment; zero if `earlier` is in fact later.
-    #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
@@ -72,7 +69,6 @@ pub struct ManualClock(Mutex<(Moment, Timestamp)>);
 
 impl ManualClock {
     /// A clock at monotonic zero and at `wall`.
-    #[must_use]
     pub const fn new(wall: Timestamp) -> Self {
         Self(Mutex::new((Moment(0), wall)))
     }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// A file that no other process has locked, until it is dropped.
 #[derive(Debug)]
+#[must_use]
 pub struct LockedFile(File);
 
 impl LockedFile {
@@ -139,7 +140,6 @@ fn fill_through(opened: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Res
 }
 
 /// The folder that `path` is in.
-#[must_use]
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -176,7 +176,6 @@ pub fn make_private(path: &Path) -> io::Result<()> {
 
 /// Whether a file or folder with this name is not a person's but an operating system's, which puts it into folders that
 /// people open: hidden files such as `.DS_Store` and `._picture.jpg`, `Thumbs.db` and `desktop.ini`.
-#[must_use]
 pub fn is_systems_own(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     name.starts_with('.') || ["Thumbs.db", "desktop.ini"].iter().any(|own| name.eq_ignore_ascii_case(own))
@@ -270,7 +269,6 @@ fn below(folder: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
 }
 
 /// Whether `name` is that of a file which a process killed in [`replace`] may have left.
-#[must_use]
 pub fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(".partial")
 }
@@ -290,7 +288,7 @@ mod tests {
         // As between a fork and the start of the child's program.
         let copy = locked.try_clone().unwrap();
         drop(locked);
-        LockedFile::of(open()).unwrap();
+        drop(LockedFile::of(open()).unwrap());
         drop(copy);
     }
 

@@ -32,7 +32,6 @@ impl FocalPower {
     }
 
     /// The focal power nearest to `value`; the middle if `value` is NaN.
-    #[must_use]
     pub const fn nearest(value: f64) -> Self {
         if value.is_nan() { Self::MIDDLE } else { Self(value.clamp(0.0, 1.0)) }
     }
@@ -44,13 +43,11 @@ impl FocalPower {
     }
 
     /// The value, 0..=1.
-    #[must_use]
     pub const fn get(self) -> f64 {
         self.0
     }
 
     /// Absolute difference to `other`.
-    #[must_use]
     pub fn distance(self, other: Self) -> f64 {
         (self.0 - other.0).abs()
     }

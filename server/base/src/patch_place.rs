@@ -20,7 +20,6 @@ impl PatchPlace {
 
     /// The place `across` to the right and `down` below the centre, in radii. A place outside the circle is moved
     /// straight towards the centre, onto the circle. What is no number counts as the centre.
-    #[must_use]
     pub fn nearest(across: f64, down: f64) -> Self {
         let distance = across.hypot(down);
         if !distance.is_finite() {
@@ -39,13 +38,11 @@ impl PatchPlace {
     }
 
     /// How far it lies to the right of the circle's centre, in radii: -1..=1.
-    #[must_use]
     pub const fn across(self) -> f64 {
         self.across
     }
 
     /// How far it lies below the circle's centre, in radii: -1..=1.
-    #[must_use]
     pub const fn down(self) -> f64 {
         self.down
     }

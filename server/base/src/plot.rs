@@ -96,7 +96,6 @@ impl Plot {
     }
 
     /// The whole plot as an SVG document.
-    #[must_use]
     pub fn svg(mut self) -> String {
         let mut x = LEFT;
         let mut y = 20.0 + self.panels as f64 * (PANEL + GAP) + ROW - 10.0;

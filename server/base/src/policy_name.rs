@@ -12,13 +12,11 @@ pub struct PolicyName(Arc<str>);
 
 impl PolicyName {
     /// A name, known or not.
-    #[must_use]
     pub fn new(name: &str) -> Self {
         Self(name.into())
     }
 
     /// The name as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -50,7 +50,6 @@ pub enum Scheduling {
 
 impl Scheduling {
     /// The consequence for the focus and, if it could be better, what to do.
-    #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
             Self::RealTime => "real-time priority: other programs do not delay the focus",
@@ -91,7 +90,6 @@ static WITHDRAWN: AtomicBool = AtomicBool::new(false);
 /// Raises the calling thread as far as the process may: to real-time priority (root, `CAP_SYS_NICE` or an
 /// `rtprio` limit), otherwise to a lower niceness (root, or a raised limit). Threads that it starts do not
 /// inherit the real-time priority.
-#[allow(clippy::must_use_candidate, reason = "only the loop reads the result")]
 pub fn raise(role: ThreadRole) -> Scheduling {
     if withdrawn() {
         return Scheduling::Withdrawn;
@@ -129,7 +127,6 @@ pub fn lower_further() {
 }
 
 /// Gives `thread`, a thread of this process, the real-time priority of `role`; returns whether that was allowed.
-#[must_use]
 pub fn raise_thread(thread: Pid, role: ThreadRole) -> bool {
     !withdrawn() && set(Some(thread), libc::SCHED_FIFO | ALONE, role as i32)
 }
@@ -170,27 +167,23 @@ pub fn withdraw() {
 }
 
 /// Whether [`withdraw`] was called.
-#[must_use]
 pub fn withdrawn() -> bool {
     WITHDRAWN.load(Ordering::Relaxed)
 }
 
 /// Locks the program's present and future memory against being swapped out, page by page as it is used; returns
 /// whether it did. If locked memory is limited, it does not even try: allocations beyond the limit would fail.
-#[must_use]
 pub fn lock_memory() -> bool {
     // Without ONFAULT all of libtorch would be read in, though the policies need little of it.
     may_lock_memory() && mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT).is_ok()
 }
 
 /// Whether this process may keep all of its memory from being swapped out.
-#[must_use]
 pub fn may_lock_memory() -> bool {
     getrlimit(Resource::Memlock).current.is_none() || has(CapabilitySet::IPC_LOCK)
 }
 
 /// Whether this process may put a thread at the real-time priority of each [`ThreadRole`].
-#[must_use]
 pub fn may_run_first() -> bool {
     let highest = ThreadRole::Wire as u64;
     getrlimit(Resource::Rtprio).current.is_none_or(|most| most >= highest) || has(CapabilitySet::SYS_NICE)

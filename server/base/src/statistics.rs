@@ -6,13 +6,11 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 /// Mean; 0 if there are no values.
-#[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Standard deviation of the values themselves (divided by their number, not by one less).
-#[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     let centre = mean(values);
     (values.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
@@ -23,7 +21,6 @@ pub const RESAMPLES: usize = 2000;
 
 /// The 95 % percentile-bootstrap interval of the mean (Efron 1979) from [`RESAMPLES`] resamples drawn from `seed`;
 /// zeros if there are no values.
-#[must_use]
 pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
     let mean_of = |drawn: &[usize]| Some(drawn.iter().map(|&place| values[place]).sum::<f64>() / values.len() as f64);
     bootstrap_statistic(values.len(), seed, mean_of).unwrap_or((0.0, 0.0))
@@ -32,7 +29,6 @@ pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
 /// The 95 % percentile-bootstrap interval of any statistic of `count` units: `statistic` computes it from the places of
 /// the units that were drawn. Resamples for which it returns `None` are left out. The result is `None` if no resample
 /// is left.
-#[must_use]
 pub fn bootstrap_statistic(count: usize, seed: u64, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
     if count == 0 {
         return None;
@@ -83,7 +79,6 @@ pub struct SignedRank {
 impl SignedRank {
     /// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero minus that below zero
     /// (Kerby 2014, Comprehensive Psychology 3:1). `None` if no pair differs.
-    #[must_use]
     pub fn rank_biserial(&self) -> Option<f64> {
         let all = self.positive + self.negative;
         (all > 0.0).then(|| (self.positive - self.negative) / all)
@@ -92,7 +87,6 @@ impl SignedRank {
 
 /// Tests whether paired values differ. Pairs without a difference are left out; equal differences share their mean
 /// rank. p is exact for at most 50 pairs that differ, with or without ties.
-#[must_use]
 pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     let (ranks, positive) = signed_ranks(a.iter().zip(b).map(|(a, b)| a - b));
 
@@ -113,7 +107,6 @@ pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
 }
 
 /// The rank-biserial correlation of [`SignedRank::rank_biserial`] without the test, which takes much longer.
-#[must_use]
 pub fn rank_biserial(differences: &[f64]) -> Option<f64> {
     let (ranks, positive) = signed_ranks(differences.iter().copied());
     let all: usize = ranks.iter().sum();
@@ -170,14 +163,12 @@ fn approximate(ranks: &[usize], positive: usize) -> f64 {
 }
 
 /// Two-sided p of the standard normal deviate `z`.
-#[must_use]
 pub fn normal_two_sided(z: f64) -> f64 {
     complementary_error(z.abs() / std::f64::consts::SQRT_2)
 }
 
 /// Each p corrected by Holm's method (1979) for the number of comparisons. If every corrected p below 0.05 counts as a
 /// finding, the chance of any false finding among all of them is below 0.05.
-#[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));

@@ -61,13 +61,11 @@ pub enum Hold {
 impl Hold {
     /// Whether the policy is the cause. Such holds could unblind a session: only learned policies take time to start
     /// and to compute.
-    #[must_use]
     pub const fn caused_by_policy(self) -> bool {
         matches!(self, Self::PolicyPanicked | Self::PolicyNonsense | Self::PolicySlow | Self::PolicyUnavailable)
     }
 
     /// Name in the database and in exports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::PolicyPanicked => "policy-panicked",

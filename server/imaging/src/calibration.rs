@@ -88,7 +88,6 @@ impl Default for Calibration {
 
 impl Calibration {
     /// Whether per-pixel references, if any, are `width` x `height` sensor pixels, as a camera's frames must be.
-    #[must_use]
     pub fn fits(&self, width: usize, height: usize) -> bool {
         [&self.dark, &self.white].into_iter().all(|reference| match reference {
             Reference::PerBand(_) => true,
@@ -97,13 +96,11 @@ impl Calibration {
     }
 
     /// Whether a white target was measured. Without, counts say nothing about reflectance.
-    #[must_use]
     pub fn has_white(&self) -> bool {
         self.white != Reference::PerBand([self.full_scale(); BANDS])
     }
 
     /// How exports and reports name it: name, unit, version and date.
-    #[must_use]
     pub fn title(&self) -> String {
         let unit = self.unit.as_ref().map_or(String::new(), |unit| format!(", unit {unit}"));
         let date = self.date.as_ref().map_or(String::new(), |date| format!(" of {date}"));
@@ -111,7 +108,6 @@ impl Calibration {
     }
 
     /// Size of its references per pixel, width and height in samples, if it has any.
-    #[must_use]
     pub fn size(&self) -> Option<(usize, usize)> {
         [&self.dark, &self.white].into_iter().find_map(|reference| match reference {
             Reference::PerBand(_) => None,
@@ -120,7 +116,6 @@ impl Calibration {
     }
 
     /// The largest count a sample can have.
-    #[must_use]
     pub fn full_scale(&self) -> f32 {
         full_scale(self.bit_depth)
     }
@@ -128,7 +123,6 @@ impl Calibration {
 
 impl Reference {
     /// Mean count of each band.
-    #[must_use]
     pub fn band_means(&self) -> [f32; BANDS] {
         let frame = match self {
             Self::PerBand(counts) => return *counts,

@@ -9,7 +9,6 @@ use super::calibration::{BANDS, Calibration, Reference};
 impl Calibration {
     /// The calibration as TOML. References per pixel are pictures: `dark` and `white` are the names
     /// of the files in which the caller keeps them.
-    #[must_use]
     pub fn to_toml(&self, dark: &str, white: &str) -> String {
         let mut text = String::new();
         let mut put = |key: &str, value: String| {

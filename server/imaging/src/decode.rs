@@ -16,7 +16,6 @@ pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
 }
 
 /// Whether `picture` is a sensor's mosaic: 16-bit gray of the sensor's full size.
-#[must_use]
 pub fn is_mosaic(picture: &DynamicImage) -> bool {
     matches!(picture, DynamicImage::ImageLuma16(_))
         && (picture.width() as usize, picture.height() as usize) == SENSOR_SIZE

@@ -34,37 +34,31 @@ impl MosaicFrame {
     }
 
     /// Width in sensor pixels.
-    #[must_use]
     pub const fn width(&self) -> usize {
         self.width
     }
 
     /// Height in sensor pixels.
-    #[must_use]
     pub const fn height(&self) -> usize {
         self.height
     }
 
     /// Width in mosaic cells, which is the width of one band.
-    #[must_use]
     pub const fn band_width(&self) -> usize {
         self.width / CELL
     }
 
     /// Height in mosaic cells, which is the height of one band.
-    #[must_use]
     pub const fn band_height(&self) -> usize {
         self.height / CELL
     }
 
     /// All samples, row by row.
-    #[must_use]
     pub fn samples(&self) -> &[u16] {
         &self.samples
     }
 
     /// Takes the samples back out, to reuse their memory.
-    #[must_use]
     pub fn into_samples(self) -> Vec<u16> {
         self.samples
     }

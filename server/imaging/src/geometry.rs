@@ -79,7 +79,6 @@ impl PatchArea {
     }
 
     /// Whether `other` is at most half a patch away along each axis: what both show can still be compared.
-    #[must_use]
     pub const fn is_near(self, other: Self) -> bool {
         2 * self.x.abs_diff(other.x) <= PATCH_SIDE && 2 * self.y.abs_diff(other.y) <= PATCH_SIDE
     }
@@ -87,7 +86,6 @@ impl PatchArea {
 
 /// The place in the bright circle `content` of the point `(x, y)`, in pixels of a `width` x `height` picture; `None` if
 /// the point is outside the picture. A point outside the circle counts as the nearest one on it.
-#[must_use]
 pub fn place_of(
     (x, y): (f64, f64),
     (width, height): (usize, usize),

@@ -18,7 +18,6 @@ pub fn rgb_to_gray(rgb: &RgbImage, gray: &mut GrayImage) {
 
 /// The gray patch of `rgb` at `area`, computing just those pixels; black where `area` leaves the
 /// picture.
-#[must_use]
 pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
     let (pixels, _) = rgb.data.as_chunks::<3>();
     Patch(std::array::from_fn(|i| {
@@ -30,7 +29,6 @@ pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
 }
 
 /// The policies' view of `rgb` with the patch at `area`, computing just those pixels.
-#[must_use]
 pub fn rgb_view(rgb: &RgbImage, area: PatchArea) -> View {
     let (pixels, _) = rgb.data.as_chunks::<3>();
     View::around(rgb_patch(rgb, area), (area.x, area.y), (rgb.width, rgb.height), |Square { x, y, side }| {

@@ -30,7 +30,6 @@ pub enum Picture {
 
 impl Picture {
     /// The picture in gray; `reconstructor` makes it from a mosaic.
-    #[must_use]
     pub fn into_gray(self, reconstructor: &mut Reconstructor) -> GrayImage {
         match self {
             Self::Rgb(_, gray) | Self::Gray(gray) => gray,

@@ -49,7 +49,6 @@ impl<'a> PictureFile<'a> {
     }
 
     /// Number of pictures: pages of a TIFF, frames of an animated PNG, else 1.
-    #[must_use]
     pub fn pages(&self) -> usize {
         match &self.contents {
             Contents::Png(bytes) => frames(bytes),
@@ -70,7 +69,6 @@ impl<'a> PictureFile<'a> {
     }
 
     /// What a TIFF says about its pages: OME-XML, `ImageJ`'s lines, or any other text.
-    #[must_use]
     pub fn description(&self) -> Option<String> {
         match &self.contents {
             Contents::Tiff(tiff) => tiff.description(),
@@ -123,7 +121,6 @@ impl<'a> PictureFile<'a> {
     }
 
     /// Whether the samples of the first picture fill 16 bit, so that nothing says how many bits they were taken with.
-    #[must_use]
     pub fn is_wide(&self) -> bool {
         let wide = guarded(|| {
             Ok(match &self.contents {

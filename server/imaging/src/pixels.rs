@@ -25,7 +25,6 @@ impl PixelFormat {
     pub const ALL: [Self; 6] = [Self::Mono10p, Self::Mono10, Self::Mono12p, Self::Mono12, Self::Mono16, Self::Mono8];
 
     /// Name by the convention.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mono8 => "Mono8",
@@ -38,7 +37,6 @@ impl PixelFormat {
     }
 
     /// Bytes of `samples` samples.
-    #[must_use]
     pub const fn bytes(self, samples: usize) -> usize {
         match self {
             Self::Mono8 => samples,
@@ -49,7 +47,6 @@ impl PixelFormat {
     }
 
     /// The greatest count.
-    #[must_use]
     pub const fn white(self) -> u16 {
         match self {
             Self::Mono8 => 0xFF,

@@ -8,14 +8,12 @@ use super::frame::GrayImage;
 /// between 1 and the picture's own. If they divide the picture's sides, each pixel is the mean of a whole block.
 ///
 /// The `image` crate cannot do this for gray levels: it clamps floating-point samples to 0..=1.
-#[must_use]
 pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
     means(picture, &covered(picture.width, width), &covered(picture.height, height))
 }
 
 /// `picture` with the mean of each whole block of `scale` x `scale` pixels as one pixel. Pixels left over at the right
 /// and below are cut off. A picture smaller than a block stays as it is.
-#[must_use]
 pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     let scale = scale.max(1);
     let width = picture.width / scale;

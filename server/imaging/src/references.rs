@@ -42,7 +42,6 @@ pub struct Average {
 
 impl Average {
     /// An empty average, for a sensor whose largest count is `full_scale`.
-    #[must_use]
     pub fn new(full_scale: f32) -> Self {
         Self { full_scale: full_scale as u16, ..Self::default() }
     }

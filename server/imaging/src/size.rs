@@ -22,7 +22,6 @@ impl Size {
     pub const ALL: [Self; 3] = [Self::Cell, Self::Half, Self::Full];
 
     /// Pixels along each side of a mosaic cell.
-    #[must_use]
     pub const fn per_cell(self) -> usize {
         match self {
             Self::Cell => 1,
@@ -32,7 +31,6 @@ impl Size {
     }
 
     /// The name, as on the command line.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cell => "cell",
@@ -60,7 +58,6 @@ impl Size {
     }
 
     /// Width and height of the picture of `mosaic`, in pixels.
-    #[must_use]
     pub const fn of(self, mosaic: &MosaicFrame) -> (usize, usize) {
         (self.per_cell() * mosaic.band_width(), self.per_cell() * mosaic.band_height())
     }

@@ -136,7 +136,6 @@ impl<'a> SpectrumSum<'a> {
     }
 
     /// The spectrum of what was added.
-    #[must_use]
     pub fn spectrum(&self) -> Spectrum {
         let has_white = self.calibration.has_white();
         Spectrum {

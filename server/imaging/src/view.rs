@@ -20,7 +20,6 @@ pub const WIDER: [Scale; 2] = [Scale::Two, Scale::Four];
 
 impl Scale {
     /// Pixels along each axis whose mean is one value.
-    #[must_use]
     pub const fn pixels(self) -> usize {
         match self {
             Self::Two => 2,
@@ -72,7 +71,6 @@ impl Square {
     /// The square that the patch at `scale` covers. Its centre is that of the 32x32 patch at `corner`, moved as little
     /// as needed to lie inside a picture of `width` x `height` pixels. `None` if the picture is smaller than the
     /// square.
-    #[must_use]
     pub fn around(corner: (usize, usize), scale: Scale, (width, height): (usize, usize)) -> Option<Self> {
         let side = PATCH_SIDE * scale.pixels();
         let margin = (side - PATCH_SIDE) / 2;
@@ -126,7 +124,6 @@ impl From<Patch> for View {
 
 /// The patch at `scale`: its values are the means of blocks of `levels`, which has `width` pixels per row and begins
 /// with the patch's first block.
-#[must_use]
 pub fn block_means(levels: &[f32], width: usize, scale: Scale) -> Patch {
     let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
     match scale {

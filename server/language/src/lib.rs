@@ -57,7 +57,6 @@ impl Language {
     pub const ALL: [Self; 4] = [Self::English, Self::German, Self::French, Self::Spanish];
 
     /// The language's code, as protocols and pages name it (BCP 47).
-    #[must_use]
     pub const fn code(self) -> &'static str {
         match self {
             Self::English => "en",
@@ -68,13 +67,11 @@ impl Language {
     }
 
     /// The language with this code; none if surgeons cannot read parfocal in it.
-    #[must_use]
     pub fn from_code(code: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|language| language.code() == code)
     }
 
     /// The language's name in English.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::English => "English",
@@ -85,7 +82,6 @@ impl Language {
     }
 
     /// The direction in which the language is written, as HTML has it.
-    #[must_use]
     pub const fn direction(self) -> &'static str {
         match self {
             Self::English | Self::German | Self::French | Self::Spanish => "ltr",
@@ -93,7 +89,6 @@ impl Language {
     }
 
     /// The language's file: all messages, in Fluent.
-    #[must_use]
     pub const fn source(self) -> &'static str {
         match self {
             Self::English => include_str!("../../../web/languages/en.ftl"),
@@ -104,13 +99,11 @@ impl Language {
     }
 
     /// The message `id` without arguments.
-    #[must_use]
     pub fn say(self, id: &str) -> String {
         self.format(id, None, None)
     }
 
     /// The languages' codes, for a sentence.
-    #[must_use]
     pub fn codes() -> String {
         Self::ALL.map(Self::code).join(", ")
     }

@@ -8,7 +8,6 @@ const NAMED: &str = " data-l10n-id=\"";
 impl Language {
     /// `page` with the text and the attributes of every element that names a message. Our own templates alone come
     /// here: such an element is empty, and none of its attributes holds a `>`.
-    #[must_use]
     pub fn fill(self, page: &str) -> String {
         let mut filled = String::with_capacity(page.len() + page.len() / 4);
         let mut rest = page;

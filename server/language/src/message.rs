@@ -28,7 +28,6 @@ const ISOLATED: [char; 2] = ['\u{2068}', '\u{2069}'];
 
 impl Message {
     /// The message with this id in the languages' files.
-    #[must_use]
     pub const fn new(id: &'static str) -> Self {
         Self { id, arguments: Vec::new() }
     }
@@ -49,7 +48,6 @@ impl Message {
     }
 
     /// The sentence in `language`.
-    #[must_use]
     pub fn say_in(&self, language: Language) -> String {
         let mut args = FluentArgs::new();
         for (name, argument) in &self.arguments {

@@ -18,7 +18,6 @@ pub struct Room {
 
 impl Room {
     /// Bytes that recordings and exports may still take.
-    #[must_use]
     pub const fn spare(self) -> u64 {
         self.available.saturating_sub(self.reserve)
     }

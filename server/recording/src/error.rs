@@ -40,7 +40,6 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// The error for `path` that could not be written, after `kept` frames were stored.
-    #[must_use]
     pub fn unwritable(path: &Path, kept: usize, error: &io::Error) -> Self {
         let path = path.display();
         Self::Failed(match error.kind() {

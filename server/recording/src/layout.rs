@@ -87,7 +87,6 @@ pub struct BandArray {
 }
 
 /// The numbers of `calibration`'s bands (as in its mosaic cell), in the order of wavelengths.
-#[must_use]
 pub fn by_wavelength(calibration: &Calibration) -> Vec<usize> {
     let mut order: Vec<usize> = (0..calibration.bands.len()).collect();
     order.sort_by(|&a, &b| calibration.bands[a].centre_nm.total_cmp(&calibration.bands[b].centre_nm));

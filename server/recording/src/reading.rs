@@ -65,37 +65,31 @@ impl Recording {
     }
 
     /// Its folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The folder of its calibration.
-    #[must_use]
     pub fn calibration(&self) -> PathBuf {
         self.folder.join(CALIBRATION)
     }
 
     /// How it was made.
-    #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
     }
 
     /// Width and height of its mosaics in samples.
-    #[must_use]
     pub const fn size(&self) -> (usize, usize) {
         self.size
     }
 
     /// The values beside each frame: time, number, exposure, focal powers and patch.
-    #[must_use]
     pub fn rows(&self) -> &[FrameRow] {
         &self.rows
     }
 
     /// Number of frames that are missing between the first and the last, by the camera's numbers.
-    #[must_use]
     pub fn missing(&self) -> u64 {
         let numbered = match (self.rows.first(), self.rows.last()) {
             (Some(first), Some(last)) => last.number.saturating_sub(first.number).saturating_add(1),
@@ -105,14 +99,12 @@ impl Recording {
     }
 
     /// Frames per second from the first to the last; `None` for fewer than two frames.
-    #[must_use]
     pub fn rate(&self) -> Option<f64> {
         let seconds = self.seconds();
         (seconds > 0.0).then(|| (self.rows.len() - 1) as f64 / seconds)
     }
 
     /// Seconds from the first frame to the last.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         match (self.rows.first(), self.rows.last()) {
             (Some(first), Some(last)) => last.time.saturating_sub(first.time) as f64 / 1e9,
@@ -121,7 +113,6 @@ impl Recording {
     }
 
     /// Bytes of its frames on disk. Files that cannot be read count as 0.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         let shards = 0..self.rows.len().div_ceil(SHARD_FRAMES);
         shards.filter_map(|shard| fs::metadata(self.shard(shard)).ok()).map(|file| file.len()).sum()
@@ -167,7 +158,6 @@ impl Recording {
 
     /// Reads every frame, and returns what is wrong with those that cannot be read. Damage of a whole file is reported
     /// once.
-    #[must_use]
     pub fn check(&self) -> Vec<String> {
         let problem = |number| self.frame(number).err().map(|error: RecordingError| error.to_string());
         let mut problems: Vec<String> = (0..self.rows.len()).into_par_iter().filter_map(problem).collect();

@@ -71,7 +71,6 @@ pub struct Intake {
 
 impl Intake {
     /// An intake that holds up to `capacity` frames, and the receiver that gets them.
-    #[must_use]
     pub fn new(capacity: usize) -> (Arc<Self>, Receiver<CapturedFrame>) {
         let (frames, taken) = sync_channel(capacity);
         (Arc::new(Self { frames, lost: Arc::default() }), taken)
@@ -138,19 +137,16 @@ impl Recorder {
     }
 
     /// Where frames are offered.
-    #[must_use]
     pub fn intake(&self) -> Arc<Intake> {
         Arc::clone(&self.intake)
     }
 
     /// The recording's folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// How far it has come.
-    #[must_use]
     pub fn progress(&self) -> RecordingProgress {
         let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone();
         progress.lost = self.intake.lost.load(Ordering::Relaxed);
@@ -158,7 +154,6 @@ impl Recorder {
     }
 
     /// Stops, stores the frames that were offered before, and returns how the recording ended.
-    #[must_use]
     pub fn stop(mut self) -> RecordingProgress {
         self.end();
         self.progress()

@@ -29,7 +29,6 @@ pub enum RecordingKind {
 
 impl RecordingKind {
     /// Its name, as in protocols.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mosaic => "mosaic",
@@ -67,7 +66,6 @@ impl AnyRecording {
     }
 
     /// Its kind.
-    #[must_use]
     pub const fn kind(&self) -> RecordingKind {
         match self {
             Self::Mosaic(_) => RecordingKind::Mosaic,
@@ -76,7 +74,6 @@ impl AnyRecording {
     }
 
     /// Its folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         match self {
             Self::Mosaic(recording) => recording.folder(),
@@ -85,7 +82,6 @@ impl AnyRecording {
     }
 
     /// Wall-clock time from which the frames' times count.
-    #[must_use]
     pub const fn started(&self) -> Timestamp {
         match self {
             Self::Mosaic(recording) => recording.header().started,
@@ -95,7 +91,6 @@ impl AnyRecording {
 
     /// The number of the server's start that recorded it, and the monotonic clock at [`AnyRecording::started`],
     /// nanoseconds. `None` for recordings that were made without a server.
-    #[must_use]
     pub fn clock(&self) -> Option<(i64, i64)> {
         match self {
             Self::Mosaic(recording) => recording.header().run.zip(recording.header().monotonic_ns),
@@ -104,7 +99,6 @@ impl AnyRecording {
     }
 
     /// Ends of the exposures of its frames, nanoseconds since it started.
-    #[must_use]
     pub fn times(&self) -> Vec<i64> {
         match self {
             Self::Mosaic(recording) => recording.rows().iter().map(|row| row.time).collect(),
@@ -113,7 +107,6 @@ impl AnyRecording {
     }
 
     /// Frames that the recorder was too slow for; `None` if they are not counted.
-    #[must_use]
     pub const fn lost(&self) -> Option<u64> {
         match self {
             Self::Mosaic(recording) => Some(recording.header().frames_lost),
@@ -122,7 +115,6 @@ impl AnyRecording {
     }
 
     /// How it ended; `None` while it is under way, or if it was cut short.
-    #[must_use]
     pub const fn ended(&self) -> Option<&Ended> {
         match self {
             Self::Mosaic(recording) => recording.header().ended.as_ref(),
@@ -175,7 +167,6 @@ pub fn of_session(recordings: &Path, session: &str) -> Result<Vec<FoundRecording
 
 /// The folder of recording `name` in `recordings`, if it belongs to `session`. `name` may be any text: the result is
 /// `None` if it is not the name of a folder directly in `recordings`.
-#[must_use]
 pub fn belonging(recordings: &Path, name: &str, session: &str) -> Option<PathBuf> {
     let mut parts = Path::new(name).components();
     let plain = matches!(parts.next(), Some(std::path::Component::Normal(part)) if part == name);

@@ -78,7 +78,6 @@ impl ViewWriter {
     }
 
     /// Its folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }

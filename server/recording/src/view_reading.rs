@@ -64,26 +64,22 @@ impl ViewRecording {
     }
 
     /// Its folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// How it was made.
-    #[must_use]
     pub const fn header(&self) -> &ViewHeader {
         &self.header
     }
 
     /// Its pictures, in order.
-    #[must_use]
     pub fn rows(&self) -> &[ViewRow] {
         &self.rows
     }
 
     /// Bytes of its pictures, by the index. The sum saturates, because a damaged row before the last may give any
     /// length.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         self.rows.iter().fold(0, |sum, row| sum.saturating_add(row.length))
     }
@@ -114,7 +110,6 @@ impl ViewRecording {
     }
 
     /// Reads every picture, and returns what is wrong with those that are not whole.
-    #[must_use]
     pub fn check(&self) -> Vec<String> {
         (0..self.rows.len()).filter_map(|number| self.picture(number).err()).map(|error| error.to_string()).collect()
     }

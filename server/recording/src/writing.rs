@@ -71,31 +71,26 @@ impl Writer {
     }
 
     /// The recording's folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Width and height of its mosaics in samples.
-    #[must_use]
     pub const fn size(&self) -> (usize, usize) {
         self.size
     }
 
     /// How the recording is made.
-    #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
     }
 
     /// Number of frames that a reader would find if the program were killed now.
-    #[must_use]
     pub const fn stored(&self) -> usize {
         self.stored
     }
 
     /// Bytes of the frames that wait for their shard.
-    #[must_use]
     pub fn waiting_bytes(&self) -> u64 {
         self.waiting.iter().map(|frame| frame.len() as u64).sum()
     }

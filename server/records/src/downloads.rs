@@ -49,7 +49,6 @@ where
 {
     /// Starts with nothing. Removes what an earlier server left in `folder`, in which things are made. What is made, or
     /// failed, is `kept` for so long.
-    #[must_use]
     pub fn new(folder: PathBuf, kept: Duration) -> Self {
         match std::fs::remove_dir_all(&folder) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -61,13 +60,11 @@ where
     }
 
     /// The folder in which things are made.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// What was last asked for under `name`, and how far it is.
-    #[must_use]
     pub fn latest(&self, name: &str) -> Option<(Order, Stage<Progress, Made>)> {
         self.lock().get(name).map(|latest| (latest.order.clone(), latest.stage.clone()))
     }

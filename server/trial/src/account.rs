@@ -49,7 +49,6 @@ impl AccountName {
     }
 
     /// The name as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -80,7 +79,6 @@ impl AccountRole {
     pub const ALL: [Self; 4] = [Self::Lead, Self::Operator, Self::Researcher, Self::Monitor];
 
     /// Whether a person with this role may act as `role`. `changes`: whether the request may change something.
-    #[must_use]
     pub const fn may_act_as(self, role: Role, changes: bool) -> bool {
         match (self, role) {
             (Self::Lead, Role::Operator | Role::Researcher)
@@ -92,7 +90,6 @@ impl AccountRole {
     }
 
     /// Whether a person with this role may lock and unblind studies.
-    #[must_use]
     pub const fn leads(self) -> bool {
         matches!(self, Self::Lead)
     }
@@ -182,7 +179,6 @@ impl From<Role> for Actor {
 
 /// How long the next attempt to sign in has to wait after `failures` failed ones in a row: not at all after a typing
 /// mistake or two, then 1 s, and twice as long after each further failure.
-#[must_use]
 pub fn wait_after(failures: u32) -> Duration {
     /// Number of failures that cost no wait.
     const FREE: u32 = 2;

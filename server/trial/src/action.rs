@@ -78,7 +78,6 @@ pub enum Action {
 
 impl Action {
     /// Whether the action stops the lens. If so, it takes effect before it is written to disk.
-    #[must_use]
     pub const fn stops_the_lens(&self) -> bool {
         matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::HoldFocus { .. } | Self::Abort { .. })
     }

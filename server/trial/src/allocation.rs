@@ -25,7 +25,6 @@ pub enum Order {
 
 impl Order {
     /// The algorithm that new sessions use.
-    #[must_use]
     pub const fn algorithm(self) -> Algorithm {
         match self {
             Self::Shuffled => Algorithm::Shuffle1,
@@ -48,7 +47,6 @@ pub enum Algorithm {
 
 impl Algorithm {
     /// The kind of order that this algorithm draws.
-    #[must_use]
     pub const fn order(self) -> Order {
         match self {
             Self::Shuffle1 => Order::Shuffled,
@@ -57,7 +55,6 @@ impl Algorithm {
     }
 
     /// Number of sessions that share a seed: the size of a balanced set, otherwise 1.
-    #[must_use]
     pub fn set_size(self, policies: usize) -> usize {
         match self {
             Self::Shuffle1 => 1,
@@ -67,7 +64,6 @@ impl Algorithm {
 
     /// The order of session `index` (from 0) of the set with this seed. For each segment it gives the policy as an
     /// index into the protocol's list (0..`policies`). Each policy occurs `repeats` times.
-    #[must_use]
     pub fn draw(self, seed: Seed, policies: usize, repeats: usize, index: usize) -> Vec<usize> {
         let mut words = Words(ChaCha20Rng::from_seed(seed.0));
         let mut order: Vec<usize> = (0..policies).flat_map(|policy| std::iter::repeat_n(policy, repeats)).collect();
@@ -106,13 +102,11 @@ impl Seed {
     }
 
     /// The seed as 64 hexadecimal digits.
-    #[must_use]
     pub fn to_hex(self) -> String {
         hex::encode(self.0)
     }
 
     /// Reads a seed from 64 hexadecimal digits; none if `text` is anything else.
-    #[must_use]
     pub fn from_hex(text: &str) -> Option<Self> {
         let mut bytes = [0; 32];
         hex::decode_to_slice(text, &mut bytes).ok()?;

@@ -37,7 +37,6 @@ pub fn check_length(text: &str) -> Result<(), Refusal> {
 
 /// The answer after `given` was added to `earlier`. A 0 among the points keeps the earlier point. So each item of a
 /// questionnaire can be answered by itself, from any device, and no item removes another.
-#[must_use]
 pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerValue {
     match (earlier, given) {
         (Some(AnswerValue::Points(before)), AnswerValue::Points(mut points)) if before.len() == points.len() => {
@@ -51,7 +50,6 @@ pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerVal
 }
 
 /// Whether every item of `value` is answered.
-#[must_use]
 pub fn is_whole(value: &AnswerValue) -> bool {
     !matches!(value, AnswerValue::Points(points) if points.contains(&0))
 }

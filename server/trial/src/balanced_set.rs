@@ -39,7 +39,6 @@ pub struct Member {
 
 impl BalancedSet {
     /// The first of the set's `size` places that a new session may take. None if the set is full or closed.
-    #[must_use]
     pub fn free_place(&self, size: usize) -> Option<usize> {
         // Unblinding one session closes the set, because its order would help to identify the policies of the others.
         if self.members.iter().any(|member| member.unblinded) {
@@ -82,7 +81,6 @@ impl BalancedSet {
 
     /// Whether the seed may be revealed. It gives away the order of every session of the set, so all of them must be
     /// unblinded.
-    #[must_use]
     pub fn may_tell_seed(&self) -> bool {
         self.members.iter().all(|member| member.unblinded)
     }

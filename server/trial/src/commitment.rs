@@ -28,7 +28,6 @@ pub struct Allocation {
 impl Allocation {
     /// Draws the order of the new session `session` with `protocol`, for place `index` among the sessions that share
     /// `seed`.
-    #[must_use]
     pub fn draw(session: SessionId, protocol: &Protocol, seed: Seed, index: usize) -> Self {
         Self {
             session,
@@ -41,7 +40,6 @@ impl Allocation {
     }
 
     /// The text that is hashed: seven lines, each ending with a line feed.
-    #[must_use]
     pub fn statement(&self) -> String {
         let schedule: Vec<&str> = self.schedule.iter().map(PolicyName::as_str).collect();
         format!(
@@ -56,7 +54,6 @@ impl Allocation {
     }
 
     /// SHA-256 of the [statement](Self::statement), in hexadecimal.
-    #[must_use]
     pub fn commitment(&self) -> String {
         hex::encode(Sha256::digest(self.statement()))
     }

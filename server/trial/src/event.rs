@@ -162,7 +162,6 @@ pub struct Seen {
 
 impl EventKind {
     /// The kind's name, as in the database and in exports.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Created => "created",
@@ -190,7 +189,6 @@ impl EventKind {
     }
 
     /// The segment that the event is about, if any.
-    #[must_use]
     pub const fn segment(&self) -> Option<SegmentId> {
         match self {
             Self::SegmentStarted { segment }
@@ -206,7 +204,6 @@ impl EventKind {
     }
 
     /// Time inspected in the segment up to the event, milliseconds; none if the event does not record it.
-    #[must_use]
     pub const fn inspected_ms(&self) -> Option<u64> {
         match self {
             Self::SegmentFinished { inspected_ms, .. }
@@ -218,7 +215,6 @@ impl EventKind {
     }
 
     /// The reason that was given, which may be empty. None for events that have no reason.
-    #[must_use]
     pub fn reason(&self) -> Option<&str> {
         match self {
             Self::Paused { reason, .. }
@@ -231,7 +227,6 @@ impl EventKind {
     }
 
     /// Number of the event that this one is about, if any.
-    #[must_use]
     pub const fn about(&self) -> Option<u32> {
         match self {
             Self::ReasonGiven { about, .. } => Some(*about),
@@ -240,7 +235,6 @@ impl EventKind {
     }
 
     /// Where the lens was sent by hand; none for other events.
-    #[must_use]
     pub const fn focal_power(&self) -> Option<FocalPower> {
         match self {
             Self::FocusedByHand { focal_power, .. } => Some(*focal_power),
@@ -249,7 +243,6 @@ impl EventKind {
     }
 
     /// Where the lens was before it was moved by hand; none for other events, and if it was moved by hand before.
-    #[must_use]
     pub const fn left_at(&self) -> Option<FocalPower> {
         match self {
             Self::FocusedByHand { left_at, .. } => *left_at,
@@ -258,7 +251,6 @@ impl EventKind {
     }
 
     /// Whether a tablet that is away has the page open, but not on screen; none for other events.
-    #[must_use]
     pub const fn hidden(&self) -> Option<bool> {
         match self {
             Self::TabletAway { hidden } => Some(*hidden),
@@ -267,7 +259,6 @@ impl EventKind {
     }
 
     /// What the surgeon saw; none for other events.
-    #[must_use]
     pub const fn seen(&self) -> Option<Seen> {
         match self {
             Self::PicturesSeen(seen) => Some(*seen),
@@ -276,7 +267,6 @@ impl EventKind {
     }
 
     /// The choice of what is to be in focus; none for other events.
-    #[must_use]
     pub const fn choice(&self) -> Option<Choice> {
         match self {
             Self::PatchPlaced { frame, x, y, place, .. } => {
@@ -297,7 +287,6 @@ impl EventKind {
     }
 
     /// A description in words. `setting` returns the number of a segment, from 1.
-    #[must_use]
     pub fn in_words(&self, setting: impl Fn(SegmentId) -> usize) -> String {
         match self {
             Self::Created => "Session made".to_owned(),
@@ -343,7 +332,6 @@ fn because(what: &str, reason: &str) -> String {
 }
 
 /// Pictures a second; 0 for no time.
-#[must_use]
 pub fn per_second(pictures: u64, over_ms: u64) -> f64 {
     if over_ms == 0 { 0.0 } else { pictures as f64 * 1000.0 / over_ms as f64 }
 }

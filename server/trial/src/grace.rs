@@ -25,7 +25,6 @@ pub struct Grace {
 
 impl Grace {
     /// The grace of a new session whose protocol gives `length`.
-    #[must_use]
     pub const fn new(length: Duration) -> Self {
         Self { length, ended: None, unblinded: None, locked: None }
     }
@@ -47,7 +46,6 @@ impl Grace {
 
     /// The end of the grace period; none while the session is under way. Unblinding the session or locking its study
     /// ends the period at once. If the session was unblinded while under way, the period ends with the session.
-    #[must_use]
     pub fn until(&self) -> Option<Timestamp> {
         let ended = self.ended?;
         let over = ended.saturating_add(self.length).unwrap_or(Timestamp::MAX);
@@ -56,7 +54,6 @@ impl Grace {
     }
 
     /// Whether a comment or answer that arrives at `at` is too late to count.
-    #[must_use]
     pub fn is_late(&self, at: Timestamp) -> bool {
         let closed = self.unblinded.is_some() || self.locked.is_some();
         self.until().is_some_and(|until| closed || at > until)

@@ -5,7 +5,6 @@ macro_rules! names {
     ($kind:ty { $($value:ident: $name:literal),+ $(,)? }) => {
         impl $kind {
             /// The name, as in the database and in exports.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$value => $name),+
@@ -13,7 +12,6 @@ macro_rules! names {
             }
 
             /// The value with this name, if there is one.
-            #[must_use]
             pub fn named(name: &str) -> Option<Self> {
                 [$(Self::$value),+].into_iter().find(|value| value.name() == name)
             }

@@ -38,7 +38,6 @@ pub enum CurrentSession {
 
 impl CurrentSession {
     /// The state for a session in `phase`; `None` means that there is no session.
-    #[must_use]
     pub const fn of(phase: Option<Phase>) -> Self {
         match phase {
             None => Self::None,
@@ -118,13 +117,11 @@ pub fn check_while_on_screen(action: &Action) -> Result<(), Refusal> {
 /// Whether `role` may see the focal power on the live view, and everything else there that distinguishes policies:
 /// which policy runs, its focus metric, its belief, and how long its steps take. The surgeon never may. The others may
 /// not until the session is closed, because they can talk to the surgeon.
-#[must_use]
 pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None
 }
 
 /// Whether `role` may see the focus metric of a session's steps afterwards. The metric's scale reveals the policy.
-#[must_use]
 pub fn may_see_metric(role: Role, unblinded: bool) -> bool {
     role == Role::Researcher && unblinded
 }
@@ -177,7 +174,6 @@ pub enum HoldTold {
 /// How much may be shown, while a session is under way, about a hold that has lasted for `held_for`. A hold that the
 /// policy caused is shown only if it lasts, and then without its reason. Otherwise it could reveal the policy, because
 /// only learned policies take time to start and to compute.
-#[must_use]
 pub fn hold_told(caused_by_policy: bool, held_for: Duration) -> HoldTold {
     if !caused_by_policy {
         HoldTold::Fully

@@ -25,7 +25,6 @@ pub enum Phase {
 
 impl Phase {
     /// Whether the session has ended. After that, only late comments and answers, withdrawal and unblinding can follow.
-    #[must_use]
     pub const fn has_ended(self) -> bool {
         matches!(self, Self::Completed | Self::Aborted)
     }

@@ -21,13 +21,11 @@ pub enum PatchRule {
 
 impl PatchRule {
     /// Whether people may choose.
-    #[must_use]
     pub const fn is_free(self) -> bool {
         matches!(self, Self::Surgeon { .. })
     }
 
     /// Whether a chosen place stays in the settings that follow.
-    #[must_use]
     pub const fn stays(self) -> bool {
         matches!(self, Self::Surgeon { stays: true })
     }

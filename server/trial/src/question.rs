@@ -104,7 +104,6 @@ pub struct Pair {
 
 impl QuestionKind {
     /// The kind's name, as in protocols and exports.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Text => "text",

@@ -32,31 +32,26 @@ pub enum RefusalKind {
 
 impl Refusal {
     /// A refusal because only `who` may do this.
-    #[must_use]
     pub fn only(who: &str) -> Self {
         Self::NotAllowed(format!("only {who} can do this"))
     }
 
     /// The session has no such segment.
-    #[must_use]
     pub const fn unknown_segment() -> Self {
         Self::Said(RefusalKind::Unknown, Message::new("refused-no-setting"))
     }
 
     /// The session does not ask this question about this segment.
-    #[must_use]
     pub const fn unknown_question() -> Self {
         Self::Said(RefusalKind::Unknown, Message::new("refused-no-question"))
     }
 
     /// A refusal because of the present state, which a surgeon can meet. `id` names its message.
-    #[must_use]
     pub const fn not_now(id: &'static str) -> Self {
         Self::Said(RefusalKind::Conflict, Message::new(id))
     }
 
     /// A refusal because of the present state. `text` describes it.
-    #[must_use]
     pub fn conflict(text: &str) -> Self {
         Self::Conflict(text.to_owned())
     }

@@ -113,13 +113,11 @@ pub enum CommentContent {
 
 impl CommentContent {
     /// Whether this says something by itself; a withdrawal is only about another comment.
-    #[must_use]
     pub const fn says_something(&self) -> bool {
         !matches!(self, Self::Withdrawal(_))
     }
 
     /// Whether the words are in the comment itself. A mark and a withdrawal have none, a voice comment's are a sound.
-    #[must_use]
     pub const fn has_words(&self) -> bool {
         matches!(self, Self::Text(_) | Self::Quick(_))
     }

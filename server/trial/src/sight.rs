@@ -19,13 +19,11 @@ pub struct SegmentSight {
 
 impl SegmentSight {
     /// Width of the pictures on average over the time, pixels.
-    #[must_use]
     pub fn mean_width(&self) -> f64 {
         if self.over_ms == 0 { f64::from(self.least_width) } else { self.width_ms as f64 / self.over_ms as f64 }
     }
 
     /// Pictures a second; 0 for no time.
-    #[must_use]
     pub fn per_second(&self) -> f64 {
         per_second(self.pictures, self.over_ms)
     }

@@ -37,7 +37,6 @@ pub struct AnswerStanding {
 }
 
 /// The standing of each of `answers`. All must be answers to the same question, in the order of their arrival.
-#[must_use]
 pub fn standings(answers: &[GivenAnswer]) -> Vec<AnswerStanding> {
     let order = in_order(answers);
 
@@ -67,7 +66,6 @@ pub fn standings(answers: &[GivenAnswer]) -> Vec<AnswerStanding> {
 }
 
 /// The standing of each of `answers`. Each comes with its question; they are in the order of their arrival.
-#[must_use]
 pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) -> Vec<AnswerStanding> {
     let mut questions: BTreeMap<Q, (Vec<usize>, Vec<GivenAnswer>)> = BTreeMap::new();
     for (place, (question, given)) in answers.into_iter().enumerate() {
@@ -84,7 +82,6 @@ pub fn by_question<Q: Ord>(answers: impl IntoIterator<Item = (Q, GivenAnswer)>) 
 
 /// The combined answer that counts. `answers` must all answer the same question, in the order of their arrival. None if
 /// no answer counts.
-#[must_use]
 pub fn counted(answers: &[GivenAnswer]) -> Option<AnswerValue> {
     standings(answers).into_iter().find(|standing| standing.counts).map(|standing| standing.value)
 }

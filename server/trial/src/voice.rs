@@ -35,7 +35,6 @@ impl MediaType {
     const ALL: [Self; 3] = [Self::WebmOpus, Self::Mp4, Self::OggOpus];
 
     /// The type's name, as in the database, in exports and over HTTP.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::WebmOpus => "audio/webm;codecs=opus",
@@ -45,7 +44,6 @@ impl MediaType {
     }
 
     /// File name extension, without a dot.
-    #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
             Self::WebmOpus => "webm",
@@ -56,7 +54,6 @@ impl MediaType {
 
     /// The type that `text` names; none if it is another type. Browsers differ in blanks and in upper and lower case,
     /// and Safari adds its codec.
-    #[must_use]
     pub fn named(text: &str) -> Option<Self> {
         let plain: String = text.chars().filter(|letter| !matches!(letter, ' ' | '"')).collect();
         let plain = plain.to_ascii_lowercase();
@@ -127,7 +124,6 @@ pub fn check_piece(new: &NewPiece) -> Result<MediaType, Refusal> {
 }
 
 /// The refusal of a piece that would make its recording too large.
-#[must_use]
 pub fn too_large() -> Refusal {
     Refusal::Invalid(format!("a recording may have {LARGEST_RECORDING} bytes in all; begin another one"))
 }

@@ -196,7 +196,6 @@ impl Filter {
     }
 
     /// How likely the optimum is in each bin when the lens will have moved.
-    #[must_use]
     pub fn outlook(&self) -> [f32; BINS] {
         let mut bins = [0.0; BINS];
         for (row, shares) in self.belief.iter().enumerate() {

@@ -45,7 +45,6 @@ pub struct ViewTransform(Rows<KEPT>);
 
 impl ViewTransform {
     /// The transform of `levels` ([`Surroundings::levels`]).
-    #[must_use]
     pub fn of(levels: &[f32]) -> Self {
         let rows = levels.as_chunks::<SIDE>().0;
         let sum: f32 = rows.iter().map(|row| row.iter().sum::<f32>()).sum();
@@ -57,14 +56,12 @@ impl ViewTransform {
     ///
     /// It is the peak of the phase correlation (Kuglin and Hines 1975). Blur hardly moves the peak: it lowers the
     /// amplitude of each frequency and leaves its phase.
-    #[must_use]
     pub fn motion_to(&self, now: &Self) -> (isize, isize) {
         peak(&correlation(&self.0, &now.0, &TABLES))
     }
 
     /// The same motion, and how far its peak stands out: its height above the mean of the other motions, in their
     /// standard deviations (the peak-to-sidelobe ratio, Bolme et al. 2010). 0 if nothing is seen.
-    #[must_use]
     pub fn registered_to(&self, now: &Self) -> ((isize, isize), f32) {
         let map = correlation(&self.0, &now.0, &TABLES);
         let motion = peak(&map);

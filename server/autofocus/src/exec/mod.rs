@@ -24,7 +24,6 @@ const SUMMARY: &str = "a policy in another process";
 
 /// Adds the policy of a command to `registry`, if `name` begins with [`PREFIX`]. Starts the process. If it cannot be
 /// used, it is listed as unavailable, with the reason.
-#[must_use]
 pub fn with_command(registry: Registry, name: &PolicyName, settings: &ProcessSettings) -> Registry {
     let Some(text) = name.as_str().strip_prefix(PREFIX) else { return registry };
     if registry.has(name) {

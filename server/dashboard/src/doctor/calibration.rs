@@ -13,7 +13,6 @@ const OLD: i32 = 180;
 
 /// Checks the calibration in use on the day `today`. `size` is the width and height of the camera's mosaics in samples;
 /// `None` means a camera that delivers colour pictures. A `simulated` camera senses like the typical sensor.
-#[must_use]
 pub fn calibration(calibration: &Calibration, size: Option<(usize, usize)>, simulated: bool, today: Date) -> Finding {
     if size.is_none() {
         return Finding::well(CALIBRATION, "The camera delivers colour pictures, which need no calibration.");
@@ -36,7 +35,6 @@ pub fn calibration(calibration: &Calibration, size: Option<(usize, usize)>, simu
 }
 
 /// The finding about a calibration that cannot be used.
-#[must_use]
 pub fn unreadable_calibration(fault: &CalibrationFault) -> Finding {
     Finding::wrong(CALIBRATION, format!("It cannot be used: {fault}."), "Follow docs/bench.md, section 3.")
 }

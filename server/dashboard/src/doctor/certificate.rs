@@ -12,7 +12,6 @@ const CERTIFICATE: &str = "certificate";
 const SOON: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// Checks a certificate that is valid until `until`. `local`: whether the server's own authority signed it.
-#[must_use]
 pub fn certificate(until: Timestamp, local: bool, now: Timestamp) -> Finding {
     let day = until.to_zoned(TimeZone::system()).date();
     let left = until.duration_since(now);

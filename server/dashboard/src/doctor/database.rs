@@ -10,7 +10,6 @@ const DATABASE: &str = "database";
 
 /// The finding about the database in the data folder `data`; `None` if the database is missing because the folder
 /// itself does not exist.
-#[must_use]
 pub fn database(data: &Path, state: DatabaseState) -> Option<Finding> {
     let folder = data.display();
     Some(match state {

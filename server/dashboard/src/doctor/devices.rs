@@ -9,7 +9,6 @@ const CAMERA: &str = "camera";
 const LENS: &str = "lens";
 
 /// Checks the camera. For a GigE camera, its message includes the size of the packets.
-#[must_use]
 pub fn camera_in_use(health: &CameraHealth) -> Finding {
     let found = named(&health.name, &health.message);
     if !health.working {
@@ -26,7 +25,6 @@ pub fn camera_in_use(health: &CameraHealth) -> Finding {
 }
 
 /// Checks the lens. `info` is what it reported about itself when the server started, if it did.
-#[must_use]
 pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
     let found = named(&health.name, &health.message);
     if !health.working {
@@ -45,7 +43,6 @@ pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
 }
 
 /// Checks a lens that no server uses; `asked` is what it reported about itself, or why it did not answer.
-#[must_use]
 pub fn lens(asked: Result<LensInfo, LensError>) -> Finding {
     match asked {
         Ok(info) => described(&info),

@@ -25,7 +25,6 @@ pub use tablet::{Tablet, TabletPart, TriedTablet, tablets, tried};
 use parfocal_base::clock::Clock;
 
 /// Checks everything except the database and the devices: the folder `data` and its disk, clock, network and rights.
-#[must_use]
 pub fn machine(data: &Path, clock: &dyn Clock) -> Vec<Finding> {
     let mut findings = vec![folder::disk(data), folder::access(data)];
     findings.push(system::clock(clock));

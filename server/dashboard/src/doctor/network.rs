@@ -33,7 +33,6 @@ pub fn addresses() -> Finding {
 ///
 /// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The
 /// destination is an address reserved for documentation (RFC 5737).
-#[must_use]
 pub fn outward() -> Option<IpAddr> {
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
     socket.connect("192.0.2.1:9").ok()?;

@@ -69,7 +69,6 @@ pub struct TriedTablet {
 }
 
 /// One finding for each tablet that was tried.
-#[must_use]
 pub fn tried(tablets: &[TriedTablet], zone: &TimeZone) -> Vec<Finding> {
     tablets.iter().map(|tablet| tried_one(tablet, zone)).collect()
 }
@@ -91,7 +90,6 @@ fn tried_one(tablet: &TriedTablet, zone: &TimeZone) -> Finding {
 }
 
 /// One finding for each open surgeon's page, or one that says that none is open.
-#[must_use]
 pub fn tablets(open: &[Tablet]) -> Vec<Finding> {
     if open.is_empty() {
         let advice = "Scan the code in the card \"Surgeon’s tablet\" with the tablet's camera.";

@@ -64,7 +64,6 @@ pub struct Signs {
 
 impl Signs {
     /// What is wrong, the worst first.
-    #[must_use]
     pub fn problems(&self) -> Vec<Problem> {
         let stalled = self.loop_spoke_ago.is_none_or(|ago| ago >= STALLED);
         let unwritable = self.is_unwritable();
@@ -97,7 +96,6 @@ impl Signs {
 }
 
 /// The condition of a server with these `problems`: that of the worst.
-#[must_use]
 pub(super) fn condition(problems: &[Problem]) -> Condition {
     problems.iter().map(|problem| problem.condition).max().unwrap_or(Condition::Ok)
 }

@@ -48,7 +48,6 @@ struct CheckResults {
 impl HealthWatch {
     /// A watch over the loop with this `status`, the sessions and the database. It checks the disk and lost telemetry
     /// only while [`HealthWatch::run`] is awaited.
-    #[must_use]
     pub fn new(
         clock: Arc<dyn Clock>,
         status: watch::Receiver<Arc<ControlStatus>>,
@@ -84,7 +83,6 @@ impl HealthWatch {
     }
 
     /// The server's condition and its problems, the worst first. Waits for nothing.
-    #[must_use]
     pub fn now(&self) -> (Condition, Vec<Problem>) {
         let problems = self.0.signs().problems();
         (condition(&problems), problems)

@@ -19,14 +19,12 @@ pub struct ServerAddress {
 
 impl ServerAddress {
     /// A server that listens on `listening`, and encrypts if it has `certificates`.
-    #[must_use]
     pub const fn new(listening: SocketAddr, certificates: Option<Arc<Certificates>>) -> Self {
         Self { listening, certificates }
     }
 
     /// Host and port for links. They are determined anew at each call: the machine gets another address when it joins
     /// another network or its cable is plugged in, and a link to the old address no longer works.
-    #[must_use]
     pub fn host(&self) -> String {
         let outward = if self.listening.ip().is_unspecified() { outward() } else { None };
         self.host_from(outward)
@@ -45,38 +43,32 @@ impl ServerAddress {
     }
 
     /// Whether the server itself encrypts connections.
-    #[must_use]
     pub const fn encrypted(&self) -> bool {
         self.certificates.is_some()
     }
 
     /// Whether the server listens only on the loopback interface, where no tablet reaches it.
-    #[must_use]
     pub const fn loopback_only(&self) -> bool {
         self.listening.ip().is_loopback()
     }
 
     /// The local authority that signed the server's certificate and that each device must trust; `None` if there is
     /// none.
-    #[must_use]
     pub fn authority(&self) -> Option<&PublicAuthority> {
         self.certificates.as_ref()?.authority()
     }
 
     /// When the server's certificate expires; `None` if the server does not encrypt.
-    #[must_use]
     pub fn certificate_until(&self) -> Option<Timestamp> {
         self.certificates.as_ref().map(|certificates| certificates.until())
     }
 
     /// The scheme of links to the server.
-    #[must_use]
     pub const fn scheme(&self) -> &'static str {
         if self.encrypted() { "https" } else { "http" }
     }
 
     /// The link that lets a browser in with `key`; `host` is one of the server's names.
-    #[must_use]
     pub fn link_by(&self, host: &str, key: &str) -> String {
         format!("{}://{host}/enter?key={key}", self.scheme())
     }
@@ -84,7 +76,6 @@ impl ServerAddress {
     /// Address of the page that helps a device to trust the server; `None` if that is not needed. `host` is one of the
     /// server's names. The page is not encrypted, so a device that does not trust the server yet can open it without a
     /// warning.
-    #[must_use]
     pub fn trust_page_by(&self, host: &str) -> Option<String> {
         self.authority().map(|_| format!("http://{host}/trust"))
     }

@@ -130,19 +130,16 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 });
 
 /// Address of static file `name`, such as `shared/api.js`. Relative imports between the files keep the hash.
-#[must_use]
 pub fn url(name: &str) -> String {
     format!("/static/{}/{name}", *VERSION)
 }
 
 /// Hash of all files, as it appears in their addresses.
-#[must_use]
 pub fn version() -> &'static str {
     &VERSION
 }
 
 /// Address of the script with the messages of the language with this code.
-#[must_use]
 pub fn language_url(code: impl AsRef<str>) -> String {
     url(&format!("languages/{}.js", code.as_ref()))
 }
@@ -154,7 +151,6 @@ pub fn surgeon_urls() -> impl Iterator<Item = String> {
 }
 
 /// What a browser gets as static file `name`; `None` if there is no such file.
-#[must_use]
 pub fn content(name: &str) -> Option<&'static [u8]> {
     asset_of(name).map(Asset::content)
 }
@@ -164,7 +160,6 @@ fn asset_of(name: &str) -> Option<&'static Asset> {
 }
 
 /// Static file `name` as it is in the repository; `None` if there is no such file.
-#[must_use]
 pub fn body(name: &str) -> Option<&'static [u8]> {
     asset_of(name).map(|asset| &*asset.body)
 }

@@ -23,7 +23,6 @@ pub struct Equipment {
 
 impl Equipment {
     /// A lens, a calibration and a camera as they were at the start.
-    #[must_use]
     pub fn new(lens: Option<LensInfo>, calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
         Self { lens, calibration, mosaics, look: Arc::default(), spectra: Mutex::default() }
     }

@@ -79,7 +79,6 @@ pub struct ErrorBody {
 
 impl Error {
     /// The HTTP status of this error.
-    #[must_use]
     pub const fn status(&self) -> StatusCode {
         match self {
             Self::NotFound(_) | Self::Said(RefusalKind::Unknown, _) => StatusCode::NOT_FOUND,
@@ -103,7 +102,6 @@ impl Error {
     }
 
     /// The error in `language`, as far as a surgeon can meet it; otherwise in English.
-    #[must_use]
     pub fn say_in(&self, language: Language) -> String {
         match self {
             Self::Said(_, message) => message.say_in(language),
@@ -313,7 +311,6 @@ fn title_of(status: StatusCode) -> &'static str {
 }
 
 /// A role's name in a sentence.
-#[must_use]
 pub const fn role_name(role: Role) -> &'static str {
     match role {
         Role::Surgeon => "surgeon",

@@ -112,7 +112,6 @@ impl Keys {
     }
 
     /// The key of `role`. It is empty for [`Role::System`], and grants nothing.
-    #[must_use]
     pub fn of(&self, role: Role) -> &str {
         match role {
             Role::Surgeon => &self.surgeon,
@@ -123,7 +122,6 @@ impl Keys {
     }
 
     /// The role that `key` grants. Takes the same time for every key of the same length.
-    #[must_use]
     pub fn role_of(&self, key: &str) -> Option<Role> {
         let mut found = None;
 
@@ -139,7 +137,6 @@ impl Keys {
 
     /// The value of the cookie of `role`. It is a hash of the key, so a stolen cookie does not reveal the link. It
     /// stays the same after a restart, so a tablet stays let in.
-    #[must_use]
     pub fn token(&self, role: Role) -> String {
         let digest = Sha256::new().chain_update(b"parfocal cookie 1:").chain_update(self.of(role)).finalize();
         hex::encode(digest)
@@ -147,25 +144,21 @@ impl Keys {
 
     /// The key of the surgeon's link to `session` only: the session's identifier, and a proof that only this server can
     /// make.
-    #[must_use]
     pub fn of_session(&self, session: SessionId) -> String {
         format!("{}{}", session.0.simple(), self.session_proof("link", session))
     }
 
     /// The session whose surgeon's link has the key `key`, whether or not it has ended.
-    #[must_use]
     pub fn session_of(&self, key: &str) -> Option<SessionId> {
         self.proven("link", key)
     }
 
     /// The value of the surgeon's cookie for `session` only.
-    #[must_use]
     pub fn session_token(&self, session: SessionId) -> String {
         format!("{}{}", session.0.simple(), self.session_proof("cookie", session))
     }
 
     /// The session whose surgeon's cookie is `token`.
-    #[must_use]
     pub fn session_of_token(&self, token: &str) -> Option<SessionId> {
         self.proven("cookie", token)
     }
@@ -190,7 +183,6 @@ impl Keys {
     }
 
     /// Whether `token` is the cookie of `role`.
-    #[must_use]
     pub fn opens(&self, role: Role, token: &str) -> bool {
         role != Role::System && bool::from(self.token(role).as_bytes().ct_eq(token.as_bytes()))
     }

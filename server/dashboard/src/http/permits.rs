@@ -51,6 +51,7 @@ struct Connection {
 }
 
 /// A connection's permit; freed when dropped.
+#[must_use]
 pub struct Permit {
     /// The host that the connection came from.
     pub host: IpAddr,

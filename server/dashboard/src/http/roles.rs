@@ -167,7 +167,6 @@ impl FromRequestParts<AppState> for Roles {
 }
 
 /// Path of the page of `role`.
-#[must_use]
 pub const fn home(role: Role) -> &'static str {
     match role {
         Role::Surgeon => "/surgeon",

@@ -133,7 +133,6 @@ fn is_same_origin(headers: &HeaderMap, host: &str, encrypted: bool) -> bool {
 }
 
 /// Whether `host`, with or without a port, is one of this machine's own names.
-#[must_use]
 pub fn is_loopback_name(host: &str) -> bool {
     let name = match host.strip_prefix('[') {
         Some(rest) => rest.split(']').next().unwrap_or_default(),

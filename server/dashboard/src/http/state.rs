@@ -93,7 +93,6 @@ pub type AppState = Arc<App>;
 
 impl App {
     /// Records what `by` looks at.
-    #[must_use]
     pub fn access_log(&self, by: impl Into<Actor>) -> AccessLog {
         AccessLog::of_server(&self.store, by.into(), Arc::clone(&self.clock))
     }
@@ -105,26 +104,22 @@ impl App {
     }
 
     /// The session on the screens, if it belongs to a study and has not ended. The surgeon's link is then to it only.
-    #[must_use]
     pub fn linked_session(&self) -> Option<SessionId> {
         self.study_session().filter(|session| self.session_goes_on(*session))
     }
 
     /// Whether `session` is on the screens and has not ended.
-    #[must_use]
     pub fn session_goes_on(&self, session: SessionId) -> bool {
         let view = self.operator_view.borrow();
         view.as_ref().is_some_and(|view| view.surgeon.session == session && !view.surgeon.phase.has_ended())
     }
 
     /// Whether values that tell policies apart are now hidden from operator and researcher too.
-    #[must_use]
     pub fn blinded(&self) -> bool {
         !may_see_focal_power(Role::Operator, self.current_session())
     }
 
     /// The state of the session on the screens.
-    #[must_use]
     pub fn current_session(&self) -> CurrentSession {
         let phase = self.operator_view.borrow().as_ref().map(|view| view.surgeon.phase);
         CurrentSession::of(phase)

@@ -15,7 +15,6 @@ pub struct TabletTrials(Arc<Mutex<BTreeMap<DeviceId, TriedTablet>>>);
 
 impl TabletTrials {
     /// The results, one for each tablet.
-    #[must_use]
     pub fn all(&self) -> Vec<TriedTablet> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect()
     }

@@ -84,7 +84,6 @@ impl Certificates {
     }
 
     /// The local authority, which devices must trust first; none if the certificate was given.
-    #[must_use]
     pub fn authority(&self) -> Option<&PublicAuthority> {
         match &self.source {
             Source::Local { authority, .. } => Some(&authority.public),
@@ -94,7 +93,6 @@ impl Certificates {
 
     /// Host and port for links to a server that is reached at `address`. If the certificate does not list the address,
     /// the host is a name that it lists.
-    #[must_use]
     pub fn host(&self, address: SocketAddr) -> String {
         let shown = self.shown.load();
         let names = &shown.facts.names;
@@ -160,7 +158,6 @@ impl Certificates {
     }
 
     /// When the present certificate ends.
-    #[must_use]
     pub fn until(&self) -> Timestamp {
         self.shown.load().facts.until
     }

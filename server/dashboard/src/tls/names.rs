@@ -14,7 +14,6 @@ pub struct Names {
 
 impl Names {
     /// The names of this machine, and the present addresses of a server that listens on `listening`.
-    #[must_use]
     pub fn of_machine(listening: IpAddr) -> Self {
         let mut addresses = BTreeSet::from([Ipv4Addr::LOCALHOST.into(), Ipv6Addr::LOCALHOST.into()]);
         if listening.is_unspecified() {
@@ -27,7 +26,6 @@ impl Names {
     }
 
     /// The names of this machine, and all its addresses.
-    #[must_use]
     pub fn of_whole_machine() -> Self {
         Self::of_machine(Ipv4Addr::UNSPECIFIED.into())
     }

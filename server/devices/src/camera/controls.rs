@@ -23,7 +23,6 @@ impl Setting {
     pub const ALL: [Self; 3] = [Self::Exposure, Self::Gain, Self::FrameRate];
 
     /// Its name, as in JSON.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Exposure => "exposure",
@@ -33,7 +32,6 @@ impl Setting {
     }
 
     /// Name at the start of a sentence.
-    #[must_use]
     pub const fn label(self) -> &'static str {
         match self {
             Self::Exposure => "Exposure",
@@ -67,7 +65,6 @@ pub struct CameraOffer {
 
 impl CameraOffer {
     /// The settings' values by their names, as JSON has them.
-    #[must_use]
     pub fn by_name(&self) -> BTreeMap<String, f64> {
         self.settings.iter().map(|one| (one.setting.name().to_owned(), one.value)).collect()
     }
@@ -101,7 +98,6 @@ pub enum ControlError {
 
 impl Controls {
     /// The settings that the camera offers now.
-    #[must_use]
     pub fn offered(&self) -> CameraOffer {
         self.inner().offer.clone()
     }
@@ -135,7 +131,6 @@ impl Controls {
     }
 
     /// For the camera: takes the changes that were asked for, one per setting.
-    #[must_use]
     pub fn take(&self) -> Vec<(Setting, f64)> {
         std::mem::take(&mut self.inner().wanted)
     }

@@ -91,7 +91,6 @@ pub struct Frame {
 
 impl Frame {
     /// The middle of the exposure. The lens's focal power at that time best stands for the whole exposure.
-    #[must_use]
     pub fn middle(&self) -> Moment {
         let half = u64::try_from(self.exposure.as_nanos() / 2).unwrap_or(u64::MAX);
         Moment::from_nanos(self.exposed_at.as_nanos().saturating_sub(half))

@@ -21,7 +21,6 @@ pub struct Pace {
 
 impl Pace {
     /// A frame every `1 / fps` seconds, the first at `start`. A rate outside 1..=1000 is clamped to it.
-    #[must_use]
     pub fn new(fps: f64, start: Moment) -> Self {
         let fps = if fps.is_nan() { 1.0 } else { fps.clamp(1.0, 1000.0) };
         Self { start, period: Duration::from_secs_f64(1.0 / fps), number: 0, lost: 0, delivered: VecDeque::new() }
@@ -65,7 +64,6 @@ impl Pace {
     }
 
     /// Frames per second, as measured over the second before `now`.
-    #[must_use]
     pub fn rate(&self, now: Moment) -> f64 {
         let recent = self.delivered.iter().filter(|at| now.since(**at) <= Duration::from_secs(1));
         let (count, first) = recent.fold((0_usize, None), |(count, first), at| (count + 1, first.or(Some(*at))));
@@ -77,13 +75,11 @@ impl Pace {
     }
 
     /// Frames skipped because the one before took too long.
-    #[must_use]
     pub const fn lost(&self) -> u64 {
         self.lost
     }
 
     /// How well the pace is kept, in one sentence.
-    #[must_use]
     pub fn message(&self) -> Arc<str> {
         let asked = 1.0 / self.period.as_secs_f64();
         let kept = self.delivered.back().is_none_or(|last| self.rate(*last) > 0.95 * asked);

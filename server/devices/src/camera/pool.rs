@@ -20,7 +20,6 @@ pub struct MosaicPool {
 
 impl MosaicPool {
     /// An empty pool for frames of `width` x `height` samples.
-    #[must_use]
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height, given: Vec::new() }
     }

@@ -58,7 +58,6 @@ fn played(opened: Result<impl Camera + 'static, impl Display>) -> Result<Box<dyn
 }
 
 /// The calibration that comes with the camera `spec`: a recording's own. `None` for all other cameras.
-#[must_use]
 pub fn own_calibration(spec: &str) -> Option<PathBuf> {
     spec.strip_prefix("recording:").filter(|path| !path.is_empty()).map(|path| Path::new(path).join(CALIBRATION))
 }

@@ -51,7 +51,6 @@ impl MeasuredDynamics {
     }
 
     /// The dynamics as the control loop uses them.
-    #[must_use]
     pub fn dynamics(&self) -> LensDynamics {
         let millis = |value: f64| Duration::from_secs_f64(value.clamp(0.0, Self::LONGEST_MS) / 1000.0);
         LensDynamics { delay: millis(self.delay_ms), settling: millis(self.settling_ms) }

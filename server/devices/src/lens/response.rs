@@ -35,7 +35,6 @@ struct Move {
 
 impl Response {
     /// A lens at rest at `start`. `play` is the half-width of the hysteresis, 0 for none.
-    #[must_use]
     pub fn new(dynamics: LensDynamics, play: f64, start: FocalPower) -> Self {
         let rest = Move { starts: Moment::from_nanos(0), from: start.get(), to: start.get() };
         Self { dynamics, play, moves: Mutex::new(VecDeque::from([rest])) }
@@ -59,7 +58,6 @@ impl Response {
     }
 
     /// Dead time and settling time.
-    #[must_use]
     pub const fn dynamics(&self) -> LensDynamics {
         self.dynamics
     }

@@ -60,13 +60,11 @@ impl FromStr for SimulatedFault {
 
 impl SimulatedLens {
     /// A lens at rest in the middle of its range.
-    #[must_use]
     pub fn new(clock: Arc<dyn Clock>) -> Self {
         Self::moving(DYNAMICS, clock)
     }
 
     /// The same with other `dynamics`.
-    #[must_use]
     pub fn moving(dynamics: LensDynamics, clock: Arc<dyn Clock>) -> Self {
         Self {
             clock,

@@ -11,7 +11,6 @@ const CUT: f64 = 4.0;
 /// Blurs `image` with a Gaussian of standard deviation `sigma` pixels: separable, kernel cut at 4
 /// sigma and normalised to sum 1, border pixels repeated outwards. A `sigma` that is not positive and
 /// finite leaves the picture as it is.
-#[must_use]
 pub fn gaussian_blur(image: &GrayImage, sigma: f64) -> GrayImage {
     let kernel = gaussian_kernel(sigma);
     if kernel.len() == 1 || image.data.is_empty() {

@@ -15,7 +15,6 @@ pub struct Cover {
 
 impl Cover {
     /// A cover that comes and goes as drawn from `seed`; at first nothing is covered.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut course = ChaCha8Rng::seed_from_u64(seed);
         let frames_left = course.random_range(0..150);
@@ -23,7 +22,6 @@ impl Cover {
     }
 
     /// The share of the picture's contrast that is left at this frame.
-    #[must_use]
     pub fn detail(&self) -> f64 {
         self.detail.unwrap_or(1.0)
     }

@@ -7,7 +7,6 @@ fn samples(sigma: f64, reach: usize) -> Vec<f64> {
 
 /// A Gaussian of standard deviation `sigma` from its middle to `reach` pixels away. With its mirror
 /// image it sums to 1.
-#[must_use]
 pub fn half_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let samples = samples(sigma, reach);
     let sum = 2.0 * samples.iter().sum::<f64>() - samples[0];
@@ -16,7 +15,6 @@ pub fn half_kernel(sigma: f64, reach: usize) -> Vec<f64> {
 
 /// A Gaussian of standard deviation `sigma` up to `reach` pixels either way, `2 * reach + 1` values
 /// that sum to 1.
-#[must_use]
 pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let half = samples(sigma, reach);
     let both: Vec<f64> = half.iter().rev().chain(&half[1..]).copied().collect();
@@ -27,7 +25,6 @@ pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
 /// The discrete Gaussian (Lindeberg 1990) of standard deviation `sigma`, up to `reach` pixels either way:
 /// `exp(-t) I_n(t)` with t = `sigma` squared. `sigma` must be below 1. In that range samples of a Gaussian, as in
 /// [`kernel`], have less than its variance.
-#[must_use]
 pub fn discrete_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let half = 0.5 * sigma * sigma;
 
@@ -49,7 +46,6 @@ pub fn discrete_kernel(sigma: f64, reach: usize) -> Vec<f64> {
 }
 
 /// `values` smoothed by a Gaussian of `sigma` places, cut at four sigma. Beyond both ends the values are mirrored.
-#[must_use]
 pub fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
     let reach = (4.0 * sigma).round() as usize;
     let kernel = kernel(sigma, reach);

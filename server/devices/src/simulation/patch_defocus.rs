@@ -88,7 +88,6 @@ impl Defocus {
     }
 
     /// Whether a blur of `sigma` leaves so little detail that a square may be made from means of 2x2 pixels.
-    #[must_use]
     pub fn is_wide(sigma: f64) -> bool {
         sigma >= WIDE_SIGMA
     }

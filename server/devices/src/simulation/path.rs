@@ -31,7 +31,6 @@ pub struct Path<const N: usize> {
 
 impl<const N: usize> Path<N> {
     /// A path whose walks advance `rate` times a second, at time zero.
-    #[must_use]
     pub fn new(seed: u64, rate: f64, habits: [Habit; N]) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(1);

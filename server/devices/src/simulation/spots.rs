@@ -25,7 +25,6 @@ pub enum LensSpot {
 
 /// `picture` blurred by `spot`. A plain disc would have a standard deviation of `sigma` pixels along
 /// each axis: its radius is twice that. Outside the picture its border pixels are repeated.
-#[must_use]
 pub fn blurred(picture: &GrayImage, sigma: f64, spot: LensSpot) -> GrayImage {
     match spot {
         _ if sigma <= 0.0 => picture.clone(),

@@ -11,7 +11,6 @@ use super::blur::gaussian_blur;
 use parfocal_imaging::GrayImage;
 
 /// A sharp picture of `side` x `side` pixels; the same seed gives the same picture.
-#[must_use]
 pub fn texture(seed: u64, side: usize) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut canvas = Canvas::blank(side);
@@ -70,7 +69,6 @@ pub struct Canvas {
 
 impl Canvas {
     /// A canvas of `side` x `side` zeros.
-    #[must_use]
     pub fn blank(side: usize) -> Self {
         Self { side, data: vec![0.0; side * side] }
     }

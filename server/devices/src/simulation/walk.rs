@@ -35,7 +35,6 @@ impl Walk {
     }
 
     /// The current position.
-    #[must_use]
     pub const fn position(&self) -> f64 {
         self.position
     }

@@ -23,7 +23,6 @@ type BandMatrix = SMatrix<f64, BANDS, BANDS>;
 
 impl Calibration {
     /// Weights of the white-balanced bands in linear sRGB red, green and blue, with the spectral correction in them.
-    #[must_use]
     pub fn linear_srgb(&self) -> [[f32; BANDS]; 3] {
         linear_srgb_from_bands(&self.bands).map(|colour| {
             std::array::from_fn(|band| {

@@ -22,7 +22,6 @@ const RADIUS: (f64, f64) = (0.2, 0.8);
 /// Finds the content area of `gray`; `None` if there is no circle, or too little of it to be sure.
 ///
 /// The same picture always gives the same answer.
-#[must_use]
 pub fn detect(gray: &GrayImage) -> Option<ContentArea> {
     let width = gray.width as f64;
     let height = gray.height as f64;

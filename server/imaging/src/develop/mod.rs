@@ -61,7 +61,6 @@ impl Default for Developed {
 impl Developer {
     /// A developer for mosaics of the sensor that `calibration` belongs to. Fits the colour matrix,
     /// which takes some milliseconds.
-    #[must_use]
     pub fn new(calibration: &Calibration) -> Self {
         Self {
             reconstructor: Reconstructor::new(calibration),
@@ -75,7 +74,6 @@ impl Developer {
     }
 
     /// The reconstructor of the same calibration, which makes pictures of one pixel per cell.
-    #[must_use]
     pub const fn reconstructor(&self) -> &Reconstructor {
         &self.reconstructor
     }

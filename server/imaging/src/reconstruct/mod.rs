@@ -75,7 +75,6 @@ impl Default for Reconstructor {
 impl Reconstructor {
     /// A reconstructor for mosaics of the sensor that `calibration` belongs to. Fits the colour matrix,
     /// which takes some milliseconds.
-    #[must_use]
     pub fn new(calibration: &Calibration) -> Self {
         let weights = weights(calibration);
         let mixes = |dark, white| Mixes::new(weights, dark, white);
@@ -122,7 +121,6 @@ impl Reconstructor {
 
     /// The patch of the gray picture at `area` (in cells), computing just those cells; black where
     /// `area` leaves the picture.
-    #[must_use]
     pub fn gray_patch(&self, mosaic: &MosaicFrame, area: PatchArea) -> Patch {
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
         self.fill_gray(mosaic, Square { x: area.x, y: area.y, side: PATCH_SIDE }, &mut patch.0);
@@ -131,14 +129,12 @@ impl Reconstructor {
 
     /// The policies' view of the gray picture with the patch at `area` (in cells), computing just those
     /// cells.
-    #[must_use]
     pub fn gray_view(&self, mosaic: &MosaicFrame, area: PatchArea) -> View {
         let size = (mosaic.band_width(), mosaic.band_height());
         View::around(self.gray_patch(mosaic, area), (area.x, area.y), size, |square| self.gray_square(mosaic, square))
     }
 
     /// The gray picture within `square` (in cells), row after row; black where the square leaves the picture.
-    #[must_use]
     pub fn gray_square(&self, mosaic: &MosaicFrame, square: Square) -> Vec<f32> {
         let mut gray = vec![0.0; square.side * square.side];
         self.fill_gray(mosaic, square, &mut gray);

@@ -13,7 +13,6 @@ const MAX_MOVE: f64 = 0.1;
 /// Mean absolute error, over the frames of one scan, of an observer who knows its `optimum` `late` frames late. It
 /// starts in the middle, as policies do, and moves by at most [`MAX_MOVE`] a frame. With `late` 0 it knows the optimum
 /// of the frame to come.
-#[must_use]
 pub fn late_error(optimum: &[f64], late: usize) -> f64 {
     let mut focal_power = FocalPower::MIDDLE.get();
     let mut sum = 0.0;
@@ -27,7 +26,6 @@ pub fn late_error(optimum: &[f64], late: usize) -> f64 {
 
 /// The delay at which the error is `wanted`, interpolated between whole frames. `error_at` tells the error of an
 /// observer so many frames late. `None` if even [`MOST_DELAY`] frames give less.
-#[must_use]
 pub fn delay_of(wanted: f64, error_at: impl Fn(usize) -> f64) -> Option<f64> {
     let mut before = error_at(0);
     if wanted <= before {

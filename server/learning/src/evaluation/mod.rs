@@ -75,7 +75,6 @@ pub struct Reliance {
 
 impl Reliance {
     /// The reliance of several paths together; `None` if they have no claims.
-    #[must_use]
     pub fn of<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<Self> {
         let mut all = Sureness::default();
         for Sureness { claims, sure, right } in paths.into_iter().map(Path::sureness) {
@@ -170,7 +169,6 @@ pub fn evaluate(
 
 impl Outcome {
     /// The figures over all paths.
-    #[must_use]
     pub fn row(&self) -> Row {
         // These figures are of whole paths, because what happens from one part to the next counts, and parts differ in
         // length.
@@ -202,7 +200,6 @@ impl Outcome {
 
     /// Mean absolute error on these scans of an observer who knows every optimum `late` frames late; see
     /// [`late_error`].
-    #[must_use]
     pub fn late_error(&self, late: usize) -> f64 {
         let frames: usize = self.paths.iter().map(|path| path.optimum.len()).sum();
         let sum = self.paths.iter().map(|path| path.optimum.len() as f64 * late_error(&path.optimum, late));
@@ -211,7 +208,6 @@ impl Outcome {
 }
 
 /// Tests each pair of rows, without the oracle.
-#[must_use]
 pub fn compare(rows: &[Row]) -> Vec<Comparison> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.policy != ORACLE).collect();
     let pairs = rows.iter().enumerate().flat_map(|(index, a)| rows[index + 1..].iter().map(move |b| (*a, *b)));

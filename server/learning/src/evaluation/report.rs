@@ -43,7 +43,6 @@ pub struct EvaluatedScans {
 
 impl EvaluatedScans {
     /// Names the first difference from `other`; `None` if there is none.
-    #[must_use]
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         let differences = [
             (self.scans != other.scans, "the scans"),
@@ -99,7 +98,6 @@ const ROBOTIC: [PaperRow; 6] = [
 impl EvaluationReport {
     /// The table as Markdown, beside the paper's figures on scans of the same kind; then the tests,
     /// and what was evaluated.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
             "| policy | MAE ± sd | 95 % CI | in focus | sharpness kept | delay | travel / frame | reversals / s \
@@ -311,7 +309,6 @@ const COLOURS: [&str; 9] =
 
 /// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`,
 /// the optimum in black.
-#[must_use]
 pub fn figure(outcomes: &[Outcome], index: usize) -> String {
     let policies: Vec<(&str, &Path)> = outcomes
         .iter()

@@ -96,7 +96,6 @@ impl Path {
     }
 
     /// How often its claims were sure, and right. A claim is about the frame after the one at which it was made.
-    #[must_use]
     pub fn sureness(&self) -> Sureness {
         let mut out = Sureness::default();
         for (claim, optimum) in self.claims.iter().zip(self.optimum.iter().skip(1)) {
@@ -110,7 +109,6 @@ impl Path {
     }
 
     /// This path cut into `count` stretches of the same length, to within a frame.
-    #[must_use]
     pub fn parts(&self, count: usize) -> Vec<Self> {
         let frames = self.focal_power.len();
         let part = |index: usize| {
@@ -126,7 +124,6 @@ impl Path {
     }
 
     /// Figures of this path; all zero for an empty one.
-    #[must_use]
     pub fn figures(&self) -> PathFigures {
         let count = self.focal_power.len().max(1) as f64;
         let steps: Vec<f64> =
@@ -148,7 +145,6 @@ impl Path {
 pub struct NoTarget(String);
 
 /// The mean gradient magnitude of the patch at the optimum, for each of `frames` frames of `scan`.
-#[must_use]
 pub fn sharpest(scan: &mut dyn FocalTimeScan, frames: usize) -> Vec<f64> {
     let mut out = Vec::with_capacity(frames);
     for _ in 0..frames {

@@ -33,13 +33,11 @@ impl Part {
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
     /// Indices of its scans among `count`, from 0.
-    #[must_use]
     pub fn scans(self, count: usize) -> impl ExactSizeIterator<Item = usize> {
         (self.index.saturating_sub(1)..count).step_by(self.of.max(1))
     }
 
     /// Name of the file with its results.
-    #[must_use]
     pub fn file_name(self) -> String {
         format!("shard-{}-of-{}.json", self.index, self.of)
     }
@@ -142,7 +140,6 @@ pub enum MergeError {
 
 impl Shard {
     /// The results on `part` of the scans of `subject`.
-    #[must_use]
     pub fn new(part: Part, subject: EvaluatedScans, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
     }

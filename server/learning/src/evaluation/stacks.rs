@@ -260,7 +260,6 @@ impl StackReport {
     }
 
     /// The figures as Markdown: one row for each stack and scale, then each policy compared with the MGM hill-climber.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let Some(first) = self.stacks.first() else { return String::new() };
         let names: Vec<&str> = first.rows.iter().map(|row| row.policy.as_str()).collect();

@@ -87,13 +87,11 @@ impl Clip {
     }
 
     /// The picture at time `t`. After its end the clip runs backwards, then forwards again, and so on.
-    #[must_use]
     pub fn at(&self, t: usize) -> &GrayImage {
         &self.frames[self.index(t)]
     }
 
     /// The picture at time `t` at half the resolution: means of 2x2 pixels.
-    #[must_use]
     pub fn coarse_at(&self, t: usize) -> &GrayImage {
         let index = self.index(t);
         let picture = &*self.frames[index];
@@ -105,7 +103,6 @@ impl Clip {
     }
 
     /// Number of pictures, at least 1.
-    #[must_use]
     #[allow(clippy::len_without_is_empty, reason = "a clip is never empty")]
     pub const fn len(&self) -> usize {
         self.frames.len()
@@ -125,7 +122,6 @@ impl Clip {
     }
 
     /// Where patches may lie.
-    #[must_use]
     pub const fn area(&self) -> Area {
         self.area
     }

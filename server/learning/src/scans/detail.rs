@@ -23,7 +23,6 @@ const LEAST_PEAK: f64 = 1.2;
 pub struct NothingToFocusOn(pub usize);
 
 /// Number of scans in `set` without detail: in no frame does even the sharpest patch show any.
-#[must_use]
 pub fn without_detail(set: &dyn ScanSet) -> usize {
     let blank = |index: &usize| {
         let (mut scan, frames) = set.scan(*index);

@@ -18,7 +18,6 @@ pub struct RawMosaics {
 
 impl RawMosaics {
     /// Mosaics in `format`; if it is `None`, in the one of the first file's length.
-    #[must_use]
     pub fn new(format: Option<PixelFormat>) -> Self {
         Self { format, is_given: format.is_some(), is_noted: false }
     }
@@ -51,7 +50,6 @@ impl RawMosaics {
 }
 
 /// The raw mosaics directly in `folder`, sorted by name; none if it cannot be read.
-#[must_use]
 pub fn mosaics_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_mosaic = |path: &PathBuf| is_raw(path) && !path.file_name().is_some_and(is_systems_own);

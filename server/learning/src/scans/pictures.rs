@@ -51,13 +51,11 @@ pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> 
 }
 
 /// The middle of brain phantom `index` of `split`, sharp.
-#[must_use]
 pub fn sharp_phantom(split: Split, index: u64) -> GrayImage {
     sharp_phantom_of(split, index, SIDE)
 }
 
 /// The middle `side` x `side` pixels of brain phantom `index` of `split`, sharp.
-#[must_use]
 pub fn sharp_phantom_of(split: Split, index: u64, side: usize) -> GrayImage {
     Scene::new(split.first_seed() + index).sharp_gray(side, side)
 }

@@ -85,27 +85,23 @@ impl PlaneStack {
     }
 
     /// Width and height in pixels.
-    #[must_use]
     pub const fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
     /// First and last position.
-    #[must_use]
     pub fn range(&self) -> (f64, f64) {
         (f64::from(self.positions[0]), f64::from(self.positions[self.positions.len() - 1]))
     }
 
     /// The position at which the patch with its corner at `(x, y)` is sharpest: where its mean
     /// gradient magnitude peaks, refined by a parabola through the peak and its neighbours.
-    #[must_use]
     pub fn sharpest(&self, corner: (usize, usize)) -> f64 {
         f64::from(self.sharpest[self.place(corner)])
     }
 
     /// As [`PlaneStack::sharpest`], but only among the positions from `low` to `high`. A patch that holds several
     /// depths has several peaks, and the highest may lie outside.
-    #[must_use]
     pub fn sharpest_within(&self, corner: (usize, usize), (low, high): (f64, f64)) -> f64 {
         let sharpest = self.sharpest(corner);
         if (low..=high).contains(&sharpest) {
@@ -136,7 +132,6 @@ impl PlaneStack {
     /// The patch with its corner at `corner` and the focal plane at `position`: a mix of the two pictures around that
     /// position. Beyond the first or last picture, that picture. If `corner` is too close to the border or beyond it,
     /// the nearest patch inside.
-    #[must_use]
     pub fn patch(&self, corner: (usize, usize), position: f64) -> Patch {
         let (x, y) = self.inside(corner);
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
@@ -145,7 +140,6 @@ impl PlaneStack {
     }
 
     /// What a policy sees, with [`PlaneStack::patch`] as the patch.
-    #[must_use]
     pub fn view(&self, corner: (usize, usize), position: f64) -> View {
         let corner = self.inside(corner);
         View::around(self.patch(corner, position), corner, self.size(), |square| {

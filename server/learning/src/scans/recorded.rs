@@ -125,7 +125,6 @@ impl Stack {
 
 /// The optimum by global search: the focal power whose patch has the greatest mean gradient magnitude (Budd et al.,
 /// MICCAI 2023). `patches` holds one for each of `powers`.
-#[must_use]
 pub fn sharpest(powers: &[FocalPower], patches: impl Iterator<Item = Patch>) -> FocalPower {
     let metrics = powers.iter().zip(patches).map(|(&power, patch)| (power, mgm(&patch)));
     let best = metrics.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -133,7 +132,6 @@ pub fn sharpest(powers: &[FocalPower], patches: impl Iterator<Item = Patch>) -> 
 }
 
 /// `count` focal powers evenly spread over the lens's range, at least 2.
-#[must_use]
 pub fn evenly_spread(count: usize) -> Vec<FocalPower> {
     let last = count.max(2) - 1;
     (0..=last).map(|index| FocalPower::nearest(index as f64 / last as f64)).collect()
@@ -141,7 +139,6 @@ pub fn evenly_spread(count: usize) -> Vec<FocalPower> {
 
 /// The indices `0..count` of the focal powers, in the order in which pose `pose` (from 0) takes them. The order is
 /// random, drawn from `seed`, so that a lens's hysteresis favours no focal power.
-#[must_use]
 pub fn capture_order(seed: u64, pose: usize, count: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream((1 << 33) + pose as u64);
@@ -152,7 +149,6 @@ pub fn capture_order(seed: u64, pose: usize, count: usize) -> Vec<usize> {
 
 impl RecordedScan {
     /// A scan of `poses`, each with a patch for each of `powers`. These must rise.
-    #[must_use]
     pub const fn new(powers: Vec<FocalPower>, poses: Vec<Stack>) -> Self {
         Self { powers, poses }
     }
@@ -182,7 +178,6 @@ impl RecordedScan {
 
     /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it. Makes only
     /// what is `kept`. `progress` is called after each pose.
-    #[must_use]
     pub fn phantom(
         trajectory: &Trajectory,
         seed: u64,
@@ -207,19 +202,16 @@ impl RecordedScan {
     }
 
     /// The poses.
-    #[must_use]
     pub fn poses(&self) -> &[Stack] {
         &self.poses
     }
 
     /// The optimum at pose `index`; beyond the last pose, that of the last.
-    #[must_use]
     pub fn optimum(&self, index: usize) -> FocalPower {
         self.poses.get(index).or(self.poses.last()).map_or(FocalPower::MIDDLE, |pose| pose.optimum)
     }
 
     /// The pose at frame `time` of an endless replay that runs forwards and backwards.
-    #[must_use]
     pub fn pose_at(&self, time: usize) -> usize {
         to_and_fro(time, self.poses.len())
     }
@@ -236,7 +228,6 @@ impl RecordedScan {
     }
 
     /// What is seen at pose `index` through a lens at `focal_power`; beyond the last pose, at the last.
-    #[must_use]
     pub fn see(&self, index: usize, focal_power: FocalPower, between: Interpolation) -> View {
         let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]).into() };
         let above = self.powers.partition_point(|&power| power <= focal_power).clamp(1, self.powers.len() - 1);
@@ -301,7 +292,6 @@ pub(super) fn put_square(picture: &mut GrayImage, square: Square, levels: &[f32]
 }
 
 /// The patch of a gray picture at `area`, in whole gray levels; black where `area` leaves the picture.
-#[must_use]
 pub fn patch_at(picture: &GrayImage, area: PatchArea) -> Patch {
     Patch(std::array::from_fn(|i| {
         let x = area.x + i % PATCH_SIDE;

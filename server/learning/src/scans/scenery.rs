@@ -22,7 +22,6 @@ struct Group {
 
 impl Scenery {
     /// Each of `groups` with the same share of the scans; empty ones are left out. `None` if all are empty.
-    #[must_use]
     pub fn evenly(groups: Vec<Vec<Scene>>) -> Option<Self> {
         let groups: Vec<Vec<Scene>> = groups.into_iter().filter(|scenes| !scenes.is_empty()).collect();
         let share = 1.0 / groups.len() as f64;

@@ -56,7 +56,6 @@ struct Batch {
 
 impl BeliefTrainer {
     /// A training from random weights on `scenery`, with its network on `device`.
-    #[must_use]
     pub fn new(recipe: BeliefRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(seed);
 

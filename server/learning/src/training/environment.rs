@@ -57,19 +57,16 @@ impl Environment {
     }
 
     /// The focal power that the lens reports.
-    #[must_use]
     pub const fn focal_power(&self) -> FocalPower {
         self.focal_power
     }
 
     /// The focal power at which the patch is in focus.
-    #[must_use]
     pub fn optimum(&self) -> FocalPower {
         self.scan.optimum()
     }
 
     /// How fast blur grows with the focal power error; `None` if the scene has no known rate.
-    #[must_use]
     pub fn blur(&self) -> Option<BlurRate> {
         self.scan.blur()
     }

@@ -24,7 +24,6 @@ pub enum Rule {
 }
 
 /// Scale of the learning rate when the share `done` (0..1) of the training is done: a half cosine from 1 to `floor`.
-#[must_use]
 pub fn half_cosine(done: f64, floor: f64) -> f64 {
     floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos())
 }
@@ -41,7 +40,6 @@ pub struct Flat {
 
 impl Flat {
     /// Moves the variables of `store` into one tensor.
-    #[must_use]
     pub fn of(store: &nn::VarStore) -> Self {
         let mut named: Vec<(String, Tensor)> = store.variables().into_iter().collect();
         named.sort_by(|a, b| a.0.cmp(&b.0));
@@ -73,7 +71,6 @@ fn joined(tensors: &[Tensor]) -> Tensor {
 }
 
 /// Splits `values` into consecutive views with the shapes of `variables`.
-#[must_use]
 pub fn parts(values: &Tensor, variables: &[Tensor]) -> Vec<Tensor> {
     let mut at = 0;
     let part = |variable: &Tensor| {
@@ -96,7 +93,6 @@ pub struct Optimiser {
 
 impl Optimiser {
     /// An optimiser of `store`'s variables. Moves them into one tensor.
-    #[must_use]
     pub fn new(rule: Rule, store: &nn::VarStore) -> Self {
         let flat = Flat::of(store);
         let state = [flat.values.zeros_like(), flat.values.zeros_like()];
@@ -104,7 +100,6 @@ impl Optimiser {
     }
 
     /// The variables.
-    #[must_use]
     pub const fn flat(&self) -> &Flat {
         &self.flat
     }

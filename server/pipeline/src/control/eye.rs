@@ -14,7 +14,6 @@ pub struct Eye {
 
 impl Eye {
     /// An eye for colour pictures, and for mosaics of the camera for which `reconstructor` is calibrated.
-    #[must_use]
     pub const fn new(reconstructor: Reconstructor) -> Self {
         Self { reconstructor }
     }
@@ -36,7 +35,6 @@ impl Eye {
     }
 
     /// Reconstructs the patch of `image` at `area`.
-    #[must_use]
     pub fn patch(&self, image: &FrameImage, area: PatchArea) -> Patch {
         match image {
             FrameImage::Mosaic(mosaic) => self.reconstructor.gray_patch(mosaic, area),
@@ -45,7 +43,6 @@ impl Eye {
     }
 
     /// Reconstructs what a policy with the field of view `field` sees of `image`, whose patch is at `area`.
-    #[must_use]
     pub fn look(&self, image: &FrameImage, area: PatchArea, field: FieldOfView) -> View {
         match (field, image) {
             (FieldOfView::Patch, _) => View::from(self.patch(image, area)),

@@ -61,7 +61,6 @@ impl LockWatch {
     }
 
     /// What was told last.
-    #[must_use]
     pub const fn told(&self) -> FocusLock {
         self.told
     }

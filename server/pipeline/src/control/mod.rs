@@ -205,7 +205,6 @@ pub struct ControlObserver {
 
 impl ControlHandle {
     /// The same access without the right to command the loop.
-    #[must_use]
     pub fn observer(&self) -> ControlObserver {
         ControlObserver { status: self.status.clone(), frames: Arc::clone(&self.frames), camera: self.camera.clone() }
     }

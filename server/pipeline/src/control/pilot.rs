@@ -35,7 +35,6 @@ pub struct HoldReason {
 
 impl HoldReason {
     /// A reason of kind `hold`.
-    #[must_use]
     pub fn new(hold: Hold, message: &str) -> Self {
         Self { hold, message: message.into() }
     }

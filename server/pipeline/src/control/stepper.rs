@@ -56,7 +56,6 @@ pub struct Stepper {
 
 impl Stepper {
     /// A loop that holds `lens` where it is until a command comes. Waits for a policy at most `patience` per frame.
-    #[must_use]
     pub fn new(lens: Box<dyn Lens>, eye: Eye, registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let start = lens.measured().unwrap_or(FocalPower::MIDDLE);
         Self {
@@ -309,37 +308,31 @@ impl Stepper {
     }
 
     /// The lens's health.
-    #[must_use]
     pub fn lens_health(&self) -> LensHealth {
         self.lens.health()
     }
 
     /// The last focal power that the lens accepted.
-    #[must_use]
     pub const fn focal_power(&self) -> FocalPower {
         self.asked
     }
 
     /// What people can point at.
-    #[must_use]
     pub const fn geometry(&self) -> PictureGeometry {
         self.geometry
     }
 
     /// Whether the patch follows the tissue.
-    #[must_use]
     pub const fn following(&self) -> Following {
         self.following
     }
 
     /// The policy that drives the lens, if any.
-    #[must_use]
     pub const fn policy(&self) -> Option<&PolicyName> {
         self.pilot.policy()
     }
 
     /// Why the lens is held; `None` if it is not.
-    #[must_use]
     pub fn hold_reason(&self) -> Option<&HoldReason> {
         self.lens_fault.as_ref().or(self.step_hold.as_ref())
     }

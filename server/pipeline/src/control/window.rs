@@ -28,7 +28,6 @@ pub struct LatencyFigures {
 
 impl LatencyFigures {
     /// Computes the figures of `latencies` in microseconds, and sorts them. Percentiles are by nearest rank.
-    #[must_use]
     pub fn of(latencies: &mut [u32]) -> Self {
         latencies.sort_unstable();
         let percentile = |percent: usize| {

@@ -32,7 +32,6 @@ pub struct Fit {
 
 impl Fit {
     /// The best fit within `longest` seconds, by least squares.
-    #[must_use]
     pub fn of(samples: &[Sample], longest: f64) -> Self {
         let mut delays = (0.0, longest);
         let mut settlings = (0.0, longest);
@@ -55,7 +54,6 @@ impl Fit {
     }
 
     /// Share of the step done `at` seconds after the command.
-    #[must_use]
     pub fn share(&self, at: f64) -> f64 {
         let since = at - self.delay;
         if since < 0.0 {
@@ -66,7 +64,6 @@ impl Fit {
     }
 
     /// The fit in the control loop's form.
-    #[must_use]
     pub fn dynamics(&self) -> LensDynamics {
         let seconds = |value: f64| Duration::from_secs_f64(value.max(0.0));
         LensDynamics { delay: seconds(self.delay), settling: seconds(self.settling) }

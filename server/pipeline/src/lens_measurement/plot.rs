@@ -7,7 +7,6 @@ use parfocal_base::plot::{Axis, Plot};
 const POINTS: u32 = 200;
 
 /// Share of the step over time, as SVG: a dot a frame, and the fit as a line.
-#[must_use]
 pub fn plot(measurement: &Measurement) -> String {
     let fit = &measurement.both;
     // Three times the lens's own time also shows how it came to rest.

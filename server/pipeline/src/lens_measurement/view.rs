@@ -22,13 +22,11 @@ pub struct CameraView {
 
 impl CameraView {
     /// The view of `camera` through `eye`, whose patch is at the picture's centre.
-    #[must_use]
     pub fn new(camera: Box<dyn Camera>, eye: Eye, clock: Arc<dyn Clock>) -> Self {
         Self { camera, eye, clock }
     }
 
     /// The current time.
-    #[must_use]
     pub fn now(&self) -> Moment {
         self.clock.now()
     }

@@ -67,19 +67,16 @@ impl Counts {
     }
 
     /// Viewers that want pictures of `size` now.
-    #[must_use]
     pub fn viewers(&self, size: Size) -> u64 {
         self.of(size).viewers.load(Ordering::Relaxed)
     }
 
     /// Frames encoded as JPEG of `size` since the start.
-    #[must_use]
     pub fn encoded(&self, size: Size) -> u64 {
         self.of(size).encoded.load(Ordering::Relaxed)
     }
 
     /// Bytes of JPEG of `size` made since the start.
-    #[must_use]
     pub fn jpeg_bytes(&self, size: Size) -> u64 {
         self.of(size).jpeg_bytes.load(Ordering::Relaxed)
     }

@@ -65,7 +65,6 @@ pub enum Side {
 impl Side {
     /// The side that `belief` (see [`Decision::belief`](parfocal_autofocus::Decision::belief)) is sure of, with the
     /// lens at `focal_power`.
-    #[must_use]
     pub fn of(belief: &[f32], focal_power: FocalPower) -> Self {
         let Sides { below, here, above } = Sides::of(belief, focal_power.get());
         let sides = [(here, Self::InFocus), (above, Self::Higher), (below, Self::Lower)];

@@ -10,7 +10,6 @@ use super::{EncodedFrame, LiveHandle, Viewer};
 impl LiveHandle {
     /// A source of frames, each at most once, at the size that the leading viewers get, or at the smallest if none
     /// leads.
-    #[must_use]
     pub fn follow(&self) -> Follower {
         let leaders = self.leaders.subscribe();
         let viewer = self.viewer(leading(&leaders.borrow()), false);

@@ -9,6 +9,7 @@ pub(super) type Leaders = [u32; Size::ALL.len()];
 
 /// Counts one viewer as leading, until dropped.
 #[derive(Debug)]
+#[must_use]
 pub(super) struct Lead {
     size: Size,
     leaders: watch::Sender<Leaders>,

@@ -60,25 +60,21 @@ impl LiveHandle {
     }
 
     /// The loop's latest frame, as far as the imaging thread takes it.
-    #[must_use]
     pub fn frames(&self) -> watch::Receiver<Option<Arc<ControlledFrame>>> {
         self.taken.subscribe()
     }
 
     /// The latest depth map. Maps are made while somebody holds such a receiver, outside of a session's settings.
-    #[must_use]
     pub fn depth_maps(&self) -> DepthMaps {
         self.depth_maps.subscribe()
     }
 
     /// The largest size of the camera's pictures.
-    #[must_use]
     pub fn largest(&self) -> Size {
         Size::ALL[self.frames.len() - 1]
     }
 
     /// Counts of the imaging threads' work so far.
-    #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
@@ -86,6 +82,7 @@ impl LiveHandle {
 
 /// One viewer among those of a size; leaves when dropped.
 #[derive(Debug)]
+#[must_use]
 struct Watcher {
     size: Size,
     frames: LatestFrame,

@@ -24,7 +24,6 @@ pub struct Viewer {
 impl LiveHandle {
     /// A viewer that may change its size, and gets `size` first. If it `leads`, a [`Follower`](super::Follower) gets
     /// the largest size that any leading viewer has.
-    #[must_use]
     pub fn viewer(&self, size: Size, leads: bool) -> Viewer {
         Viewer { live: self.clone(), leads, watcher: Some(self.join(size, leads)), coming: None, last: 0 }
     }
@@ -32,19 +31,16 @@ impl LiveHandle {
 
 impl Viewer {
     /// The size of the frames that it gets now; `None` while it looks away.
-    #[must_use]
     pub fn size(&self) -> Option<Size> {
         self.watcher.as_ref().map(|watcher| watcher.size)
     }
 
     /// The size that was last asked for; `None` while it looks away.
-    #[must_use]
     pub fn asked(&self) -> Option<Size> {
         self.coming.as_ref().or(self.watcher.as_ref()).map(|watcher| watcher.size)
     }
 
     /// Whether the first frame of a larger size has not arrived yet.
-    #[must_use]
     pub const fn is_growing(&self) -> bool {
         self.coming.is_some()
     }

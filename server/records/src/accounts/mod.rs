@@ -44,7 +44,6 @@ pub struct Accounts {
 
 impl Accounts {
     /// The accounts of the running server.
-    #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>, cost: Cost) -> Self {
         Self::new(AccountBook::of_server(store, Arc::clone(&clock)), clock, cost)
     }
@@ -63,7 +62,6 @@ impl Accounts {
     }
 
     /// The reader of the accounts' database.
-    #[must_use]
     pub const fn reader(&self) -> &Reader {
         self.book.reader()
     }

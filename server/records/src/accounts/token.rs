@@ -20,14 +20,12 @@ impl Token {
     }
 
     /// The token in `text`, which a browser sent; none if it does not have the form of a token.
-    #[must_use]
     pub fn sent(text: &str) -> Option<Self> {
         let is_token = text.len() == BYTES * 2 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
         is_token.then(|| Self(text.to_owned()))
     }
 
     /// The token as the browser sends it: 64 hexadecimal digits.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }

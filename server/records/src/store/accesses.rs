@@ -96,7 +96,6 @@ pub struct AccessLog {
 
 impl AccessLog {
     /// Records what `by` does through the server.
-    #[must_use]
     pub fn of_server(store: &Store, by: Actor, clock: Arc<dyn Clock>) -> Self {
         let folder = store.inner.folder.clone();
         let Actor { role, account } = by;
@@ -127,19 +126,16 @@ impl AccessLog {
     }
 
     /// The data folder.
-    #[must_use]
     pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The account of the person whose accesses it records; `None` if nobody is signed in.
-    #[must_use]
     pub const fn account(&self) -> Option<&AccountName> {
         self.account.as_ref()
     }
 
     /// The reader of the same database.
-    #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }

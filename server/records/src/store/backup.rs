@@ -170,7 +170,6 @@ pub struct VerifiedCopy {
 
 impl VerifiedCopy {
     /// The path of the file, which is removed when the path is dropped.
-    #[must_use]
     pub fn into_path(self) -> TempPath {
         self.file.into_temp_path()
     }
@@ -181,7 +180,6 @@ impl VerifiedCopy {
 /// # Errors
 /// If the file cannot be written, the database cannot be read, or the copy does not verify.
 #[boxed]
-#[must_use]
 pub async fn verified_copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
     copy_into(access_log, temporary_in(folder)?, "the backup").await
 }

@@ -70,13 +70,11 @@ pub enum BackupState {
 
 impl Backups {
     /// Starts without a backup. Removes what an earlier server left in the data folder `data`.
-    #[must_use]
     pub fn new(data: &Path) -> Self {
         Self(Downloads::new(data.join(FOLDER), KEPT))
     }
 
     /// Begins a backup for `by`, unless one is being made. `access_log` records it.
-    #[must_use]
     pub fn start(&self, access_log: AccessLog, by: AccountName) -> BackupState {
         self.0.start(NAME, by, make(access_log, self.0.folder().to_owned()));
         BackupState::Running

@@ -34,7 +34,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn keep_consent(
         &self,
         session: SessionId,

@@ -56,7 +56,6 @@ pub struct LatestCorrections(BTreeMap<(Subject, String, Field), String>);
 
 impl LatestCorrections {
     /// Takes the `corrections` of a session, in the order in which they were recorded.
-    #[must_use]
     pub fn of(corrections: &[StoredCorrection]) -> Self {
         let entry = |StoredCorrection { correction, .. }: &StoredCorrection| {
             ((correction.subject, correction.record.clone(), correction.field), correction.new.clone())
@@ -65,19 +64,16 @@ impl LatestCorrections {
     }
 
     /// The session's right participant; `None` if that was not corrected.
-    #[must_use]
     pub fn participant(&self, session: SessionId) -> Option<&str> {
         self.get(Subject::Session, session.to_string(), Field::Participant)
     }
 
     /// The right value of the answer with this key; `None` if it was not corrected.
-    #[must_use]
     pub fn value(&self, answer: &IdempotencyKey) -> Option<AnswerValue> {
         serde_json::from_str(self.get(Subject::Answer, answer.to_string(), Field::Value)?).ok()
     }
 
     /// The note on an answer or a comment, if it has one that was not erased.
-    #[must_use]
     pub fn note(&self, subject: Subject, key: &IdempotencyKey) -> Option<&str> {
         self.get(subject, key.to_string(), Field::Note).filter(|note| !note.is_empty())
     }
@@ -93,7 +89,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
         self.write(async |connection| {
             let number = Insert::into("corrections")

@@ -162,19 +162,16 @@ impl Store {
     }
 
     /// Number of this start of the server, from 1.
-    #[must_use]
     pub fn run(&self) -> i64 {
         self.inner.run
     }
 
     /// The reader of the same database.
-    #[must_use]
     pub fn reader(&self) -> &Reader {
         &self.inner.reader
     }
 
     /// How much telemetry was written or lost since the start of the server.
-    #[must_use]
     pub fn telemetry_counts(&self) -> &Counts {
         &self.inner.telemetry_counts
     }
@@ -199,13 +196,11 @@ impl Store {
     }
 
     /// How long writes took, and whether they failed, since the start of the server.
-    #[must_use]
     pub fn writes(&self) -> &Writes {
         &self.inner.writes
     }
 
     /// The data folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.inner.folder
     }
@@ -244,7 +239,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
         self.write(async |connection| {
             let number = Insert::into("device_events")
@@ -266,7 +260,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
         let wall = wall.to_string();
         self.write(async |connection| {

@@ -52,7 +52,6 @@ pub struct Erased(BTreeMap<(Erasable, String), Timestamp>);
 
 impl Erased {
     /// Takes the `erasures` of a session.
-    #[must_use]
     pub fn by(erasures: &[StoredErasure]) -> Self {
         let entry = |StoredErasure { erasure, .. }: &StoredErasure| {
             ((erasure.subject, erasure.record.clone()), erasure.stamp.wall)
@@ -61,7 +60,6 @@ impl Erased {
     }
 
     /// When the words of this record were erased, by the server's wall clock; `None` if they were not.
-    #[must_use]
     pub fn at(&self, subject: Erasable, record: &impl ToString) -> Option<Timestamp> {
         self.0.get(&(subject, record.to_string())).copied()
     }
@@ -75,7 +73,6 @@ impl Store {
     /// If the disk or database fails, or another program has the database open. Then copies of the words may remain in
     /// free pages of the file or in its log, until [`Store::finish_erasures`] succeeds or the server starts again.
     #[boxed]
-    #[must_use]
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
         self.write(async |connection| {
             // Deleted content is overwritten with zeros. The setting stays with this connection; the others do not need

@@ -84,7 +84,6 @@ pub enum StoreError {
 
 impl StoreError {
     /// Whether the disk or the database failed, and did not merely refuse a request.
-    #[must_use]
     pub const fn is_of_the_disk(&self) -> bool {
         match self {
             Self::Full | Self::ReadOnly | Self::Disk(_) | Self::Damaged(_) | Self::Shut | Self::Locked => true,

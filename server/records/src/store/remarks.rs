@@ -33,7 +33,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn keep_comment(&self, comment: &Comment) -> Result<KeepOutcome, StoreError> {
         let key = comment.key.to_string();
         let (kind, text) = said_columns(&comment.said);
@@ -78,7 +77,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn keep_answer(&self, answer: &Answer) -> Result<KeepOutcome, StoreError> {
         let key = answer.key.to_string();
         let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
@@ -193,7 +191,6 @@ impl Reader {
 
 /// The comments that the surgeon took back, each with when that was kept. A withdrawal that came too late to count is
 /// none.
-#[must_use]
 pub fn withdrawn(comments: &[(i64, Comment)]) -> BTreeMap<IdempotencyKey, Timestamp> {
     let withdrawn = |(_, comment): &(i64, Comment)| match comment.said {
         CommentContent::Withdrawal(key) if !comment.late => Some((key, comment.stamp.wall)),

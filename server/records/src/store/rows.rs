@@ -72,7 +72,6 @@ pub struct Answer {
 impl Answer {
     /// The answer in the form in which the answers to a question are compared. `run` is the run that kept it, and
     /// `clocks` has the clocks of that run.
-    #[must_use]
     pub fn given(&self, run: i64, clocks: &RunClocks) -> GivenAnswer {
         GivenAnswer {
             device: self.origin.device,
@@ -86,7 +85,6 @@ impl Answer {
 
 /// The standing of each of `answers`, such as whether it counts. `answers` are those of a session in the order they
 /// were kept, each with the run that kept it.
-#[must_use]
 pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<AnswerStanding> {
     let asked = |(run, answer): &(i64, Answer)| ((answer.segment, answer.question.clone()), answer.given(*run, clocks));
     by_question(answers.iter().map(asked))
@@ -103,7 +101,6 @@ pub struct DeviceReport {
 
 impl DeviceReport {
     /// How many the device held, and when it reported this, by `clocks`; `None` if it never reported.
-    #[must_use]
     pub fn told_on(&self, clocks: &RunClocks) -> Option<(u32, Timestamp)> {
         let (holding, run, at) = self.report?;
         Some((holding, clocks.wall(run, at)))
@@ -204,7 +201,6 @@ pub struct RunClocks(pub(super) BTreeMap<i64, Stamp>);
 impl RunClocks {
     /// The time of day of `at` in run `run`, counted from the wall clock at the start of that run. So setting the wall
     /// clock does not change the distances between times of a run.
-    #[must_use]
     pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
         let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };
         start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
@@ -212,7 +208,6 @@ impl RunClocks {
 
     /// When a comment or answer was entered that arrived at `at` in run `run`: the arrival minus its wait on the
     /// surgeon's device.
-    #[must_use]
     pub fn entered_at(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
         let arrived = self.wall(run, at);
         let waited = Duration::from_millis(origin.waited_millis.map_or(0, i64::unsigned_abs));

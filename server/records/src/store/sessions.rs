@@ -77,14 +77,12 @@ impl StoredSession {
     }
 
     /// When the withdrawal of its participant was recorded, and by which role; `None` without a withdrawal.
-    #[must_use]
     pub fn withdrawn(&self) -> Option<(Timestamp, Role)> {
         let withdrawal = self.events.iter().find(|(_, event)| matches!(event.kind, EventKind::Withdrawn { .. }));
         withdrawal.map(|(_, event)| (event.wall, event.by))
     }
 
     /// Decides whether what arrives for the session still counts. `clocks` are those of the server's starts.
-    #[must_use]
     pub fn grace(&self, clocks: &RunClocks) -> Grace {
         let mut grace = Grace::new(self.protocol().map_or(DEFAULT_GRACE, |protocol| protocol.grace));
         for (run, event) in &self.events {
@@ -100,7 +98,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn create_session(
         &self,
         new: &NewSession,
@@ -150,7 +147,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
         self.write(async |connection| {
             for event in events {
@@ -192,7 +188,6 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     #[boxed]
-    #[must_use]
     pub async fn session(&self, session: SessionId) -> Result<Option<StoredSession>, StoreError> {
         let row = sqlx::query("SELECT * FROM sessions WHERE session = ?")
             .bind(session.to_string())

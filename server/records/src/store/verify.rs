@@ -24,7 +24,6 @@ use parfocal_trial::commitment::Allocation;
 /// # Errors
 /// If there is no database, or it is of another version.
 #[boxed]
-#[must_use]
 pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
     let file = if path.is_dir() { path.join(DATABASE) } else { path.to_owned() };
     let snapshot = Reader::open_snapshot(&file).await?;

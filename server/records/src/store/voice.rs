@@ -84,32 +84,27 @@ pub struct VoiceRecording {
 
 impl VoiceRecording {
     /// Length of all pieces in bytes.
-    #[must_use]
     pub fn bytes(&self) -> i64 {
         self.pieces.iter().map(|piece| piece.bytes).sum()
     }
 
     /// How long it is, in seconds, as the page reported.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         let longest = self.pieces.iter().map(|piece| piece.through_ms).max().unwrap_or(0);
         longest as f64 / 1000.0
     }
 
     /// Media type of its sound; `None` before its first piece.
-    #[must_use]
     pub fn media_type(&self) -> Option<MediaType> {
         self.pieces.first().map(|piece| piece.media_type)
     }
 
     /// Why it ended; `None` if it was cut off.
-    #[must_use]
     pub fn ended(&self) -> Option<Ending> {
         self.pieces.iter().find_map(|piece| piece.ended)
     }
 
     /// Pieces that have not arrived, though a later one has.
-    #[must_use]
     pub fn missing(&self) -> usize {
         let last = self.pieces.iter().map(|piece| piece.piece).max().unwrap_or(0);
         (last as usize).saturating_sub(self.pieces.len())
@@ -136,7 +131,6 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     #[boxed]
-    #[must_use]
     pub async fn keep_voice(&self, new: &VoicePiece) -> Result<PieceKept, StoreError> {
         let comment = new.comment.to_string();
         let sha256 = hex::encode(Sha256::digest(&new.audio));

@@ -66,25 +66,21 @@ impl Default for Writes {
 
 impl Writes {
     /// Times of writing.
-    #[must_use]
     pub const fn times(&self) -> &WriteTimes {
         &self.times
     }
 
     /// How long the write under way has taken so far; `None` if there is none.
-    #[must_use]
     pub fn under_way_for(&self) -> Option<Duration> {
         self.marks().under_way.map(|began| began.elapsed())
     }
 
     /// How long writes have been failing; `None` if the last one worked.
-    #[must_use]
     pub fn failing_for(&self) -> Option<Duration> {
         self.marks().failing.map(|since| since.elapsed())
     }
 
     /// How long ago a write last failed; `None` if none ever did.
-    #[must_use]
     pub fn failed_ago(&self) -> Option<Duration> {
         self.marks().failed.map(|last| last.elapsed())
     }
@@ -118,6 +114,7 @@ impl Writes {
 
 /// A writer's turn; ends when dropped.
 #[derive(Debug)]
+#[must_use]
 pub(super) struct Turn<'a> {
     writes: &'a Writes,
     times: &'a Histogram,

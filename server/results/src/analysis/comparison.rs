@@ -137,7 +137,6 @@ pub struct Position {
 }
 
 /// Compares `outcome` between `policies`. Resamples and permutations are drawn from `seed`.
-#[must_use]
 pub fn compare(outcome: Outcome, policies: &[String], observations: &[Value], seed: u64) -> Comparison {
     let surgeons = surgeon_means(policies, observations);
     let blocks: Vec<Vec<f64>> = surgeons.iter().filter_map(|line| line.means.iter().copied().collect()).collect();

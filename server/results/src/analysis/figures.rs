@@ -11,7 +11,6 @@ const SURGEON: &str = "#767676";
 const ALL: &str = "#000000";
 
 /// The surgeons' means by policy, and below them the means by position; `None` if there are no values.
-#[must_use]
 pub fn figure(compared: &Comparison) -> Option<String> {
     let means = || compared.surgeons.iter().flat_map(|line| line.means.iter().flatten().copied());
     let positions = compared.position.means.iter().copied();

@@ -57,7 +57,6 @@ pub struct Value {
 
 /// The outcomes from the questions of `protocol`: each single answer, each score of a questionnaire after a setting,
 /// and the rank of each setting.
-#[must_use]
 pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
     let after_setting = protocol.after_segment.iter().flat_map(of_question);
     let settings = protocol.policies.len() * protocol.repeats;
@@ -67,13 +66,11 @@ pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
 }
 
 /// The outcomes of closing questions about the session as a whole.
-#[must_use]
 pub fn asked_of_session(protocol: &Protocol) -> Vec<Outcome> {
     protocol.closing.iter().filter(|question| !is_ranking(question)).flat_map(of_question).collect()
 }
 
 /// The outcomes from telemetry.
-#[must_use]
 pub fn driven() -> Vec<Outcome> {
     let outcome = |outcome: &str, label: &str, unit: &str, better, highest| Outcome {
         outcome: outcome.to_owned(),
@@ -94,7 +91,6 @@ pub fn driven() -> Vec<Outcome> {
 
 /// The values of the outcomes of [`driven`] in `motion`. Those that need the optimum are left out unless it is known
 /// for at least half of the frames.
-#[must_use]
 pub fn of_motion(motion: &LensMotion) -> Vec<(&'static str, f64)> {
     let mut values = Vec::new();
     if motion.seconds > 0.0 {
@@ -109,26 +105,22 @@ pub fn of_motion(motion: &LensMotion) -> Vec<(&'static str, f64)> {
 }
 
 /// The values of the outcomes of `question` in an answer to it.
-#[must_use]
 pub fn of_answer(question: &Question, value: &AnswerValue) -> Vec<(String, f64)> {
     let counted = measures(&question.kind, value).into_iter().filter(|measure| is_outcome(&question.kind, measure));
     counted.filter_map(|measure| Some((name(question, &measure), measure.value?))).collect()
 }
 
 /// The rank that a ranking gives each setting, in the order of the settings; `None` for a setting without a rank.
-#[must_use]
 pub fn of_ranks(question: &Question, value: &AnswerValue) -> Vec<Option<f64>> {
     measures(&question.kind, value).into_iter().map(|measure| measure.value).collect()
 }
 
 /// Whether `question` asks to rank all settings.
-#[must_use]
 pub const fn is_ranking(question: &Question) -> bool {
     matches!(question.kind, QuestionKind::Ranking { .. })
 }
 
 /// The name of the outcome of a ranking.
-#[must_use]
 pub fn rank_name(question: &Question) -> String {
     format!("{}/rank", question.id)
 }

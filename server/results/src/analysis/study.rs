@@ -22,7 +22,6 @@ use parfocal_records::store::{Reader, StoreError};
 /// # Errors
 /// If there is no such study, it is not unblinded, or the database failed.
 #[boxed]
-#[must_use]
 pub async fn analyse(reader: &Reader, name: &str) -> Result<Analysis, AnalysisError> {
     let records = database::read(reader, name).await?;
     // Permutations need much processor time, so keep them off the asynchronous threads.

@@ -4,7 +4,6 @@ use super::statistics::Interval;
 use parfocal_base::statistics::Method;
 
 /// `value` to `places` decimal places, with a typographic minus sign.
-#[must_use]
 pub fn decimals(value: f64, places: usize) -> String {
     let text = format!("{value:.places$}");
     let is_zero = text.trim_start_matches('-').chars().all(|digit| matches!(digit, '0' | '.'));
@@ -12,13 +11,11 @@ pub fn decimals(value: f64, places: usize) -> String {
 }
 
 /// A p value in words.
-#[must_use]
 pub fn p_words(p: f64) -> String {
     if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
 }
 
 /// How a p value was computed, in words.
-#[must_use]
 pub const fn method_words(method: Method) -> &'static str {
     match method {
         Method::Exact => "exact",
@@ -27,7 +24,6 @@ pub const fn method_words(method: Method) -> &'static str {
 }
 
 /// An interval as it follows its statistic; empty for `None`.
-#[must_use]
 pub fn interval_words(interval: Option<&Interval>, places: usize) -> String {
     interval.map_or_else(String::new, |Interval { low, high }| {
         format!(" (95 % interval {} to {})", decimals(*low, places), decimals(*high, places))
@@ -35,7 +31,6 @@ pub fn interval_words(interval: Option<&Interval>, places: usize) -> String {
 }
 
 /// `count` and the name of the thing; its plural must end in s.
-#[must_use]
 pub fn counted(count: usize, thing: &str) -> String {
     if count == 1 { format!("1 {thing}") } else { format!("{count} {thing}s") }
 }

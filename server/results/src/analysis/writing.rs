@@ -37,7 +37,6 @@ impl Analysis {
     }
 
     /// Name for a folder or file, without an extension.
-    #[must_use]
     pub fn folder_name(study: &str) -> String {
         format!("parfocal-{study}-analysis")
     }

@@ -11,14 +11,12 @@ use parfocal_records::store::export::verify::{Check, Verdict, not_part};
 use parfocal_records::store::export::{ExportFiles, SUMS};
 
 /// Whether `path` looks like a package: it has a folder with sessions.
-#[must_use]
 pub fn is_package(path: &Path) -> bool {
     path.join(SESSIONS).is_dir()
 }
 
 /// Checks the package in `folder` and returns every check, in order. With `expected`, a head known from elsewhere, it
 /// also checks that the history up to it is unchanged at the site where the head was noted.
-#[must_use]
 pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     let verdict = |outcome: Result<Verdict, String>| outcome.unwrap_or_else(Verdict::Failed);
     let checksums = Check { name: "checksums", verdict: verdict(checksums(folder)) };

@@ -97,7 +97,6 @@ impl PackageSource {
     }
 
     /// The export's folder within a package.
-    #[must_use]
     pub fn place(&self) -> String {
         format!("{SESSIONS}/{}", self.session)
     }

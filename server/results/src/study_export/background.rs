@@ -76,7 +76,6 @@ pub enum StudyExportState {
 
 impl StudyExports {
     /// Starts without exports. Removes those that an earlier server left in the data folder `data`.
-    #[must_use]
     pub fn new(data: &Path) -> Self {
         Self(Downloads::new(data.join(FOLDER), KEPT))
     }
@@ -121,7 +120,6 @@ impl StudyExports {
 
     /// Starts an export of `study`, unless one is already running, and returns the state. `access_log` records the
     /// export.
-    #[must_use]
     pub fn start(&self, access_log: AccessLog, study: &str, unblinded: bool) -> StudyExportState {
         let making = make(self.clone(), access_log, study.to_owned(), unblinded);
         self.0.start(study, unblinded, async { making.await.map_err(|error| error.to_string()) });

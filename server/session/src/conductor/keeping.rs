@@ -16,7 +16,6 @@ impl Conductor {
     /// Keeps time limits, prompts and the remaining time, records what waits for the disk, and erases voice when its
     /// retention period is over. Never returns; drop it to stop.
     #[boxed]
-    #[must_use]
     pub async fn run(self) {
         let keeping_time = async {
             loop {

@@ -55,7 +55,6 @@ impl From<ProtocolError> for LibraryError {
 impl Library {
     /// The text of a study's definition to start from, for a study that `lead` unblinds; `None` if no protocol is for
     /// studies.
-    #[must_use]
     pub fn study_template(&self, lead: &str) -> Option<String> {
         let protocol = self.protocols.values().find(|protocol| !protocol.practice)?;
         Some(Definition::template(protocol, lead))
@@ -79,7 +78,6 @@ impl Library {
     }
 
     /// The protocol called `name`.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<&Protocol> {
         self.protocols.get(name)
     }
@@ -90,13 +88,11 @@ impl Library {
     }
 
     /// All names, separated by commas.
-    #[must_use]
     pub fn names(&self) -> String {
         self.protocols.keys().map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 
     /// Summaries of all protocols, ordered by name.
-    #[must_use]
     pub fn summaries(&self) -> Vec<ProtocolSummary> {
         self.protocols.values().map(ProtocolSummary::of).collect()
     }

@@ -192,26 +192,22 @@ impl Conductor {
 
     /// The session under way, or one that has just ended until it is dismissed, as the surgeon may see it. The receiver
     /// gets every change.
-    #[must_use]
     pub fn surgeon_view(&self) -> watch::Receiver<Option<Arc<SurgeonView>>> {
         self.shared.surgeon.subscribe()
     }
 
     /// The same for the operator.
-    #[must_use]
     pub fn operator_view(&self) -> watch::Receiver<Option<Arc<OperatorView>>> {
         self.shared.operator.subscribe()
     }
 
     /// The session that has neither ended nor been closed, if there is one.
-    #[must_use]
     pub fn session_under_way(&self) -> Option<SessionId> {
         let live = self.shared.live();
         live.shown().filter(|course| !course.state.phase().has_ended()).map(Course::session)
     }
 
     /// The session under way, and what is to be recorded of it, from its start to its end.
-    #[must_use]
     pub fn to_record(&self) -> Option<(SessionId, Record)> {
         let live = self.shared.live();
         let course = live.shown()?;

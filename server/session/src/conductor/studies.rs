@@ -50,7 +50,6 @@ impl Studies {
     }
 
     /// Reads the database.
-    #[must_use]
     pub const fn reader(&self) -> &Reader {
         self.book.reader()
     }
@@ -66,7 +65,6 @@ impl Studies {
     /// # Errors
     /// If the definition is malformed, a study of that name exists, or it has no such site.
     #[boxed]
-    #[must_use]
     pub async fn plan(
         &self,
         way: Channel,

@@ -11,7 +11,6 @@ use parfocal_trial::study::state::Change;
 
 impl Conductor {
     /// Reads and changes studies.
-    #[must_use]
     pub fn studies(&self) -> &Studies {
         &self.shared.studies
     }

@@ -36,7 +36,6 @@ pub struct BandLevel {
 
 impl PlaceSpectrum {
     /// The table of `spectrum`, which was taken by a sensor with `calibration`.
-    #[must_use]
     pub fn new(calibration: &Calibration, spectrum: &Spectrum) -> Self {
         let level = |band: usize| {
             let reflectance = spectrum.reflectance.map(|levels| levels[band]);

@@ -60,7 +60,6 @@ pub struct Stepping<'a> {
 
 impl<'a> Stepping<'a> {
     /// Prepares `policy` for the first frame of `recording`, which was made with `calibration`.
-    #[must_use]
     pub fn new(recording: &'a Recording, calibration: &Calibration, policy: Box<dyn Policy>) -> Self {
         let eye = Eye::new(Reconstructor::new(calibration));
         Self { recording, policy, eye, jumps: None, next: 0 }

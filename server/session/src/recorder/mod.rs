@@ -71,7 +71,6 @@ struct Active {
 
 impl Recordings {
     /// A recorder that records nothing yet. It follows protocols only while [`Recordings::run`] is awaited.
-    #[must_use]
     pub fn new(parts: RecorderParts) -> Self {
         Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
     }

@@ -129,7 +129,6 @@ impl Reports {
     /// # Errors
     /// If there is no such session, or the database failed.
     #[boxed]
-    #[must_use]
     pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
         let course = self.load(session).await?;
         let withdrawal = self.withdrawal(&course).await?;

@@ -166,7 +166,6 @@ impl StudyDetail {
     /// # Errors
     /// If there is no such study, or the database failed.
     #[boxed]
-    #[must_use]
     pub async fn read(studies: &Studies, name: &str) -> Result<Self, ConductError> {
         let study = studies.stored(name).await?;
         let mut detail = Self::of(&study);
@@ -180,7 +179,6 @@ impl StudyDetail {
     }
 
     /// The details of `study`; `outstanding` is 0, and `concerns` is empty.
-    #[must_use]
     pub fn of(study: &StoredStudy) -> Self {
         let definition = &study.definition;
         let line = line(study);

@@ -209,7 +209,6 @@ impl Reports {
     /// # Errors
     /// If there is no such session, its participant withdrew, or the database failed.
     #[boxed]
-    #[must_use]
     pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;
@@ -294,14 +293,12 @@ pub struct Played {
 
 impl Played {
     /// Seconds from the session's start to the moment `monotonic_ns` of run `run`; negative before the start.
-    #[must_use]
     pub fn seconds_at(&self, run: i64, monotonic_ns: i64) -> f64 {
         let at = Moment::from_nanos(u64::try_from(monotonic_ns).unwrap_or(0));
         seconds(self.start, self.clocks.wall(run, at))
     }
 
     /// Seconds from the session's start to `wall`, by the wall clock alone.
-    #[must_use]
     pub fn seconds_of(&self, wall: Timestamp) -> f64 {
         seconds(self.start, wall)
     }
@@ -313,7 +310,6 @@ impl Reports {
     /// # Errors
     /// If `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
     #[boxed]
-    #[must_use]
     pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
         let course = self.load(session).await?;
         permission::check_reading(course.state.withdrawn())?;

@@ -18,7 +18,6 @@ use measure::in_words as item_in_words;
 
 /// Whether `value` is an answer to a question of `kind` in a session of `settings` settings. A questionnaire also takes
 /// partial answers.
-#[must_use]
 pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
     match (kind, value) {
         (QuestionKind::Text, AnswerValue::Text(_)) => true,
@@ -37,7 +36,6 @@ pub fn fits(kind: &QuestionKind, value: &AnswerValue, settings: usize) -> bool {
 }
 
 /// The score of the System Usability Scale; `None` for another kind of question, and if an item is missing.
-#[must_use]
 pub fn sus_score(kind: Option<&QuestionKind>, value: &AnswerValue) -> Option<f64> {
     match (kind, value) {
         (Some(QuestionKind::Sus { .. }), AnswerValue::Points(items)) => sus::score(items),
@@ -46,7 +44,6 @@ pub fn sus_score(kind: Option<&QuestionKind>, value: &AnswerValue) -> Option<f64
 }
 
 /// The answers that a question of `kind` takes in a session of `settings` settings, in words.
-#[must_use]
 pub fn expected(kind: &QuestionKind, settings: usize) -> String {
     let gradations = |scales: &[Scale]| format!("{} gradations from 1 to {}", scales.len(), workload::GRADATIONS);
     match kind {
@@ -73,7 +70,6 @@ pub fn expected(kind: &QuestionKind, settings: usize) -> String {
 const OPEN: &str = "0 for an item that stays as it was";
 
 /// The items and scores of an answer; empty for a text.
-#[must_use]
 pub fn measures(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
     match (kind, value) {
         (QuestionKind::Likert { .. }, AnswerValue::Point(point)) => likert::measures(*point),
@@ -90,7 +86,6 @@ pub fn measures(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
 }
 
 /// An answer in words, for people. Without `kind` the points are listed without their meaning.
-#[must_use]
 pub fn in_words(kind: Option<&QuestionKind>, value: &AnswerValue) -> String {
     match (kind, value) {
         (Some(QuestionKind::Likert { labels, .. }), AnswerValue::Point(point)) => likert::in_words(labels, *point),

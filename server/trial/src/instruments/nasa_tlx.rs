@@ -10,7 +10,6 @@ use parfocal_language::Language;
 /// The question with its six scales in `language`. `None` where we have no published translation whose wording is
 /// certain: the French one (Cegarra & Morgado 2009) and the Spanish one (Arquer & Nogareda 2001, INSST, NTP 544) are
 /// published, but we have not seen all of their scales in print.
-#[must_use]
 pub fn question(language: Language) -> Option<QuestionKind> {
     let scales = match language {
         Language::English => english(),
@@ -94,7 +93,6 @@ fn german() -> Vec<Scale> {
 }
 
 /// The six ratings and their mean. The mean is missing if a rating is.
-#[must_use]
 pub fn measures(scales: &[Scale], items: &[u8]) -> Vec<Measure> {
     let mut measures = workload::ratings(scales, items);
     let ratings: Vec<Option<f64>> = measures.iter().map(|rating| rating.value).collect();

@@ -9,14 +9,12 @@ use parfocal_language::Language;
 const WORDS: [&str; 3] = ["No", "Not sure", "Yes"];
 
 /// Whether `point` is one of the three answers.
-#[must_use]
 pub fn fits(point: u8) -> bool {
     (1..=WORDS.len()).contains(&usize::from(point))
 }
 
 /// The question that follows a yes: the guess alone does not tell what gave the setting away. `closing` says whether
 /// the recognition question `id` is about all settings.
-#[must_use]
 pub fn follow_up(id: &str, closing: bool, language: Language) -> Question {
     let text = if closing { "recognised-which" } else { "recognised-this" };
     Question {
@@ -29,13 +27,11 @@ pub fn follow_up(id: &str, closing: bool, language: Language) -> Question {
 }
 
 /// 1 for no, 2 for not sure, 3 for yes.
-#[must_use]
 pub fn measures(point: u8) -> Vec<Measure> {
     vec![Measure::item("recognised", "Recognised: 1 no, 2 not sure, 3 yes", given(point))]
 }
 
 /// The answer in words.
-#[must_use]
 pub fn in_words(point: u8) -> String {
     let word = usize::from(point).checked_sub(1).and_then(|place| WORDS.get(place));
     word.map_or_else(|| point.to_string(), |word| (*word).to_owned())

@@ -11,7 +11,6 @@ use parfocal_language::Language;
 
 /// The question with its six scales. If it is `weighted`, it also has the 15 pairs. `None` where we know no published
 /// translation.
-#[must_use]
 pub fn question(weighted: bool, language: Language) -> Option<QuestionKind> {
     if language != Language::English {
         return None;
@@ -56,7 +55,6 @@ fn weights(scales: usize, pairs: &[Pair], choices: &[u8]) -> Option<Vec<f64>> {
 
 /// The six ratings and their mean. With pairs, also the six weights and the weighted index. A measure that needs a
 /// missing item is missing too.
-#[must_use]
 pub fn measures(scales: &[Scale], pairs: &[Pair], items: &[u8]) -> Vec<Measure> {
     let (gradations, choices) = items.split_at_checked(scales.len()).unwrap_or((items, &[]));
     let mut measures = workload::ratings(scales, gradations);

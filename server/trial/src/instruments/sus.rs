@@ -73,7 +73,6 @@ const FRENCH: Wording = Wording {
 /// The question in `language`. `None` where we have no published translation whose wording is certain: there are
 /// several Spanish ones (such as Sevilla-Gonzalez et al. 2020, JMIR Human Factors 7:e21161), which we have not seen in
 /// print.
-#[must_use]
 pub fn question(language: Language) -> Option<QuestionKind> {
     let Wording { items, low, high } = match language {
         Language::English => ENGLISH,
@@ -85,7 +84,6 @@ pub fn question(language: Language) -> Option<QuestionKind> {
 }
 
 /// Whether `items` are points of all items (1 to 5), or of some of them (0 for the others).
-#[must_use]
 pub fn fits(items: &[u8]) -> bool {
     items.len() == ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
 }
@@ -93,7 +91,6 @@ pub fn fits(items: &[u8]) -> bool {
 /// The score, 0..=100 in steps of 2.5, of ten items from 1 (strongly disagree) to 5 (strongly agree): odd items count
 /// `item - 1`, even ones `5 - item`, and the sum is multiplied by 2.5 (Brooke 1996). `None` if an item is missing.
 /// Brooke asks respondents to mark the middle point instead of omitting an item; we leave that to the surgeon.
-#[must_use]
 pub fn score(items: &[u8]) -> Option<f64> {
     if items.len() != ITEMS || !items.iter().all(|item| (1..=5).contains(item)) {
         return None;
@@ -103,7 +100,6 @@ pub fn score(items: &[u8]) -> Option<f64> {
 }
 
 /// The ten items and the score.
-#[must_use]
 pub fn measures(items: &[u8]) -> Vec<Measure> {
     let item = |(number, &point): (usize, &u8)| {
         Measure::item(format!("item-{number}"), format!("Item {number}"), given(point))

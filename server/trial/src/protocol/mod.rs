@@ -102,46 +102,39 @@ pub struct Prompt {
 
 impl Protocol {
     /// Number of segments in a session.
-    #[must_use]
     pub fn settings(&self) -> usize {
         self.policies.len() * self.repeats
     }
 
     /// Number of sessions whose orders are drawn together from one seed: 1 if they are plainly shuffled.
-    #[must_use]
     pub fn set_size(&self) -> usize {
         self.order.algorithm().set_size(self.policies.len())
     }
 
     /// Draws the order of session `index` (from 0) of the set with this seed: the policy of each segment.
-    #[must_use]
     pub fn draw(&self, seed: Seed, index: usize) -> Vec<PolicyName> {
         let order = self.order.algorithm().draw(seed, self.policies.len(), self.repeats, index);
         order.into_iter().map(|policy| self.policies[policy].clone()).collect()
     }
 
     /// SHA-256 of the TOML text.
-    #[must_use]
     pub fn sha256(&self) -> [u8; 32] {
         Sha256::digest(self.source.as_bytes()).into()
     }
 
     /// The question with this id: among those after a segment if `after_segment`, otherwise among the closing
     /// questions.
-    #[must_use]
     pub fn question(&self, id: &str, after_segment: bool) -> Option<&Question> {
         let questions = if after_segment { &self.after_segment } else { &self.closing };
         questions.iter().find(|question| question.id == id)
     }
 
     /// The prompt to show when `inspected` has been inspected in a segment; none if none is due.
-    #[must_use]
     pub fn prompt_at(&self, inspected: Duration) -> Option<&Prompt> {
         self.prompts.iter().rev().find(|prompt| prompt.at <= inspected && inspected < prompt.at + self.prompt_stay)
     }
 
     /// The next time inspected, after `inspected`, at which the shown prompt changes; none if it stays as it is.
-    #[must_use]
     pub fn next_prompt_change(&self, inspected: Duration) -> Option<Duration> {
         self.prompts
             .iter()

@@ -43,7 +43,6 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
 }
 
 /// The events that the passing of time causes: the end of a segment at its time limit.
-#[must_use]
 pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
     if !state.running() || state.inspected(now) < state.plan.limit {
         return Vec::new();
@@ -103,7 +102,6 @@ fn not_inspecting(state: &SessionState, said: &'static str) -> Refusal {
 
 /// The events that are caused by what the surgeon's tablets report: that none shows the page any longer, or one does
 /// again. If none ever did, nothing follows, as nobody can go away who was never there.
-#[must_use]
 pub fn decide_tablet(state: &SessionState, presence: Presence, now: Moment) -> Vec<EventKind> {
     if state.ended() || state.phase == Phase::Ready {
         return Vec::new();
@@ -127,7 +125,6 @@ pub fn decide_tablet(state: &SessionState, presence: Presence, now: Moment) -> V
 }
 
 /// The events that are caused by a picture on the surgeon's page that is smaller than the protocol allows.
-#[must_use]
 pub fn decide_small_picture(state: &SessionState, now: Moment) -> Vec<EventKind> {
     if state.running() { vec![paused_by_system(state, reason::SMALL_PICTURE, now)] } else { Vec::new() }
 }
@@ -137,7 +134,6 @@ fn paused_by_system(state: &SessionState, reason: &str, now: Moment) -> EventKin
 }
 
 /// The events that a restart of the server causes. `inspected` is the known time inspected in the segment.
-#[must_use]
 pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
     if state.ended() || state.phase == Phase::Ready {
         return Vec::new();

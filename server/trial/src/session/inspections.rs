@@ -20,7 +20,6 @@ pub struct Inspection<T> {
 
 impl<T: Copy> Inspection<T> {
     /// The event with which it was inspected to the end; `None` if it was not.
-    #[must_use]
     pub fn finished(&self) -> Option<T> {
         self.ended.filter(|_| self.inspected.is_some())
     }

@@ -62,7 +62,6 @@ pub struct Plan {
 
 impl Plan {
     /// The plan of a session with this protocol and these segments.
-    #[must_use]
     pub fn new(protocol: &Protocol, segments: Vec<SegmentId>) -> Self {
         Self {
             segments,
@@ -77,7 +76,6 @@ impl Plan {
     }
 
     /// Place of `segment` in the session, from 0.
-    #[must_use]
     pub fn position(&self, segment: SegmentId) -> Option<usize> {
         self.segments.iter().position(|&known| known == segment)
     }
@@ -142,7 +140,6 @@ struct Answered {
 
 impl SessionState {
     /// The state of a new session.
-    #[must_use]
     pub const fn new(plan: Plan) -> Self {
         Self {
             plan,
@@ -170,61 +167,51 @@ impl SessionState {
     }
 
     /// The session's plan.
-    #[must_use]
     pub const fn plan(&self) -> &Plan {
         &self.plan
     }
 
     /// The session's phase. It does not change while the session is paused.
-    #[must_use]
     pub const fn phase(&self) -> Phase {
         self.phase
     }
 
     /// What paused the session; none if it is not paused.
-    #[must_use]
     pub const fn paused(&self) -> Option<PauseCause> {
         self.paused
     }
 
     /// Whether the operator may focus by hand: while the session is paused, and after an abort.
-    #[must_use]
     pub fn may_be_focused_by_hand(&self) -> bool {
         self.phase == Phase::Aborted || (self.paused.is_some() && !self.ended())
     }
 
     /// Place of the patch.
-    #[must_use]
     pub const fn patch(&self) -> PatchPlace {
         self.pointed.patch
     }
 
     /// Whether the focus is held on request.
-    #[must_use]
     pub const fn focus_held(&self) -> bool {
         self.pointed.held
     }
 
     /// Numbers of the events of people who paused the session without giving a reason, oldest first.
-    #[must_use]
     pub fn unreasoned(&self) -> &[u32] {
         &self.unreasoned
     }
 
     /// Whether the session was completed or aborted.
-    #[must_use]
     pub const fn ended(&self) -> bool {
         self.phase.has_ended()
     }
 
     /// Whether the session was unblinded.
-    #[must_use]
     pub const fn unblinded(&self) -> bool {
         self.unblinded
     }
 
     /// Whether the participant withdrew.
-    #[must_use]
     pub const fn withdrawn(&self) -> bool {
         self.withdrawn
     }
@@ -235,33 +222,28 @@ impl SessionState {
     }
 
     /// Number of segments that are done, including their questions.
-    #[must_use]
     pub const fn done(&self) -> usize {
         self.done
     }
 
     /// The current segment, from its notice to the end of its questions; none outside that.
-    #[must_use]
     pub fn segment(&self) -> Option<SegmentId> {
         let under_way = matches!(self.phase, Phase::Notice | Phase::Inspecting | Phase::Questions);
         self.plan.segments.get(self.done).copied().filter(|_| under_way)
     }
 
     /// Time inspected in the current segment, without pauses, and never more than the limit.
-    #[must_use]
     pub fn inspected(&self, now: Moment) -> Duration {
         let running = self.running_since.map_or(Duration::ZERO, |since| now.since(since));
         (self.inspected + running).min(self.plan.limit)
     }
 
     /// Whether the segment's clock is running.
-    #[must_use]
     pub const fn running(&self) -> bool {
         self.running_since.is_some()
     }
 
     /// The questions that are asked now.
-    #[must_use]
     pub fn questions(&self) -> &[Question] {
         match self.phase {
             Phase::Questions => &self.plan.after_segment,
@@ -271,7 +253,6 @@ impl SessionState {
     }
 
     /// The answer to `question` that counts. The question was asked after `segment`, or at the end if that is `None`.
-    #[must_use]
     pub fn answer(&self, segment: Option<SegmentId>, question: &str) -> Option<&AnswerValue> {
         self.answers.get(&(segment, question.to_owned()))?.counts.as_ref()
     }
@@ -285,7 +266,6 @@ impl SessionState {
 
     /// Whether answers to the questions about `segment` (`None`: the closing questions) are kept. They always are once
     /// the questions have been shown. [`Grace`](super::grace::Grace) decides whether a late answer counts.
-    #[must_use]
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {
             None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.plan.segments.len(),

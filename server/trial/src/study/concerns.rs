@@ -7,7 +7,6 @@ use crate::protocol::Protocol;
 
 /// The concerns about `definition`, each a sentence. `accounts` are those that are enabled, and `here` the sites that
 /// this database runs.
-#[must_use]
 pub fn concerns(definition: &Definition, accounts: &[Account], here: &[String]) -> Vec<String> {
     let sites = definition.sites.iter().filter(|site| here.contains(&site.name));
     let lists = sites.flat_map(|site| definition.protocols.iter().map(move |protocol| (site, protocol)));

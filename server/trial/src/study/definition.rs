@@ -32,7 +32,6 @@ pub struct StudyName(String);
 
 impl StudyName {
     /// The name as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -84,7 +83,6 @@ pub struct Site {
 
 impl Site {
     /// Number of places in each list of the site.
-    #[must_use]
     pub const fn places(&self) -> usize {
         self.surgeons + self.spares
     }
@@ -165,13 +163,11 @@ impl Definition {
     }
 
     /// SHA-256 of the TOML text, in hexadecimal, as `sha256sum` prints it for the file.
-    #[must_use]
     pub fn sha256(&self) -> String {
         hex::encode(Sha256::digest(self.source.as_bytes()))
     }
 
     /// A definition to start from, for a study by `protocol` that `lead` unblinds.
-    #[must_use]
     pub fn template(protocol: &Protocol, lead: &str) -> String {
         let in_a_set = protocol.set_size();
         let surgeons = in_a_set * 12_usize.div_ceil(in_a_set);
@@ -206,13 +202,11 @@ impl Definition {
     }
 
     /// The site with this name, if there is one.
-    #[must_use]
     pub fn site(&self, name: &str) -> Option<&Site> {
         self.sites.iter().find(|site| site.name == name)
     }
 
     /// The protocol with this name, if the study has it.
-    #[must_use]
     pub fn protocol(&self, name: &str) -> Option<&Protocol> {
         self.protocols.iter().find(|protocol| protocol.name == name)
     }

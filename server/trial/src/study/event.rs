@@ -50,7 +50,6 @@ pub enum StudyEventKind {
 
 impl StudyEventKind {
     /// The kind's name, as in the database and in exports.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Planned => "planned",
@@ -64,7 +63,6 @@ impl StudyEventKind {
     }
 
     /// The kind with this name, with the other fields of its record. None if they do not fit together.
-    #[must_use]
     pub fn of(name: &str, session: Option<SessionId>, commitment: Option<String>) -> Option<Self> {
         Some(match (name, session) {
             ("planned", None) => Self::Planned,
@@ -79,7 +77,6 @@ impl StudyEventKind {
     }
 
     /// The session that the event is about, if any.
-    #[must_use]
     pub const fn session(&self) -> Option<SessionId> {
         match self {
             Self::SessionWithdrawn { session } | Self::SessionUnblinded { session } => Some(*session),
@@ -88,7 +85,6 @@ impl StudyEventKind {
     }
 
     /// The commitment that the event publishes, if any.
-    #[must_use]
     pub fn commitment(&self) -> Option<&str> {
         match self {
             Self::Opened { commitment } => commitment.as_deref(),
@@ -97,7 +93,6 @@ impl StudyEventKind {
     }
 
     /// A description in words. `participant` returns the code of a session's participant.
-    #[must_use]
     pub fn in_words(&self, participant: impl Fn(SessionId) -> String) -> String {
         match self {
             Self::Planned => "Study planned".to_owned(),

@@ -53,7 +53,6 @@ pub struct ListPlace {
 
 impl Lists {
     /// Draws the orders of `definition` for `sites` from `seed`.
-    #[must_use]
     pub fn draw(definition: &Definition, sites: &[String], seed: Seed) -> Self {
         let here = definition.sites.iter().filter(|site| sites.contains(&site.name));
         let lists = here.flat_map(|site| {
@@ -69,14 +68,12 @@ impl Lists {
     }
 
     /// Place `number` (from 1) of the list for `site` and `protocol`; none if there is no such place.
-    #[must_use]
     pub fn place(&self, site: &str, protocol: &str, number: usize) -> Option<&ListPlace> {
         let list = self.each.iter().find(|list| list.site == site && list.protocol == protocol)?;
         list.places.get(number.checked_sub(1)?)
     }
 
     /// The text that is hashed: lines, each ending with a line feed.
-    #[must_use]
     pub fn statement(&self) -> String {
         let mut text = format!(
             "parfocal-study-commitment-1\nstudy {}\ndefinition {}\nseed {}\n",
@@ -95,7 +92,6 @@ impl Lists {
     }
 
     /// SHA-256 of the [statement](Self::statement), in hexadecimal.
-    #[must_use]
     pub fn commitment(&self) -> String {
         commitment(&self.statement())
     }
@@ -103,7 +99,6 @@ impl Lists {
 
 impl List {
     /// Draws the list for `site` and `protocol`, with `places` places. `seed` is the seed of the whole study.
-    #[must_use]
     pub fn draw(site: &str, protocol: &Protocol, places: usize, seed: Seed) -> Self {
         let in_a_set = protocol.set_size();
         let place = |place: usize| {
@@ -122,19 +117,16 @@ impl List {
 }
 
 /// The commitment: SHA-256 of the statement of all orders, in hexadecimal.
-#[must_use]
 pub fn commitment(statement: &str) -> String {
     hex::encode(Sha256::digest(statement))
 }
 
 /// The line with the commitment, to be printed, published or mailed before the first session.
-#[must_use]
 pub fn commitment_line(study: &str, definition_sha256: &str, commitment: &str) -> String {
     format!("parfocal study {study} definition {definition_sha256} orders {commitment}")
 }
 
 /// An order as it is written in a statement: policy names, separated by commas.
-#[must_use]
 pub fn in_words(schedule: &[PolicyName]) -> String {
     schedule.iter().map(PolicyName::as_str).collect::<Vec<_>>().join(",")
 }

@@ -36,7 +36,6 @@ pub struct Enrolled {
 
 impl Enrolled {
     /// The surgeon whose session it was: the corrected code if there is one, otherwise the recorded one.
-    #[must_use]
     pub fn surgeon(&self) -> &str {
         self.corrected_participant.as_ref().unwrap_or(&self.participant)
     }

@@ -20,7 +20,6 @@ pub enum Channel {
 
 impl Channel {
     /// The way's name, as in the database and in exports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Role(role) => role.name(),
@@ -29,7 +28,6 @@ impl Channel {
     }
 
     /// The way with this name, if there is one.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         if name == Self::CommandLine.name() { Some(Self::CommandLine) } else { Role::named(name).map(Self::Role) }
     }

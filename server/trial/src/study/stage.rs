@@ -21,7 +21,6 @@ pub enum Stage {
 
 impl Stage {
     /// The stage's name, as it is shown.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Planned => "planned",

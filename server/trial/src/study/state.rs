@@ -80,7 +80,6 @@ pub struct StudyCircumstances<'a> {
 
 impl StudyState {
     /// The state after `events`.
-    #[must_use]
     pub fn after(events: &[StudyEvent]) -> Self {
         let mut state = Self { stage: Stage::Planned, commitment: None, locked: None, events: 0 };
         for event in events {

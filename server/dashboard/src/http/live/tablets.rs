@@ -59,7 +59,6 @@ pub struct TabletSign {
 
 impl OpenTablets {
     /// The pages that are open, the oldest first.
-    #[must_use]
     pub fn open(&self) -> Vec<Tablet> {
         self.pages().open.values().map(|page| page.tablet.clone()).collect()
     }
@@ -132,6 +131,7 @@ impl Pages {
 
 /// A page's entry; removed when dropped.
 #[derive(Debug)]
+#[must_use]
 pub(super) struct OpenTablet {
     tablets: OpenTablets,
     number: u64,

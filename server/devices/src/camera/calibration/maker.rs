@@ -22,7 +22,6 @@ pub struct MakersFile {
 }
 
 /// Whether `path` names such a file.
-#[must_use]
 pub fn is_makers(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("xml"))
 }

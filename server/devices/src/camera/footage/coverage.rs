@@ -25,7 +25,6 @@ impl std::fmt::Display for CutOff {
 
 /// How much of the video at `path` can be read, if that is less than its header announces. `None` also if the header
 /// announces nothing, or the program `ffprobe`, which comes with ffmpeg, is missing.
-#[must_use]
 pub fn cut_off(path: &Path) -> Option<CutOff> {
     let text = probe(path, &["-show_entries", ENTRIES, "-of", "json"])?;
     let (begin, announced) = announced(&text)?;

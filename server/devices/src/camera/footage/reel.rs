@@ -147,13 +147,11 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
 }
 
 /// Whether `path` has the file extension of a raw mosaic.
-#[must_use]
 pub fn is_raw(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"))
 }
 
 /// Whether `path` has the file extension of a picture.
-#[must_use]
 pub fn is_picture(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known))

@@ -23,13 +23,11 @@ pub struct FootageError(pub(super) String);
 
 impl FootageError {
     /// The file or folder `path` cannot be read, for `reason`.
-    #[must_use]
     pub fn unreadable(path: &Path, reason: impl std::fmt::Display) -> Self {
         Self(format!("cannot read {}: {reason}", path.display()))
     }
 
     /// The decoder cannot be started.
-    #[must_use]
     pub fn no_decoder(error: &std::io::Error) -> Self {
         Self(format!(
             "cannot start `ffmpeg`, which decodes videos ({error}); install it, on Debian with `apt install ffmpeg`"
@@ -134,7 +132,6 @@ fn check(path: &Path) -> Result<(), FootageError> {
 }
 
 /// The decoder with the file at `path` as its input; the caller adds what to do with it.
-#[must_use]
 pub fn ffmpeg(path: &Path) -> Command {
     let mut command = Command::new("ffmpeg");
     command.args(["-v", "error", "-nostdin", "-i"]).arg(input(path)).stdin(Stdio::null());

@@ -84,7 +84,6 @@ impl GigeCamera {
 
     /// When the last packet of the latest frame from [`Camera::next_frame`] had arrived. The time of the transfer,
     /// which depends on the link, ends here. For measurements.
-    #[must_use]
     pub fn whole_at(&self) -> Option<Moment> {
         self.shared.whole_at()
     }
@@ -130,7 +129,6 @@ pub struct FoundCamera {
 }
 
 /// Every camera that answers, on every network interface and USB port. Takes about a second.
-#[must_use]
 pub fn list() -> Vec<FoundCamera> {
     static ARAVIS: OnceLock<Option<std::sync::Mutex<Aravis>>> = OnceLock::new();
     let aravis = ARAVIS.get_or_init(|| Aravis::initialize().ok().map(std::sync::Mutex::new));

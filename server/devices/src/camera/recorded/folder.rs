@@ -110,19 +110,16 @@ impl ScanFolder {
     }
 
     /// The scan's folder.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// The scan's header: what was to be recorded.
-    #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
     }
 
     /// The poses that are stored, by number.
-    #[must_use]
     pub const fn poses(&self) -> &BTreeMap<usize, Pose> {
         &self.poses
     }
@@ -132,7 +129,6 @@ impl ScanFolder {
     }
 
     /// Numbers of the poses that are not stored.
-    #[must_use]
     pub fn missing(&self) -> Vec<usize> {
         (1..=self.header.poses).filter(|number| !self.poses.contains_key(number)).collect()
     }
@@ -179,7 +175,6 @@ impl ScanFolder {
 
     /// Checks every picture of `pose` against its checksum. Returns the bytes of the undamaged pictures, and the
     /// damage.
-    #[must_use]
     pub fn check(&self, pose: &Pose) -> (u64, Vec<Damage>) {
         let mut bytes = 0;
         let mut damages = Vec::new();

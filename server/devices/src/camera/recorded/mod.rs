@@ -90,7 +90,6 @@ pub struct Pose {
 
 impl Pose {
     /// The patch's place and size.
-    #[must_use]
     pub const fn patch_area(&self) -> PatchArea {
         PatchArea { x: self.patch.0, y: self.patch.1, width: PATCH_SIDE, height: PATCH_SIDE }
     }
@@ -146,7 +145,6 @@ impl ScanError {
     }
 
     /// The folder `path` holds a scan that was begun with other arguments: `difference` says how they differ.
-    #[must_use]
     pub fn other(path: &Path, difference: &str) -> Self {
         Self(format!(
             "{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder",
@@ -156,7 +154,6 @@ impl ScanError {
 }
 
 /// Poses for people: `pose 3`, `poses 3, 7 to 9`.
-#[must_use]
 pub fn poses(of: &[usize]) -> String {
     format!("{} {}", if of.len() == 1 { "pose" } else { "poses" }, numbers(of))
 }

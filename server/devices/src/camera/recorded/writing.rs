@@ -72,7 +72,6 @@ impl ScanRecording {
     }
 
     /// The scan's folder, with the poses stored so far.
-    #[must_use]
     pub const fn folder(&self) -> &ScanFolder {
         &self.folder
     }

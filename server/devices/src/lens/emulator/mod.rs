@@ -50,13 +50,11 @@ impl Emulator {
     }
 
     /// Path of the serial port. Unplugging does not change it, like a name in `/dev/serial/by-id`.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.link
     }
 
     /// The folder that replaces `/dev/serial/by-id`.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -116,31 +114,26 @@ impl Emulator {
 
     /// Focal power commands carried out, in the driver's units, each with the time it was read from the wire. Only the
     /// latest few thousand are kept.
-    #[must_use]
     pub fn commands(&self) -> Vec<(Moment, i16)> {
         self.firmware().commands.iter().copied().collect()
     }
 
     /// Orders that the unit received, carried out or not. Only the latest few thousand are kept.
-    #[must_use]
     pub fn orders(&self) -> Vec<LensCommand> {
         self.firmware().orders.iter().copied().collect()
     }
 
     /// Number of whole requests that have arrived so far. The reply to the latest may not have been sent yet.
-    #[must_use]
     pub fn requests(&self) -> u64 {
         self.firmware().requests
     }
 
     /// Mode of control, by the driver's number, and the current, in counts.
-    #[must_use]
     pub fn mode_and_current(&self) -> (u8, i16) {
         self.firmware().mode_and_current()
     }
 
     /// The true focal power; 0..=1 is the whole range of the lens.
-    #[must_use]
     pub fn glass(&self) -> Arc<Response> {
         self.firmware().glass()
     }

@@ -100,7 +100,6 @@ pub struct Model {
 impl Model {
     /// [`Model::play`] for a hysteresis in dioptres between the way up and the way down; `None` outside 0 to the whole
     /// range.
-    #[must_use]
     pub fn play_of(hysteresis: f64) -> Option<f64> {
         let range = LENS_DIOPTRES.1 - LENS_DIOPTRES.0;
         (0.0..=range).contains(&hysteresis).then_some(hysteresis / 2.0 / range)

@@ -55,7 +55,6 @@ impl Port {
     }
 
     /// The file to read, write and poll.
-    #[must_use]
     pub fn file(&self) -> &File {
         &self.0
     }

@@ -15,13 +15,11 @@ pub struct Scale {
 
 impl Scale {
     /// The scale of a firmware type: `A` adds an offset of five dioptres, the others none.
-    #[must_use]
     pub const fn of_firmware(letter: u8) -> Self {
         Self { offset: if letter == b'A' { 5.0 } else { 0.0 } }
     }
 
     /// Converts `raw` to dioptres.
-    #[must_use]
     pub fn dioptre(self, raw: i16) -> f64 {
         f64::from(raw) / PER_DIOPTRE - self.offset
     }
@@ -68,7 +66,6 @@ impl Range {
     }
 
     /// Converts `power` to the driver's units, never outside the range that the device allows.
-    #[must_use]
     pub fn raw(self, power: FocalPower) -> i16 {
         let min = f64::from(self.min);
         let max = f64::from(self.max);
@@ -76,7 +73,6 @@ impl Range {
     }
 
     /// Converts `raw` to the nearest focal power.
-    #[must_use]
     pub fn focal_power(self, raw: i16) -> FocalPower {
         let min = f64::from(self.min);
         let max = f64::from(self.max);
@@ -84,13 +80,11 @@ impl Range {
     }
 
     /// Dioptres at focal power 0.
-    #[must_use]
     pub fn min_dioptre(self) -> f64 {
         self.scale.dioptre(self.min)
     }
 
     /// Dioptres at focal power 1.
-    #[must_use]
     pub fn max_dioptre(self) -> f64 {
         self.scale.dioptre(self.max)
     }

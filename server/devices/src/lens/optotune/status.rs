@@ -26,27 +26,23 @@ impl Status {
     const USER_TEMPERATURE: u32 = 1 << 7;
 
     /// Whether no usable lens is plugged in.
-    #[must_use]
     pub const fn without_lens(self) -> bool {
         self.0 & (Self::LENS_MISSING | Self::MEMORY_FAULTY) != 0
     }
 
     /// Whether the driver lost its temperature limits, as it does when it restarts.
-    #[must_use]
     pub const fn restarted(self) -> bool {
         self.0 & Self::NO_LIMITS != 0
     }
 
     /// Whether the lens follows commands, but its focal power is unreliable: it is too hot or too cold, or does not
     /// reach as far.
-    #[must_use]
     pub const fn doubtful(self) -> bool {
         const TEMPERATURE: u32 = Status::PRODUCT_TEMPERATURE | Status::GUARANTEED_RANGE | Status::USER_TEMPERATURE;
         self.0 & (TEMPERATURE | Self::UNREACHABLE) != 0
     }
 
     /// All conditions that are set, in words.
-    #[must_use]
     pub fn words(self) -> Vec<String> {
         let known = CONDITIONS.iter().enumerate().filter(|(bit, _)| self.0 >> bit & 1 == 1);
         known.map(|(_, words)| (*words).to_owned()).collect()
@@ -54,7 +50,6 @@ impl Status {
 }
 
 /// Name of the mode of control with the driver's number `number`.
-#[must_use]
 pub const fn mode_name(number: u8) -> &'static str {
     match number {
         1 => "current",

@@ -61,13 +61,11 @@ pub struct Hand {
 
 impl Hand {
     /// The hand of a seed, at time zero.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self::moving(seed, Haste::default())
     }
 
     /// The hand of a seed that moves with `haste`.
-    #[must_use]
     pub fn moving(seed: u64, haste: Haste) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(4);

@@ -45,7 +45,6 @@ pub struct Phantom {
 
 impl Phantom {
     /// The phantom of a seed, under a sensor of the default calibration. Takes about a fifth of a second.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         let scene = Scene::new(seed);
         Self {
@@ -59,7 +58,6 @@ impl Phantom {
     }
 
     /// The content area's place and size, in pixels of one band.
-    #[must_use]
     pub fn content_area(&self) -> ContentArea {
         self.optics.content_area()
     }
@@ -125,7 +123,6 @@ impl Phantom {
 
     /// The focal power at which the patch in the middle of the content area is sharpest: the mean over
     /// the patch of each pixel's sharp focal power, weighted by the pixel's squared contrast.
-    #[must_use]
     pub fn optimal(&self, pose: &Pose) -> FocalPower {
         let mapping = Mapping::new(&self.optics, pose);
         let area = self.content_area();

@@ -63,7 +63,6 @@ impl Character {
 
 impl Scene {
     /// The scene of a seed. The same seed gives the same scene; another seed gives another brain.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let character = Character::draw(&mut rng);
@@ -80,7 +79,6 @@ impl Scene {
     /// The middle of the scene as the gray picture a perfect lens would give: `width` x `height` texels
     /// (at most [`SIDE`] each; more is cut), linear in light, on the 0..255 scale, exposed so that 1
     /// pixel in 50 is above 200.
-    #[must_use]
     pub fn sharp_gray(&self, width: usize, height: usize) -> GrayImage {
         let weights = Bands::new(&Calibration::default()).gray();
         let mut picture = self.middle(width, height, |texel| mix(texel, weights));
@@ -92,7 +90,6 @@ impl Scene {
 
     /// The middle of the scene as `band` sees it through a perfect lens, under the light that gives the
     /// scene's white 255: `width` x `height` texels (at most [`SIDE`] each; more is cut), linear in light.
-    #[must_use]
     pub fn sharp_band(&self, band: &Band, width: usize, height: usize) -> GrayImage {
         let response = endmembers_in_band(band.centre_nm, band.fwhm_nm);
         let weights = response.map(|value| 255.0 * value as f32 / UNIT);

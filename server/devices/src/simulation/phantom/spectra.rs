@@ -96,7 +96,6 @@ const TISSUES: [Tissue; 3] = [
 /// absorption is 2.303 * extinction * blood * 150 g/l / 64 500 g/mol (Prahl); the reflectance of the
 /// half-space follows from the reduced albedo by diffusion theory at a matched boundary, as wet tissue
 /// nearly is (Flock 1989).
-#[must_use]
 pub fn reflectance(tissue: Tissue, nanometres: f64) -> f64 {
     let [oxygenated, deoxygenated] = extinction(nanometres);
     let molar = tissue.saturation * oxygenated + (1.0 - tissue.saturation) * deoxygenated;
@@ -109,7 +108,6 @@ pub fn reflectance(tissue: Tissue, nanometres: f64) -> f64 {
 
 /// Reflectance of each endmember in a band of Gaussian response around `centre` nm, `fwhm` nm wide at
 /// half height.
-#[must_use]
 pub fn endmembers_in_band(centre: f64, fwhm: f64) -> [f64; ENDMEMBERS] {
     let sigma = fwhm / (8.0 * std::f64::consts::LN_2).sqrt();
     let mut sum = [0.0; ENDMEMBERS];

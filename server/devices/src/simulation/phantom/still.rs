@@ -31,7 +31,6 @@ pub struct Trajectory {
 impl Trajectory {
     /// The poses of the hand of `seed`, moving with `haste`, at `poses` moments [`INTERVAL`] apart.
     /// Takes about a fifth of a second.
-    #[must_use]
     pub fn new(seed: u64, poses: usize, haste: Haste) -> Self {
         let brain = FIRST_BRAIN.wrapping_add(seed);
         let mut hand = Hand::moving(brain, haste);
@@ -47,19 +46,16 @@ impl Trajectory {
     }
 
     /// Number of poses.
-    #[must_use]
     pub const fn len(&self) -> usize {
         self.poses.len()
     }
 
     /// Whether there is no pose.
-    #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.poses.is_empty()
     }
 
     /// Pose `index`, from 0, held still; `None` beyond the last.
-    #[must_use]
     pub fn still(&self, index: usize) -> Option<Still<'_>> {
         let pose = self.poses.get(index)?;
         let best = self.phantom.optimal(pose);
@@ -81,13 +77,11 @@ pub struct Still<'a> {
 
 impl Still<'_> {
     /// The focal power at which the patch is sharpest: see [`Phantom::optimal`].
-    #[must_use]
     pub const fn optimal(&self) -> FocalPower {
         self.best
     }
 
     /// The patch's place, in pixels of a band.
-    #[must_use]
     pub fn patch(&self) -> PatchArea {
         let area = self.phantom.content_area();
         // The fallback is never used: the sensor is larger than a patch.
@@ -105,7 +99,6 @@ impl Still<'_> {
     }
 
     /// The square that the widest patch of the policies covers, in pixels of a band.
-    #[must_use]
     pub fn seen(&self) -> Square {
         let PatchArea { x, y, width, .. } = self.patch();
         let widest = WIDER[WIDER.len() - 1];

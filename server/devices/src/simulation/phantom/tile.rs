@@ -15,7 +15,6 @@ pub struct Tile {
 impl Tile {
     /// The tile before the camera of a seed. The light brings the content area's centre to `level` of full scale; 0 is
     /// with the lens cap on.
-    #[must_use]
     pub fn new(seed: u64, level: f32) -> Self {
         Self { optics: Optics::new(seed), sensor: Sensor::new(seed, SENSOR_WIDTH, SENSOR_HEIGHT), level }
     }

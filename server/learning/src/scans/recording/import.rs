@@ -94,7 +94,6 @@ impl Imported {
     }
 
     /// Number of poses.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.poses.len()
     }

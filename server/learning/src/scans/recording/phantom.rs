@@ -17,7 +17,6 @@ pub struct PhantomPoses {
 
 impl PhantomPoses {
     /// The poses of `trajectory`, one after another.
-    #[must_use]
     pub fn new(trajectory: Trajectory) -> Self {
         Self { trajectory, reconstructor: Reconstructor::default() }
     }

@@ -38,7 +38,6 @@ enum Look {
 impl Scan {
     /// A scan over `scene` whose course is drawn from `seed`. Over a focal stack, blur, spot,
     /// tremor, veil and unrest of `settings` are ignored: the stack has its own.
-    #[must_use]
     pub fn over(scene: Scene, settings: ScanSettings, seed: u64) -> Self {
         let (mut course, blur) = Course::draw(&scene, &settings, seed);
         let room = scene.room();
@@ -51,7 +50,6 @@ impl Scan {
     }
 
     /// How fast blur grows. `None` for photographs, of which it is not known.
-    #[must_use]
     pub fn blur(&self) -> Option<BlurRate> {
         match &self.look {
             Look::Flat(flat) => BlurRate::new(flat.blur),

@@ -45,13 +45,11 @@ pub struct ScanSettings {
 impl ScanSettings {
     /// The reference benchmark's scans: over still pictures, on which the crop moves as fast as crop
     /// and scene together do in footage. `docs/notebook.md` says how they were calibrated.
-    #[must_use]
     pub fn reference() -> Self {
         Self { crop: Motion { speed: 5.0, memory: 30.0 }, ..Self::default() }
     }
 
     /// The settings that fit `scene`: the default over a video, the reference's over anything that is still.
-    #[must_use]
     pub fn fitting(scene: &Scene) -> Self {
         match scene {
             Scene::Flat(clip) if clip.len() > 1 => Self::default(),

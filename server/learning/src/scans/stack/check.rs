@@ -238,7 +238,6 @@ fn jumps(stack: &FocalStack, notes: &mut Vec<String>) -> Vec<bool> {
 }
 
 /// The shift of `b` against `a`, in pixels, at which they differ least; at most `farthest` along each axis.
-#[must_use]
 pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
     let width = a.width;
     let height = a.height;

@@ -53,7 +53,6 @@ impl StackCourse {
     /// A course over `stack`, drawn from `seed`. The stack's positions count its planes from 0, and `planes` of them
     /// are the range. `None` if `planes` is below 3, the stack has fewer planes, or it is smaller than the window of
     /// 128 pixels.
-    #[must_use]
     pub fn new(stack: Arc<PlaneStack>, planes: usize, seed: u64) -> Option<Self> {
         let (width, height) = stack.size();
         let available = stack.range().1 as usize + 1;

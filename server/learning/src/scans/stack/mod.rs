@@ -100,13 +100,11 @@ impl FocalStack {
     }
 
     /// The pictures, in rising position.
-    #[must_use]
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
 
     /// Width and height of every picture.
-    #[must_use]
     pub fn size(&self) -> (usize, usize) {
         self.planes.first().map_or((0, 0), |plane| (plane.picture.width, plane.picture.height))
     }

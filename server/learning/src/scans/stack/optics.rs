@@ -53,13 +53,11 @@ pub struct StackOptics {
 
 impl StackOptics {
     /// Measures all figures that `stack` shows.
-    #[must_use]
     pub fn of(stack: &FocalStack) -> Self {
         Self { magnification: magnification(stack), ..Self::of_focus(stack) }
     }
 
     /// As [`StackOptics::of`], but without magnification, which takes longer than all the rest.
-    #[must_use]
     pub fn of_focus(stack: &FocalStack) -> Self {
         let (width, height) = stack.size();
         let corner = |side: usize, index: usize| (side - PATCH_SIDE) * (2 * index + 1) / (2 * PLACES);
@@ -86,7 +84,6 @@ impl StackOptics {
     }
 
     /// Combines several stacks of one optic: all places, and the medians of the figures.
-    #[must_use]
     pub fn together(all: Vec<Self>) -> Self {
         let figure = |value: fn(&Self) -> Option<f64>| median(all.iter().filter_map(value).collect());
         let [blur_per_unit, softness, magnification] =

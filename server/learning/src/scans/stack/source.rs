@@ -70,7 +70,6 @@ pub struct ScaledStack {
 
 impl ScaledStack {
     /// The same pictures, smaller by `factor`; `None` if there would be no room for a patch to move.
-    #[must_use]
     pub fn smaller(&self, factor: f64) -> Option<PlaneStack> {
         let (width, height) = self.stack.size();
         let [width, height] = [width, height].map(|side| (side as f64 * factor).round() as usize);
@@ -83,7 +82,6 @@ impl ScaledStack {
     }
 
     /// How fast blur grows over the range; `None` if the pictures do not show it. Measuring takes seconds.
-    #[must_use]
     pub fn blur_rate(&self) -> Option<BlurRate> {
         let rate = StackOptics::of_focus(&self.stack).blur_per_unit?;
         BlurRate::new(rate * (self.planes - 1) as f64)
@@ -92,7 +90,6 @@ impl ScaledStack {
 
 impl StackSource {
     /// The source that `DIR` or `DIR:PLANES` names, with raw mosaics in the format `raw` if there are any.
-    #[must_use]
     pub fn parse(text: &str, raw: Option<PixelFormat>) -> Self {
         let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
         match split {
@@ -102,7 +99,6 @@ impl StackSource {
     }
 
     /// The folder's name.
-    #[must_use]
     pub fn name(&self) -> String {
         self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
     }

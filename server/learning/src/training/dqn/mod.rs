@@ -54,7 +54,6 @@ struct Actor {
 
 impl DqnTrainer {
     /// A training from random weights on `scenery`, with its networks on `device`.
-    #[must_use]
     pub fn new(input: Input, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let (online, mut target) = drawn_with(seed, || (Values::new(input, device), Values::new(input, device)));

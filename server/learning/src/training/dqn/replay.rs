@@ -34,7 +34,6 @@ pub enum CompactView {
 
 impl CompactView {
     /// A patch in compact form.
-    #[must_use]
     pub fn patch(patch: &Patch) -> Self {
         Self::Patch(patch.0.iter().map(|&gray| gray as u8).collect())
     }
@@ -96,19 +95,16 @@ impl Ring {
 
 impl Replay {
     /// A memory of at most `frames` frames in all, for `actors` actors.
-    #[must_use]
     pub fn new(frames: usize, actors: usize) -> Self {
         Self { actors: (0..actors).map(|_| Ring::default()).collect(), capacity: (frames / actors.max(1)).max(1) }
     }
 
     /// Frames held.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.actors.iter().map(|ring| ring.transitions.len()).sum()
     }
 
     /// Whether nothing is held.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

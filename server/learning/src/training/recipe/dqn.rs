@@ -94,7 +94,6 @@ pub struct DqnRecipe {
 
 impl DqnRecipe {
     /// Share of random actions after `frames` frames.
-    #[must_use]
     pub fn epsilon(&self, frames: u64) -> f64 {
         let done = (frames as f64 / self.epsilon_frames.max(1) as f64).min(1.0);
         let first = self.first_epsilon;

@@ -102,20 +102,17 @@ const SHIPPED: [(&str, &str); 13] = [
 ];
 
 /// The text of the recipe that ships under `name`.
-#[must_use]
 pub fn shipped(name: &str) -> Option<&'static str> {
     SHIPPED.iter().find(|recipe| recipe.0 == name).map(|recipe| recipe.1)
 }
 
 /// Names of the recipes that ship.
-#[must_use]
 pub fn names() -> Vec<&'static str> {
     SHIPPED.iter().map(|recipe| recipe.0).collect()
 }
 
 impl Recipe {
     /// The first key (as `section.key`) whose value differs in `other`, with this recipe's value and the other's.
-    #[must_use]
     pub fn difference(&self, other: &Self) -> Option<(String, String, String)> {
         let table = |recipe: &Self| toml::Table::try_from(recipe).unwrap_or_default();
         difference("", &table(self), &table(other))
@@ -164,7 +161,6 @@ impl Recipe {
     }
 
     /// Updates of the whole training.
-    #[must_use]
     pub fn updates(&self) -> u64 {
         self.dqn.as_ref().map_or(0, |dqn| dqn.updates).max(self.belief.as_ref().map_or(0, |belief| belief.updates))
     }

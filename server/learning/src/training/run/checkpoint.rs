@@ -135,7 +135,6 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// The error that this checkpoint is damaged, for `reason`.
-    #[must_use]
     pub fn damaged(&self, reason: impl Into<String>) -> CheckpointError {
         CheckpointError::Damaged { path: self.path.clone(), reason: reason.into() }
     }

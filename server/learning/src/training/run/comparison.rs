@@ -37,7 +37,6 @@ pub struct BenchmarkFigures {
 
 impl BenchmarkFigures {
     /// The figures of `row`, measured on `scans` scans.
-    #[must_use]
     pub fn new(row: &Row, scans: usize) -> Self {
         let Row { mae, sd, in_focus, travel, reversals, .. } = *row;
         Self { scans, mae, sd, in_focus, travel, reversals }
@@ -142,7 +141,6 @@ fn flat(recipe: &Recipe) -> BTreeMap<String, toml::Value> {
 
 /// `runs` as a Markdown table, with a column for each value in which their recipes differ. The run with the best
 /// validation comes first; runs without a validation come last.
-#[must_use]
 pub fn markdown(runs: &[TrainedRun]) -> String {
     let mut runs: Vec<&TrainedRun> = runs.iter().collect();
     let error = |run: &TrainedRun| run.best_validation.unwrap_or(f64::INFINITY);

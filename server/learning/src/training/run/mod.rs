@@ -159,26 +159,22 @@ impl Run {
     }
 
     /// The recipe of this training.
-    #[must_use]
     pub const fn recipe(&self) -> &Recipe {
         &self.recipe
     }
 
     /// Updates done so far.
-    #[must_use]
     pub fn updates(&self) -> u64 {
         self.trainer.updates()
     }
 
     /// Lowest mean absolute error of any validation so far; infinite before the first.
-    #[must_use]
     pub const fn best(&self) -> f64 {
         self.best
     }
 
     /// The version of parfocal that made the checkpoint from which this training resumes; `None` if it is this version.
     /// With another version the result may differ.
-    #[must_use]
     pub fn other_version(&self) -> Option<&str> {
         self.other_version.as_deref()
     }

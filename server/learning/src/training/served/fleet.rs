@@ -25,7 +25,6 @@ pub enum Shows {
 
 impl Shows {
     /// Patches of a frame.
-    #[must_use]
     pub const fn patches(self) -> usize {
         match self {
             Self::Patch => 1,
@@ -85,7 +84,6 @@ impl Slot {
 
 impl Fleet {
     /// `count` environments over `scenery`, whose scans have `frames` frames.
-    #[must_use]
     pub fn new(scenery: Scenery, variety: Variety, shows: Shows, count: usize, frames: u32, seed: u64) -> Self {
         let slots = (0..count as u64)
             .map(|index| {
@@ -100,13 +98,11 @@ impl Fleet {
     }
 
     /// Number of environments.
-    #[must_use]
     pub const fn count(&self) -> usize {
         self.slots.len()
     }
 
     /// What they show of a frame.
-    #[must_use]
     pub const fn shows(&self) -> Shows {
         self.shows
     }

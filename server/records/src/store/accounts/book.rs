@@ -24,7 +24,6 @@ pub struct AccountBook {
 
 impl AccountBook {
     /// The account book of the server.
-    #[must_use]
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>) -> Self {
         Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), clock }
     }
@@ -39,7 +38,6 @@ impl AccountBook {
     }
 
     /// The reader of the same database.
-    #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }

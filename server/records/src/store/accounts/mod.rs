@@ -89,7 +89,6 @@ pub enum FailedAttempt {
 
 impl AccountEvent {
     /// Name of the kind, as in the database.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Added(_) => "added",

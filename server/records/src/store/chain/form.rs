@@ -148,7 +148,6 @@ impl Default for Head {
 
 impl Head {
     /// Whether it is the row `number` with this hash.
-    #[must_use]
     pub fn is(&self, number: i64, hash: &str) -> bool {
         self.number == number && hash.starts_with(&self.hash)
     }

@@ -35,7 +35,6 @@ impl Folder {
     }
 
     /// Begins an export into the ZIP file `zip`.
-    #[must_use]
     pub fn zipped(zip: ZipStream) -> Self {
         Self::to(Destination::Zip(Box::new(zip)))
     }
@@ -193,7 +192,6 @@ fn new_block() -> csv::Writer<Vec<u8>> {
 }
 
 /// Name for an export of `session`, without a file extension.
-#[must_use]
 pub fn folder_name(session: SessionId, unblinded: bool) -> String {
     format!("parfocal-{session}{}", if unblinded { "-unblinded" } else { "" })
 }

@@ -76,7 +76,6 @@ impl Export {
     /// # Errors
     /// If there is no such session, its participant withdrew, or the policies are asked for before unblinding.
     #[boxed]
-    #[must_use]
     pub async fn prepare(access_log: &AccessLog, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
         may_export(access_log.reader(), session, unblinded).await?;

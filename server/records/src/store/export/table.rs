@@ -183,7 +183,6 @@ pub struct Meaning {
 }
 
 /// A column that means `description`, has no unit, and is not hashed.
-#[must_use]
 pub const fn means(description: &'static str) -> Meaning {
     Meaning { unit: "", description, proof: Proof::None }
 }
@@ -208,7 +207,6 @@ impl Meaning {
     }
 
     /// The column called `name`, which has a value in every row.
-    #[must_use]
     pub const fn column(self, name: &'static str, kind: Type) -> Column {
         let may_be_empty = false;
         Column { name, kind, unit: self.unit, description: self.description, may_be_empty, proof: self.proof }
@@ -272,7 +270,6 @@ macro_rules! export_table {
 pub use export_table as table;
 
 /// `rows` as JSON objects.
-#[must_use]
 pub fn objects<R: Row>(rows: &[R]) -> Value {
     let object = |row: &R| {
         let names = R::TABLE.header().map(str::to_owned);
@@ -283,7 +280,6 @@ pub fn objects<R: Row>(rows: &[R]) -> Value {
 
 impl Type {
     /// Its Frictionless name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::String => "string",
@@ -309,7 +305,6 @@ impl Type {
 
 impl Table {
     /// The table's file.
-    #[must_use]
     pub fn file(&self) -> String {
         format!("{}.csv", self.name)
     }
@@ -328,7 +323,6 @@ impl Table {
 
 impl Column {
     /// Its Frictionless description.
-    #[must_use]
     pub fn field(&self) -> Value {
         let mut field = json!({ "name": self.name, "type": self.kind.name(), "description": self.description });
         if !self.unit.is_empty() {
@@ -350,13 +344,11 @@ const FORMULA: [char; 11] = ['=', '+', '-', '@', '＝', '＋', '－', '＠', '\t
 
 impl Column {
     /// `cell` as the CSV files have it.
-    #[must_use]
     pub fn csv(&self, cell: &Value) -> String {
         in_csv(self.kind, cell)
     }
 
     /// The text of a cell of the CSV files, without an added apostrophe.
-    #[must_use]
     pub fn read<'a>(&self, csv: &'a str) -> &'a str {
         match csv.strip_prefix('\'') {
             Some(text) if self.kind == Type::String && is_formula(text) => text,

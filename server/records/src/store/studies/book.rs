@@ -22,7 +22,6 @@ pub struct StudyBook {
 
 impl StudyBook {
     /// The book of the server.
-    #[must_use]
     pub fn of_server(store: &Store) -> Self {
         Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), _lock: None }
     }
@@ -43,13 +42,11 @@ impl StudyBook {
     }
 
     /// The run of the server that writes in it; `None` for a command.
-    #[must_use]
     pub fn run(&self) -> Option<i64> {
         self.writer.run()
     }
 
     /// The reader of the same database.
-    #[must_use]
     pub const fn reader(&self) -> &Reader {
         &self.reader
     }

@@ -50,7 +50,6 @@ pub struct StoredStudy {
 
 impl StoredStudy {
     /// The state that its events lead to.
-    #[must_use]
     pub fn state(&self) -> StudyState {
         StudyState::after(&self.events)
     }

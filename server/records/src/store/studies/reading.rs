@@ -31,7 +31,6 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     #[boxed]
-    #[must_use]
     pub async fn study(&self, name: &str) -> Result<Option<StoredStudy>, StoreError> {
         let row = sqlx::query("SELECT definition, sites FROM studies WHERE study = ?").bind(name);
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };

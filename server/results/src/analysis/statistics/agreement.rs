@@ -20,7 +20,6 @@ pub struct Agreement {
 
 /// The agreement within `subjects`, each with the same two or more repeats. `None` for fewer than two subjects or
 /// repeats, and if all values are equal.
-#[must_use]
 pub fn agreement(subjects: &[Vec<f64>]) -> Option<Agreement> {
     let repeats = subjects.first()?.len();
     if subjects.len() < 2 || repeats < 2 {

@@ -50,7 +50,6 @@ pub enum PermutationMethod {
 
 /// Tests `blocks` of three or more treatments each. If there are too many permutations to take all, some are drawn from
 /// `seed`. `None` for fewer than two blocks or three treatments, and if no block has a difference.
-#[must_use]
 pub fn friedman(blocks: &[Vec<f64>], seed: u64) -> Option<Friedman> {
     let treatments = blocks.first()?.len();
     if blocks.len() < 2 || treatments < 3 {
@@ -82,7 +81,6 @@ fn chi_square_above(x: f64, df: f64) -> f64 {
 
 /// Kendall's W of `blocks`, corrected for ties (Kendall & Babington Smith 1939, Annals of Mathematical Statistics
 /// 10:275); `None` if no block has a difference.
-#[must_use]
 pub fn concordance<'a>(blocks: impl IntoIterator<Item = &'a Vec<f64>>) -> Option<f64> {
     concordance_of(&blocks.into_iter().map(|block| doubled_ranks(block)).collect::<Vec<_>>())
 }

@@ -26,7 +26,6 @@ pub struct Interval {
 }
 
 /// The summary of `values`.
-#[must_use]
 pub fn summary(values: &[f64]) -> Summary {
     let n = values.len();
     let mean = (n > 0).then(|| values.iter().sum::<f64>() / n as f64);
@@ -36,7 +35,6 @@ pub fn summary(values: &[f64]) -> Summary {
 }
 
 /// The median; for an even number of values, the mean of the two in the middle. `None` without values.
-#[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -29,7 +29,6 @@ pub struct Trend {
 
 /// Tests `blocks` for a trend in either direction over their three or more treatments, which are in order. `None` for
 /// fewer than two blocks or three treatments, and if no block has a difference.
-#[must_use]
 pub fn trend(blocks: &[Vec<f64>]) -> Option<Trend> {
     let treatments = blocks.first()?.len();
     if blocks.len() < 2 || treatments < 3 {

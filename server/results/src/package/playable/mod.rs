@@ -9,7 +9,6 @@ mod webm;
 use parfocal_trial::voice::MediaType;
 
 /// `sound` with its duration written into it; as it is if it states one, or if its parts cannot be read.
-#[must_use]
 pub fn with_duration(media_type: MediaType, sound: Vec<u8>) -> Vec<u8> {
     let changed = match media_type {
         MediaType::WebmOpus => webm::with_duration(&sound),

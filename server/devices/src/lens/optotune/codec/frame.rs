@@ -46,7 +46,6 @@ pub enum DeviceError {
 }
 
 /// The error reply at the start of `bytes`, if there is one. Firmware sends the error's number as a digit or as a byte.
-#[must_use]
 pub fn error_reply(bytes: &[u8]) -> Option<DeviceError> {
     if bytes.starts_with(OLD_CRC_ERROR) {
         return Some(DeviceError::Checksum);

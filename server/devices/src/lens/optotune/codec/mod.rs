@@ -95,7 +95,6 @@ pub struct Limits {
 
 impl Request {
     /// The bytes that go over the wire.
-    #[must_use]
     pub fn encode(self) -> Vec<u8> {
         let mut bytes = self.payload();
         let checksum = CHECKSUM.checksum(&bytes);

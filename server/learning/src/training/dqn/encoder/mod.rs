@@ -27,7 +27,6 @@ pub struct Encoder {
 
 impl Encoder {
     /// The encoder whose variables are under `path` in `store`; `None` if there is none, or it is not on the CPU.
-    #[must_use]
     pub fn of(store: &nn::VarStore, path: &str) -> Option<Self> {
         if store.device() != Device::Cpu {
             return None;
@@ -42,7 +41,6 @@ impl Encoder {
     }
 
     /// Encodings `[N, 8]` of patches `[N, 1024]`, row after row.
-    #[must_use]
     pub fn encode(&self, patches: &[u8]) -> Vec<f32> {
         let weights = self.weights();
         let patches = patches.as_chunks().0;
@@ -55,7 +53,6 @@ impl Encoder {
 
     /// The gradient of a loss with respect to all variables, one after another in the order of their names.
     /// `grad_output` is the loss's gradient with respect to the encodings `[N, 8]` of `patches` (`[N, 1024]`).
-    #[must_use]
     pub fn gradient(&self, patches: &[u8], grad_output: &[f32]) -> Vec<f32> {
         let weights = self.weights();
         let patches = patches.as_chunks().0;

@@ -35,19 +35,16 @@ struct Rows {
 
 impl ExportFiles {
     /// The files of the export in `folder`. Nothing is read yet.
-    #[must_use]
     pub fn of(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), documents: ReadCache::default(), tables: ReadCache::default() }
     }
 
     /// The folder of the export.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Whether the export has `file`.
-    #[must_use]
     pub fn has(&self, file: &str) -> bool {
         self.folder.join(file).exists()
     }

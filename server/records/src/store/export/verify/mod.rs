@@ -43,14 +43,12 @@ pub struct Check {
 }
 
 /// Whether `path` looks like an export: it has at least one of the files that every export has.
-#[must_use]
 pub fn is_export(path: &Path) -> bool {
     [SUMS, "datapackage.json", "sessions.csv"].iter().any(|file| path.join(file).exists())
 }
 
 /// Runs every check on the export in `folder`, in order. If `expected`, a head known from elsewhere, is given, also
 /// checks that the chain has this head in it.
-#[must_use]
 pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     verify_files(&ExportFiles::of(folder), expected)
 }
