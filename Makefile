@@ -67,10 +67,10 @@ TEST_THREADS := $(shell echo $$((2 * $$(nproc))))
 # One failing test does not keep the others from running. The bad day takes a kill for each of its troubles.
 unit: compiled
 	RUST_TEST_THREADS=$(TEST_THREADS) PARFOCAL_KILLS=8 \
-		cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES) -- --skip $(CAMERAS)
+		cargo test $(CARGO_FLAGS) --release --locked --no-fail-fast $(FEATURES) -- $(CAMERAS:%=--skip %)
 
 # These wait for a camera, and for one another, most of their time: all other tests run meanwhile.
-CAMERAS := network_camera::
+CAMERAS := network_camera:: camera_card::
 cameras: compiled
 	cargo test $(CARGO_FLAGS) --release --locked $(FEATURES) --test system -- $(CAMERAS)
 
