@@ -38,13 +38,7 @@ fn state(question: &str) -> String {
 /// The operator prepares a session. It cannot start before the consent is recorded.
 pub async fn prepare(theatre: &Theatre) {
     let operator = &theatre.operator;
-    until("the dialog for a new participant", || async {
-        operator.is("#participant-dialog", "open").await || {
-            operator.try_click("#add-participant").await;
-            false
-        }
-    })
-    .await;
+    operator.click("#add-participant").await;
     operator.type_into("#code", "S-31").await;
     operator.click("#participant-dialog [type=submit]").await;
     operator.sees_no("#participant-dialog").await;

@@ -40,14 +40,7 @@ async fn sign_in(page: &Browser, name: &str, passphrase: &str) {
 
 /// The operator prepares a session in the study and ends it again.
 async fn a_session(operator: &Browser) {
-    // The page may still be growing above the button, so that a click meets something else.
-    until("the dialog for a new participant", || async {
-        operator.is("#participant-dialog", "open").await || {
-            operator.try_click("#add-participant").await;
-            false
-        }
-    })
-    .await;
+    operator.click("#add-participant").await;
     operator.type_into("#code", "S-01").await;
     operator.click("#participant-dialog [type=submit]").await;
     operator.sees_no("#participant-dialog").await;

@@ -89,16 +89,10 @@ impl Browser {
 }
 
 impl Browser {
-    /// The operator presses "Prepare session", again and again until the session is there: a card that grows above the
-    /// button moves it away under a click.
+    /// The operator presses "Prepare session", and waits until the session is there.
     pub async fn prepare_session(&self) {
-        until("the session to be ready to start", || async {
-            self.text("#phase").await.contains("Ready to start") || {
-                self.try_click("#new-session [type=submit]").await;
-                false
-            }
-        })
-        .await;
+        self.click("#new-session [type=submit]").await;
+        self.sees("#phase", "Ready to start").await;
     }
 }
 
@@ -140,14 +134,7 @@ impl Theatre {
     /// The operator prepares a session of a new participant `participant` by `protocol`.
     pub async fn prepare(&self, participant: &str, protocol: &str) {
         let operator = &self.operator;
-        // The page may still be growing above the button, so that a click meets something else.
-        until("the dialog for a new participant", || async {
-            operator.is("#participant-dialog", "open").await || {
-                operator.try_click("#add-participant").await;
-                false
-            }
-        })
-        .await;
+        operator.click("#add-participant").await;
         operator.type_into("#code", participant).await;
         operator.click("#participant-dialog [type=submit]").await;
         operator.sees_no("#participant-dialog").await;
