@@ -1,10 +1,9 @@
 //! The pictures that ffmpeg writes to a pipe, one after another, as PNM.
 
-use std::io::BufRead;
+use std::io::{BufRead, Error};
 
 use image::codecs::pnm::PnmDecoder;
-use image::error::{LimitError, LimitErrorKind};
-use image::{DynamicImage, ImageDecoder, ImageError, ImageResult};
+use image::{DynamicImage, ImageDecoder, ImageResult};
 
 /// Most bytes of a picture. One that claims more is implausible: the stream is damaged.
 const MOST_BYTES: u64 = 1 << 28;
@@ -19,8 +18,9 @@ pub fn next_pnm(stream: &mut impl BufRead) -> ImageResult<Option<DynamicImage>> 
     }
 
     let decoder = PnmDecoder::new(stream)?;
-    if decoder.total_bytes() > MOST_BYTES {
-        return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
+    let bytes = decoder.total_bytes();
+    if bytes > MOST_BYTES {
+        return Err(Error::other(format!("a picture of {bytes} bytes is too large")).into());
     }
 
     Ok(Some(DynamicImage::from_decoder(decoder)?))
