@@ -381,14 +381,14 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     assert!(told.is_sorted_by_key(|progress| (progress.exported, progress.joined)), "{told:?}");
 
     let made = exports.made(&reader, STUDY).await.unwrap().unwrap();
-    let export = made.folder.join("sessions").join(session.to_string());
+    let export = made.folder().join("sessions").join(session.to_string());
     let accesses = rows(&export, "accesses");
     assert_eq!(accesses.len(), 1, "one export: {accesses:?}");
 
     // The next export replaces it. Its files stay as long as somebody downloads them.
     let _ = exports.start(trial.access_log(), STUDY, false);
     assert!(exports.made(&reader, STUDY).await.unwrap().is_none());
-    assert!(made.folder.is_dir(), "it is being downloaded");
+    assert!(made.folder().is_dir(), "it is being downloaded");
 }
 
 #[tokio::test]

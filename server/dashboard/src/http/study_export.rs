@@ -97,7 +97,7 @@ async fn study_export_zip(
 
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
     // The closure holds `made`, so its files stay until all of them are sent.
-    Ok(zip_download(name, async move |zip| Box::pin(zip.send_folder(&made.folder)).await))
+    Ok(zip_download(name, async move |zip| Box::pin(zip.send_folder(made.folder())).await))
 }
 
 /// The routes of this file.

@@ -33,8 +33,7 @@ pub struct StudyExports(Downloads<bool, ExportProgress, FinishedExport>);
 pub struct FinishedExport {
     /// Whether the export contains the policies.
     pub unblinded: bool,
-    /// Folder of the package.
-    pub folder: PathBuf,
+    folder: PathBuf,
     /// The sessions in the export.
     pub sessions: Vec<SessionId>,
     /// The account of the person who started it; `None` if nobody was signed in.
@@ -43,6 +42,14 @@ pub struct FinishedExport {
     taken_back: i64,
     /// Temporary folder around the package; dropping it removes the files.
     _room: Arc<TempDir>,
+}
+
+impl FinishedExport {
+    /// Folder of the package. It is no open field: a closure that used that alone would hold the name of the folder, and
+    /// not its files.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
 }
 
 /// The state of a study's latest export.
