@@ -3,6 +3,9 @@
 
 const KEPT = "steps";
 
+/** If the disk cannot be read, it is tried again after this time. */
+export const READ_AGAIN_MS = 2000;
+
 /**
  * A store of things by their ids.
  *

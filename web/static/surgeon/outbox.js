@@ -8,11 +8,9 @@
 import { inWords, Refused } from "../shared/api.js";
 import { say } from "../shared/language.js";
 import { Delivery } from "./delivery.js";
+import { READ_AGAIN_MS } from "./disk_store.js";
 
 const PREFIX = "parfocal.outbox.";
-
-/** If the spare copy cannot be read, it is tried again after this time. */
-const READ_AGAIN_MS = 2000;
 
 /** An entry that is sent and not answered for so long is told as late. The request goes on. */
 const LATE_MS = 2000;

@@ -7,6 +7,7 @@ import { inWords, Refused } from "../shared/api.js";
 import { say } from "../shared/language.js";
 import { PATH as COMMENTS } from "./comments.js";
 import { Delivery } from "./delivery.js";
+import { READ_AGAIN_MS } from "./disk_store.js";
 
 /** @typedef {import("./origin.js").Stamp} Stamp */
 /** @typedef {"released" | "limit" | "microphone-lost" | "left"} Ending */
@@ -39,9 +40,6 @@ import { Delivery } from "./delivery.js";
  */
 
 /** @typedef {Begin | Piece} Step */
-
-/** If the device cannot be read, it is tried again after this time. */
-const READ_AGAIN_MS = 2000;
 
 /**
  * @typedef {object} Surroundings
