@@ -11,6 +11,7 @@ use tokio::net::{TcpSocket, TcpStream};
 use tokio::task::JoinSet;
 
 use super::live::Page;
+use crate::browser::wait::until;
 use crate::support::{Server, command};
 
 /// More connections than the server may have open files.
@@ -122,10 +123,5 @@ async fn each_open_page_takes_one_of_its_hosts_places_until_it_leaves() {
     assert_eq!(status().await, StatusCode::SERVICE_UNAVAILABLE);
 
     pages.shutdown().await;
-    let let_in = async {
-        while status().await != StatusCode::OK {
-            tokio::time::sleep(Duration::from_millis(50)).await;
-        }
-    };
-    tokio::time::timeout(Duration::from_mins(1), let_in).await.unwrap();
+    until("another page to be let in", || async { status().await == StatusCode::OK }).await;
 }
