@@ -82,3 +82,19 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
         assert wrong in run.stderr
         assert said in run.stderr
         assert "Traceback" not in run.stderr
+
+
+def test_two_surfaces_of_one_name_are_refused(tmp_path: Path) -> None:
+    """Their films would be the same files."""
+    command = [
+        sys.executable,
+        "-s",
+        str(TOOL),
+        "--out",
+        str(tmp_path / "films"),
+        "one/scene.png",
+        "two/scene.jpg",
+    ]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 1
+    assert "two surfaces are named scene" in run.stderr

@@ -5,7 +5,7 @@ python3 tools/make_films.py --out DIR PHOTOGRAPH_OR_FOCAL_STACK...
 Each film shows one surface, in focus everywhere, under a camera in a hand: it pans, turns, comes nearer, and the surface
 is strained as tissue is. Light, softness, noise, glints and compression differ from film to film. Blur is left to the
 training. A focal stack (a folder of pictures) first becomes one picture, each place from the plane where it is sharpest.
-Needs ffmpeg and numpy.
+Every core makes films of another surface. Needs ffmpeg and numpy.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from __future__ import annotations
 import argparse
 import shutil
 import subprocess
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +149,13 @@ def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
         raise SystemExit(f"ffmpeg could not write {file}")
 
 
+def films(path: Path, first_seed: int, given: argparse.Namespace) -> None:
+    """Write the films of one surface, a photograph or a focal stack."""
+    surface = all_in_focus(path) if path.is_dir() else read(path)
+    for number in range(given.each):
+        film(surface, given.out / f"{path.stem}-{number}.mp4", given.frames, first_seed + number)
+
+
 def main() -> None:
     """Make the films that the command line names."""
     parser = argparse.ArgumentParser(description="Make films of still surfaces, to train on.")
@@ -159,13 +168,16 @@ def main() -> None:
     if not shutil.which("ffmpeg"):
         raise SystemExit("films are made by ffmpeg, which is not installed: install Debian's package ffmpeg")
 
+    stems = [path.stem for path in given.surface]
+    for stem in stems:
+        if stems.count(stem) > 1:
+            raise SystemExit(f"two surfaces are named {stem}, and so would be their films: rename one")
+
     given.out.mkdir(parents=True, exist_ok=True)
-    seed = given.seed
-    for path in given.surface:
-        surface = all_in_focus(path) if path.is_dir() else read(path)
-        for number in range(given.each):
-            film(surface, given.out / f"{path.stem}-{number}.mp4", given.frames, seed)
-            seed += 1
+    first_seeds = [given.seed + given.each * index for index in range(len(given.surface))]
+    with ProcessPoolExecutor() as cores:
+        # The list waits for the films, and raises what went wrong with one.
+        list(cores.map(partial(films, given=given), given.surface, first_seeds))
 
 
 if __name__ == "__main__":
