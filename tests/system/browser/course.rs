@@ -16,7 +16,7 @@ const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
 #[tokio::test(flavor = "multi_thread")]
 async fn practice_a_time_limit_an_emergency_and_an_abort() {
     let driver = Driver::start();
-    let theatre = Theatre::seeing(&driver).await;
+    let theatre = Theatre::open(&driver).await;
 
     the_belief_of_a_policy_that_has_one(&theatre).await;
     practice(&theatre).await;

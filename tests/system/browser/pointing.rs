@@ -237,7 +237,7 @@ async fn the_papers_trial_has_neither_button_and_a_tap_changes_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn with_text_of_twice_the_size_the_buttons_stay_in_reach() {
     let driver = Driver::start();
-    let mut theatre = Theatre::seeing(&driver).await;
+    let mut theatre = Theatre::open(&driver).await;
     let link = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
     theatre.surgeon = driver.browser_with_large_text().await;
     theatre.surgeon.open(&link).await;
