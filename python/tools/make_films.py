@@ -75,21 +75,23 @@ def all_in_focus(folder: Path) -> Picture:
     return best
 
 
-def looked_at(picture: Picture, x: NDArray[np.float64], y: NDArray[np.float64]) -> Picture:
+def looked_at(picture: Picture, x: Picture, y: Picture) -> Picture:
     """Return the levels at places between pixels, by linear interpolation; beyond its edges a picture is mirrored."""
     height, width = picture.shape
 
-    def mirrored(place: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-        turned: NDArray[np.float64] = np.mod(place, 2 * (size - 1))
-        return turned + np.minimum(0, 2 * (size - 1 - turned))
+    def mirrored(place: Picture, size: int) -> Picture:
+        period = np.float32(2 * (size - 1))
+        turned: Picture = place - period * np.floor(place / period)
+        return size - 1 - np.abs(turned - (size - 1))
 
     x, y = mirrored(x, width), mirrored(y, height)
-    left, top = np.minimum(x.astype(np.intp), width - 2), np.minimum(y.astype(np.intp), height - 2)
-    across, down = x - left, y - top
-    above = picture[top, left] * (1 - across) + picture[top, left + 1] * across
-    below = picture[top + 1, left] * (1 - across) + picture[top + 1, left + 1] * across
-    levels: Picture = above * (1 - down) + below * down
-    return levels
+    left, top = np.minimum(x.astype(np.int32), width - 2), np.minimum(y.astype(np.int32), height - 2)
+    across, down = x - left.astype(np.float32), y - top.astype(np.float32)
+    levels, first = picture.ravel(), top * width + left
+    above = levels[first] * (1 - across) + levels[first + 1] * across
+    below = levels[first + width] * (1 - across) + levels[first + width + 1] * across
+    mixed: Picture = above * (1 - down) + below * down
+    return mixed
 
 
 def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
@@ -108,8 +110,12 @@ def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
 
     light = (255 * gain * (np.clip(surface, 0, 255) / 255) ** gamma).astype(np.float32)
     light = np.clip(blurred(light, softness / zoom) if softness else light, 0, 255)
-    x, y = np.meshgrid(np.arange(WIDTH) - WIDTH / 2, np.arange(HEIGHT) - HEIGHT / 2)
+    x = np.arange(WIDTH, dtype=np.float32)[None, :] - WIDTH / 2
+    y = np.arange(HEIGHT, dtype=np.float32)[:, None] - HEIGHT / 2
     shade = 1 - fall * (x**2 + y**2) / (WIDTH**2 / 4 + HEIGHT**2 / 4)
+    is_glint = np.zeros((HEIGHT, WIDTH), bool)
+    for left, top, radius in glints:
+        is_glint |= (x + WIDTH / 2 - left) ** 2 + (y + HEIGHT / 2 - top) ** 2 < radius**2
     place, velocity = np.array([width, height]) * random.uniform(0.3, 0.7, 2), np.zeros(2)
     angle, turning, depth, nearing = random.uniform(0, 6.28), 0.0, 0.0, 0.0
 
@@ -129,20 +135,25 @@ def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
         place, angle = place + 0.7 * velocity, angle + turning
         depth = float(np.clip(depth + nearing, -0.25, 0.25))
 
+        # How far the strain moves what is in a column, and what is in a row, to the right and down.
         swing = 0.3 * strain / wave
-        along = x + swing[0] * np.sin(y * wave[0] + pace[0] * frame + phase[0])
-        along = along + swing[1] * np.sin(x * wave[1] + pace[1] * frame + phase[1])
-        down = y + swing[2] * np.sin(x * wave[2] + pace[2] * frame + phase[2])
-        down = down + swing[3] * np.sin(y * wave[3] + pace[3] * frame + phase[3])
+        right = swing[1] * np.sin(x * wave[1] + pace[1] * frame + phase[1])
+        right_in_row = swing[0] * np.sin(y * wave[0] + pace[0] * frame + phase[0])
+        down = swing[2] * np.sin(x * wave[2] + pace[2] * frame + phase[2])
+        down_in_row = swing[3] * np.sin(y * wave[3] + pace[3] * frame + phase[3])
+
+        # Each coordinate is a sum of what depends on the column and what depends on the row.
         scale = np.exp(depth) / zoom
         cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
-        across = place[0] + cosine * along - sine * down
-        below = place[1] + sine * along + cosine * down
-        picture = looked_at(light, across, below) * shade
-        for left, top, radius in glints:
-            picture[(x + WIDTH / 2 - left) ** 2 + (y + HEIGHT / 2 - top) ** 2 < radius**2] = 255
+        across = (cosine * (x + right) - sine * down + place[0]).astype(np.float32)
+        across_in_row = (cosine * right_in_row - sine * (y + down_in_row)).astype(np.float32)
+        below = (sine * (x + right) + cosine * down + place[1]).astype(np.float32)
+        below_in_row = (sine * right_in_row + cosine * (y + down_in_row)).astype(np.float32)
+
+        picture = looked_at(light, across + across_in_row, below + below_in_row) * shade
+        picture[is_glint] = 255
         if noise:
-            picture = picture + random.normal(0, noise, picture.shape)
+            picture += np.float32(noise) * random.standard_normal(picture.shape, np.float32)
         encoder.stdin.write(np.clip(np.rint(picture), 0, 255).astype(np.uint8).tobytes())
     encoder.stdin.close()
     if encoder.wait() != 0:

@@ -35,7 +35,7 @@ fn small(policy: &str, updates: u64) -> Recipe {
     }
 
     if let Some(belief) = &mut recipe.belief {
-        (belief.scans, belief.window, belief.updates, belief.variety) = (8, 16, updates, 0.0);
+        (belief.scans, belief.window, belief.updates, belief.variety) = (8, 4, updates, 0.0);
     }
     recipe
 }
@@ -59,9 +59,9 @@ fn train(mut run: Run, legs: u64) -> bool {
 #[test]
 fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut recipe = small("parfocal", 200);
+    let mut recipe = small("parfocal", 2 * LEG);
     if let Some(belief) = &mut recipe.belief {
-        belief.scans = 32;
+        (belief.scans, belief.window) = (32, 8);
     }
     assert!(train(begin(&recipe, folder.path()), u64::MAX));
     let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();
