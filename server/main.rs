@@ -1,7 +1,5 @@
 //! The `parfocal` program: hands its arguments to [`parfocal::cli`].
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
+fn main() {
     parfocal::cli::main()
 }

@@ -26,8 +26,6 @@ mod study_analysis;
 mod train;
 mod verify;
 
-use std::process::ExitCode;
-
 use clap::{Parser, Subcommand};
 
 use output::Failure;
@@ -90,19 +88,25 @@ enum Command {
     Verify(verify::Arguments),
 }
 
-/// Runs the command that the process's arguments name. Exit code 0 success, 1 failure, 2 wrong usage.
-pub fn main() -> ExitCode {
+/// Runs the command that the process's arguments name, and ends the process. Exit code 0 success, 1 failure, 2 wrong
+/// usage.
+pub fn main() -> ! {
     let arguments = Arguments::parse();
     let outcome = run(arguments.command);
     // A thread that hangs may still hold a lens.
     parfocal_devices::lens::let_go_of_all();
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            tell(format_args!("parfocal: {failure}"));
-            ExitCode::FAILURE
-        }
+    if let Err(failure) = &outcome {
+        tell(format_args!("parfocal: {failure}"));
     }
+    end(i32::from(outcome.is_err()))
+}
+
+/// Ends the process at once. Otherwise libtorch would first take itself apart, which takes a tenth of a second, and
+/// threads that are left may still use it.
+#[allow(unsafe_code, reason = "the standard library has no such end")]
+fn end(code: i32) -> ! {
+    // SAFETY: the call takes a number and does not return.
+    unsafe { libc::_exit(code) }
 }
 
 fn run(command: Command) -> Result<(), Failure> {
