@@ -26,6 +26,8 @@ mod study_analysis;
 mod train;
 mod verify;
 
+use std::io::Write;
+
 use clap::{Parser, Subcommand};
 
 use output::Failure;
@@ -105,6 +107,8 @@ pub fn main() -> ! {
 /// threads that are left may still use it.
 #[allow(unsafe_code, reason = "the standard library has no such end")]
 fn end(code: i32) -> ! {
+    // Nobody else does it then. Each command has already done so for what it must not lose.
+    let _ = std::io::stdout().flush();
     // SAFETY: the call takes a number and does not return.
     unsafe { libc::_exit(code) }
 }
