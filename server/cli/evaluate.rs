@@ -11,7 +11,6 @@ use super::input::without_systems_own;
 use super::library;
 use super::output::{Failure, bar, bar_of_poses, print, print_result};
 use super::policy_process;
-use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{FieldOfView, Registry, exec, scripted};
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
@@ -139,7 +138,6 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> String {
 
 /// The requested policies, each of which can run, and the registry that builds them.
 fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
-    compute_on_this_thread();
     let registry = library::policies(arguments.weights.as_deref(), arguments.blur_rate())?;
 
     if matches!(arguments.blur, Some(Blur::Measured)) && arguments.stacks.is_empty() {

@@ -32,6 +32,7 @@ use clap::{Parser, Subcommand};
 
 use output::Failure;
 use parfocal_autofocus::exec;
+use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::notices::tell;
 
 /// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
@@ -94,6 +95,8 @@ enum Command {
 /// usage.
 pub fn main() -> ! {
     let arguments = Arguments::parse();
+    // Weights are read on this thread. On a busy machine, threads that share so little work wait for one another.
+    compute_on_this_thread();
     let outcome = run(arguments.command);
     // A thread that hangs may still hold a lens.
     parfocal_devices::lens::let_go_of_all();

@@ -26,7 +26,6 @@ use self::upkeep::keep_up;
 use super::announce::announcement;
 use super::output::Failure;
 use parfocal_autofocus::Registry;
-use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::priority;
 use parfocal_dashboard::health::HealthWatch;
@@ -85,8 +84,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Everything that the server writes is trial data, so only this user may read it.
     rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     control::keep_policies_quiet();
-    // The weights are read on this thread. On a busy machine, threads that share so little work wait for one another.
-    compute_on_this_thread();
 
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let outcome = runtime.block_on(serve(arguments));

@@ -106,7 +106,6 @@ fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
 }
 
 fn train(arguments: &Training) -> Result<(), Failure> {
-    compute_on_this_thread();
     let device = device(arguments.device)?;
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
     let total = run.recipe().updates();

@@ -6,7 +6,6 @@ use crate::cli::library::policies;
 use crate::cli::output::{Failure, csv, print, save};
 use crate::cli::policy_process;
 use parfocal_autofocus::Registry;
-use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::{BlurRate, PolicyName};
 use parfocal_devices::camera::calibration;
 use parfocal_recording::Recording;
@@ -55,7 +54,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// All policies, `name` among them. A policy in another process gets frames at the recording's `rate`.
 fn registry(arguments: &Arguments, name: &PolicyName, rate: Option<f64>) -> Result<Registry, Failure> {
-    compute_on_this_thread();
     let registry = policies(arguments.weights.as_deref(), arguments.blur)?;
     Ok(policy_process::with_outside(registry, name, &policy_process::for_evaluation(rate)))
 }
