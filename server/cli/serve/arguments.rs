@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Lens: simulated, emulated (an emulated Optotune driver), optotune:auto or optotune:DEVICE.
     #[arg(long, value_name = "SPEC", default_value = "simulated")]
     pub(super) lens: String,
-    /// Frame rate to request from the camera, per second; at least 5, since a frame that takes longer counts as missing.
+    /// Frame rate to request from the camera, per second; at least 5, as a later frame counts as missing.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(5..=1000))]
     pub(super) fps: u32,
     /// Seed that repeats simulated devices and practice sessions; random by default. Real sessions always use the

@@ -13,7 +13,8 @@ use super::runner::guarded;
 use parfocal_base::priority::{self, ThreadRole};
 use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame};
 
-/// Longest wait for one frame. After it the thread checks whether it should stop, and asks the camera again.
+/// Longest wait for one frame. After it the thread checks whether it should stop, and asks the camera again. The least
+/// `--fps` of the server follows from it.
 const TIMEOUT: Duration = Duration::from_millis(200);
 /// Pause after a failure without a wait, so that a dead camera does not keep a core busy.
 const PAUSE: Duration = Duration::from_millis(50);
