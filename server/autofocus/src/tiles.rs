@@ -5,7 +5,6 @@
 
 use std::collections::VecDeque;
 use std::ops::Range;
-use std::sync::Arc;
 
 use multiversion::multiversion;
 
@@ -23,8 +22,11 @@ const TILES: usize = ACROSS * ACROSS;
 const BANDS: usize = LAGS.len();
 /// So many pixels at the ends of a picture have no second difference at the longest lag.
 const EDGE: usize = LAGS[BANDS - 1];
+/// Rows of a band's [`ColumnSums`]: one more than there are rows of pixels with second differences at all lags.
+const SUMS: usize = SIDE - 2 * EDGE + 1;
 /// How many frames ago the frames are that a new one is compared with.
 const AGO: [usize; 4] = [1, 2, 4, 8];
+const LONGEST: usize = AGO[AGO.len() - 1];
 /// A tile is near the patch if its centre is at most so many pixels from the patch's centre along both axes.
 const NEAR: usize = 40;
 /// Least share of the tiles that both frames must show.
@@ -48,8 +50,7 @@ type Tiles = Vec<Option<Bands>>;
 /// An earlier frame.
 #[derive(Debug, Clone)]
 struct Earlier {
-    /// [`Surroundings::levels`].
-    levels: Arc<[f32]>,
+    energies: ColumnSums,
     focal_power: f32,
     /// How far the scene moved from the frame before to this one (right, down), in pixels.
     motion: (isize, isize),
@@ -60,7 +61,7 @@ struct Earlier {
 /// The latest frames' views.
 #[derive(Debug, Clone, Default)]
 pub struct ViewTrace {
-    /// The latest first, at most as many as the longest of [`AGO`].
+    /// The latest first, one more than the [`LONGEST`] comparison needs.
     earlier: VecDeque<Earlier>,
     latest: Option<Box<ViewTransform>>,
     /// The logarithms of all tiles' energies in the latest frame.
@@ -80,7 +81,9 @@ impl ViewTrace {
         let transform = ViewTransform::of(&surroundings.levels);
         let registered = self.latest.as_ref().map(|latest| latest.registered_to(&transform));
         let (motion, stands_out) = registered.unwrap_or_default();
-        let now = Now::of(surroundings);
+        // A frame that is too long ago to be compared with leaves its memory to the new one.
+        let spent = if self.earlier.len() > LONGEST { self.earlier.pop_back() } else { None };
+        let now = Now::of(surroundings, spent.map(|earlier| earlier.energies));
 
         let (by_itself, compared) = input.split_at_mut(BY_ITSELF);
         self.describe(&now, by_itself);
@@ -99,21 +102,19 @@ impl ViewTrace {
             least = least.min(earlier.stands_out);
         }
 
-        let levels = Arc::clone(&surroundings.levels);
-        self.earlier.push_front(Earlier { levels, focal_power, motion, stands_out });
-        self.earlier.truncate(AGO[AGO.len() - 1]);
+        self.earlier.push_front(Earlier { energies: now.energies, focal_power, motion, stands_out });
         self.latest = Some(Box::new(transform));
         input
     }
 
     /// Writes to `input` what a frame shows by itself.
-    fn describe(&mut self, now: &Now<'_>, input: &mut [f32]) {
+    fn describe(&mut self, now: &Now, input: &mut [f32]) {
         let logarithms: Vec<Bands> = now.tiles.iter().flatten().map(|energies| energies.map(logarithm)).collect();
         let (mean, deviation) = moments(&logarithms);
         let before = self.sharpness.replace(mean).unwrap_or(mean);
         let change = std::array::from_fn(|band| 4.0 * (mean[band] - before[band]));
 
-        let patch = seen_window(now.patch, (0, 0)).map_or([0.0; BANDS], |(x, y)| window(now.levels, x, y));
+        let patch = seen_window(now.patch, (0, 0)).map_or([0.0; BANDS], |(x, y)| now.energies.mean(&x, &y));
         let near = pooled(&now.tiles, &now.near);
         write(input, &[patch.map(logarithm), near.map(logarithm), mean, deviation, change]);
         input[5 * BANDS] = 1.0;
@@ -121,8 +122,8 @@ impl ViewTrace {
 }
 
 /// The frame that is compared with earlier ones.
-struct Now<'a> {
-    levels: &'a [f32],
+struct Now {
+    energies: ColumnSums,
     /// Column and row of the patch's upper left pixel in the view.
     patch: (usize, usize),
     tiles: Tiles,
@@ -130,13 +131,15 @@ struct Now<'a> {
     near: Vec<bool>,
 }
 
-impl<'a> Now<'a> {
-    fn of(surroundings: &'a Surroundings) -> Self {
+impl Now {
+    fn of(surroundings: &Surroundings, spent: Option<ColumnSums>) -> Self {
         let Surroundings { levels, patch } = surroundings;
         let centre = |tile: usize| tile * TILE + TILE / 2;
         let is_near = |tile: usize, corner: usize| centre(tile).abs_diff(corner + PATCH_SIDE / 2) <= NEAR;
         let near = (0..TILES).map(|tile| is_near(tile % ACROSS, patch.0) && is_near(tile / ACROSS, patch.1));
-        Self { levels, patch: *patch, tiles: tiles(levels, &(0..SIDE), &(0..SIDE)), near: near.collect() }
+        let energies = ColumnSums::of(levels, spent);
+        let tiles = energies.tiles((0, 0), &(0..SIDE), &(0..SIDE));
+        Self { energies, patch: *patch, tiles, near: near.collect() }
     }
 
     /// Writes to `input` how blur changed since the frame `before`, from where the scene has `moved` (right, down).
@@ -147,14 +150,15 @@ impl<'a> Now<'a> {
         if columns.len() <= 2 * EDGE || rows.len() <= 2 * EDGE {
             return;
         }
-        let earlier = carried(&before.levels, moved, &columns, &rows);
 
         // The whole patch, beside the same piece of the scene.
-        let patch = seen_window(self.patch, moved)
-            .map_or([0.0; BANDS], |(x, y)| change(&window(self.levels, x.clone(), y.clone()), &window(&earlier, x, y)));
+        let patch = seen_window(self.patch, moved).map_or([0.0; BANDS], |(x, y)| {
+            let then = before.energies.mean(&carried_back(&x, moved.0), &carried_back(&y, moved.1));
+            change(&self.energies.mean(&x, &y), &then)
+        });
         write(input, &[patch]);
 
-        let then = tiles(&earlier, &columns, &rows);
+        let then = before.energies.tiles(moved, &columns, &rows);
         let pairs: Vec<Option<(Bands, Bands)>> =
             self.tiles.iter().zip(&then).map(|(now, then)| Some(((*now)?, (*then)?))).collect();
         let share = pairs.iter().flatten().count() as f32 / TILES as f32;
@@ -217,90 +221,83 @@ fn seen_window(patch: (usize, usize), moved: (isize, isize)) -> Option<(Range<us
     (x.len() >= PATCH_SIDE / 4 && y.len() >= PATCH_SIDE / 4).then_some((x, y))
 }
 
-/// An earlier view's `levels`, carried `by` the motion to where the scene is now. Outside `columns` and `rows`, of which
-/// it shows nothing, they are 0.
-fn carried(levels: &[f32], by: (isize, isize), columns: &Range<usize>, rows: &Range<usize>) -> Vec<f32> {
-    let mut out = vec![0.0; SIDE * SIDE];
-    let left = columns.start.wrapping_add_signed(-by.0);
-    for y in rows.clone() {
-        let from = y.wrapping_add_signed(-by.1) * SIDE + left;
-        out[y * SIDE..][columns.clone()].copy_from_slice(&levels[from..from + columns.len()]);
+/// Energies of a view, summed down its columns, so that those of any rectangle take two rows of them. There are
+/// [`SUMS`] rows for each band, one band after another: row `y` of them is the sum of the first `y` rows of pixels,
+/// beginning [`EDGE`] pixels from the view's upper end.
+#[derive(Debug, Clone)]
+struct ColumnSums(Box<[[f32; SIDE]]>);
+
+impl ColumnSums {
+    /// The energies of a view's `levels`, in the memory of one that is no longer needed, if there is one.
+    fn of(levels: &[f32], spent: Option<Self>) -> Self {
+        let mut sums = spent.unwrap_or_else(|| Self(vec![[0.0; SIDE]; BANDS * SUMS].into()));
+        add_up(levels, &mut sums.0);
+        sums
     }
-    out
+
+    /// Mean energies in the columns `x` and rows `y`, which lie [`EDGE`] pixels or more from the view's ends.
+    fn mean(&self, x: &Range<usize>, y: &Range<usize>) -> Bands {
+        let pixels = (x.len() * y.len()).max(1) as f32;
+        std::array::from_fn(|band| {
+            let line = |row: usize| &self.0[band * SUMS + row - EDGE][x.clone()];
+            difference(line(y.start), line(y.end)) / pixels
+        })
+    }
+
+    /// Energies of the tiles that lie [`EDGE`] pixels or more within `columns` and `rows` of a view before which the
+    /// scene `moved`, so that this one shows them elsewhere.
+    fn tiles(&self, moved: (isize, isize), columns: &Range<usize>, rows: &Range<usize>) -> Tiles {
+        let place = |tile: usize, seen: &Range<usize>, by: isize| {
+            let tile = tile * TILE..(tile + 1) * TILE;
+            (tile.start >= seen.start + EDGE && tile.end + EDGE <= seen.end).then(|| carried_back(&tile, by))
+        };
+        let tile = |tile: usize| {
+            let x = place(tile % ACROSS, columns, moved.0)?;
+            let y = place(tile / ACROSS, rows, moved.1)?;
+            Some(self.mean(&x, &y))
+        };
+        (0..TILES).map(tile).collect()
+    }
 }
 
-/// Energies in a window of a view that lies [`EDGE`] pixels or more from its ends.
-fn window(levels: &[f32], x: Range<usize>, y: Range<usize>) -> Bands {
-    let line = |row: usize, column: usize| &levels[row * SIDE + column..][..x.len()];
-    let pixels = (x.len() * y.len()).max(1) as f32;
-    LAGS.map(|lag| {
-        let mut sum = 0.0;
-        for row in y.clone() {
-            let here = line(row, x.start);
-            sum += squares(line(row - lag, x.start), here, line(row + lag, x.start));
-            sum += squares(line(row, x.start - lag), here, line(row, x.start + lag));
-        }
-        sum / pixels
-    })
+/// Where the pixels `place` of an axis were before they moved `by`.
+const fn carried_back(place: &Range<usize>, by: isize) -> Range<usize> {
+    place.start.wrapping_add_signed(-by)..place.end.wrapping_add_signed(-by)
 }
 
-/// The sum of the squares of the second differences of three lines of equal length.
+/// Writes to `sums` the energies of a view's `levels` at each lag, as [`ColumnSums`] keeps them.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn squares(before: &[f32], here: &[f32], after: &[f32]) -> f32 {
+fn add_up(levels: &[f32], sums: &mut [[f32; SIDE]]) {
+    let rows = levels.as_chunks::<SIDE>().0;
+    for (sums, lag) in sums.chunks_exact_mut(SUMS).zip(LAGS) {
+        for y in EDGE..SIDE - EDGE {
+            let (above, here, below) = (&rows[y - lag], &rows[y], &rows[y + lag]);
+            let (before, after) = sums[y - EDGE..].split_at_mut(1);
+            let (before, after) = (&before[0], &mut after[0]);
+            for x in EDGE..SIDE - EDGE {
+                let down = above[x] - 2.0 * here[x] + below[x];
+                let along = here[x - lag] - 2.0 * here[x] + here[x + lag];
+                after[x] = before[x] + down * down + along * along;
+            }
+        }
+    }
+}
+
+/// The sum of `after` less that of `before`, which is as long.
+fn difference(before: &[f32], after: &[f32]) -> f32 {
     const LANES: usize = 8;
 
     let mut sums = [0.0f32; LANES];
     let (before, before_rest) = before.as_chunks::<LANES>();
-    let (here, here_rest) = here.as_chunks::<LANES>();
     let (after, after_rest) = after.as_chunks::<LANES>();
-    for ((before, here), after) in before.iter().zip(here).zip(after) {
+    for (before, after) in before.iter().zip(after) {
         for lane in 0..LANES {
-            let difference = before[lane] - 2.0 * here[lane] + after[lane];
-            sums[lane] += difference * difference;
+            sums[lane] += after[lane] - before[lane];
         }
     }
 
-    let rest = before_rest.iter().zip(here_rest).zip(after_rest);
-    let rest: f32 = rest.map(|((before, here), after)| (before - 2.0 * here + after).powi(2)).sum();
+    let rest: f32 = before_rest.iter().zip(after_rest).map(|(before, after)| after - before).sum();
     rest + sums.iter().sum::<f32>()
-}
-
-/// Energies of the tiles that lie [`EDGE`] pixels or more within `columns` and `rows`.
-fn tiles(levels: &[f32], columns: &Range<usize>, rows: &Range<usize>) -> Tiles {
-    let sums = tile_sums(levels);
-    let is_seen =
-        |tile: usize, seen: &Range<usize>| tile * TILE >= seen.start + EDGE && (tile + 1) * TILE + EDGE <= seen.end;
-    let energies = |tile: usize| std::array::from_fn(|band| sums[band][tile] / (TILE * TILE) as f32);
-    let tile = |tile: usize| {
-        let seen = is_seen(tile % ACROSS, columns) && is_seen(tile / ACROSS, rows);
-        seen.then(|| energies(tile))
-    };
-    (0..TILES).map(tile).collect()
-}
-
-/// The sum of the squares of the second differences in each tile, at each lag. The outermost tiles, which have none at
-/// the longest lag at their outer pixels, have 0.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn tile_sums(levels: &[f32]) -> [[f32; TILES]; BANDS] {
-    let rows = levels.as_chunks::<SIDE>().0;
-    let mut out = [[0.0; TILES]; BANDS];
-    for (sums, lag) in out.iter_mut().zip(LAGS) {
-        for row in 1..ACROSS - 1 {
-            let mut columns = [0.0f32; SIDE];
-            for y in row * TILE..(row + 1) * TILE {
-                let (above, here, below) = (&rows[y - lag], &rows[y], &rows[y + lag]);
-                for x in TILE..SIDE - TILE {
-                    let down = above[x] - 2.0 * here[x] + below[x];
-                    let along = here[x - lag] - 2.0 * here[x] + here[x + lag];
-                    columns[x] += down * down + along * along;
-                }
-            }
-            for column in 1..ACROSS - 1 {
-                sums[row * ACROSS + column] = columns[column * TILE..][..TILE].iter().sum();
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]
@@ -344,10 +341,11 @@ mod tests {
 
         let alike =
             |found: &Bands| found.iter().zip(expected).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-3);
-        let tiles = tiles(&levels, &(0..SIDE), &(0..SIDE));
+        let energies = ColumnSums::of(&levels, None);
+        let tiles = energies.tiles((0, 0), &(0..SIDE), &(0..SIDE));
         assert_eq!(tiles.iter().flatten().count(), (ACROSS - 2) * (ACROSS - 2), "the outermost are not wholly seen");
         assert!(tiles.iter().flatten().all(alike), "{tiles:?} {expected:?}");
-        assert!(alike(&window(&levels, 16..48, 32..64)));
+        assert!(alike(&energies.mean(&(16..48), &(32..64))));
     }
 
     #[test]
