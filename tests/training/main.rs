@@ -71,6 +71,18 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 }
 
 #[test]
+fn the_number_of_cores_changes_no_digit() {
+    let recipe = small("parfocal", LEG);
+    let weights = [1, 3].map(|cores| {
+        let folder = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build().unwrap();
+        assert!(pool.install(|| train(begin(&recipe, folder.path()), u64::MAX)));
+        std::fs::read(folder.path().join("parfocal.safetensors")).unwrap()
+    });
+    assert!(weights[0] == weights[1]);
+}
+
+#[test]
 fn what_begins_with_weights_begins_with_what_they_know() {
     let folder = tempfile::tempdir().unwrap();
     let recipe = small("mgm-learned", 1);
