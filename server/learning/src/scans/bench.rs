@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::planes::PlaneStack;
@@ -60,10 +61,18 @@ impl BenchScenes {
     /// # Errors
     /// If a folder is missing, or what is in it cannot be used.
     pub fn read(folders: &[String], raw: Option<PixelFormat>) -> Result<Self, BenchError> {
+        let read: Vec<_> = folders.par_iter().map(|folder| recording(folder, raw)).collect();
+        let read: Vec<(Vec<Scene>, Vec<String>)> = read.into_iter().collect::<Result<_, _>>()?;
+        let (recordings, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+
         let mut hash = Sha256::new();
-        let mut doubts = Vec::new();
-        let recordings: Vec<Vec<Scene>> =
-            folders.iter().map(|folder| recording(folder, raw, &mut hash, &mut doubts)).collect::<Result<_, _>>()?;
+        for scene in recordings.iter().flatten() {
+            match scene {
+                Scene::Flat(clip) => clip.digest(&mut hash),
+                Scene::Stack(stack) => stack.planes.digest(&mut hash),
+                Scene::Recorded(scan) => scan.digest(&mut hash),
+            }
+        }
 
         let is_kept = |index: usize| index % KEPT_OF == KEPT_OF - 1;
         let scenes = |kept: bool| -> Vec<Scene> {
@@ -76,27 +85,21 @@ impl BenchScenes {
             folders.iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, folder)| folder.clone()).collect();
         let validation = if kept.is_empty() { training.clone() } else { scenes(true) };
 
-        for doubt in doubts {
+        for doubt in doubts.into_iter().flatten() {
             tell(format_args!("note: {doubt}"));
         }
         Ok(Self { training, validation, kept, sha256: hex::encode(hash.finalize()) })
     }
 }
 
-/// The scenes of one folder.
-fn recording(
-    folder: &str,
-    raw: Option<PixelFormat>,
-    hash: &mut Sha256,
-    doubts: &mut Vec<String>,
-) -> Result<Vec<Scene>, BenchError> {
+/// The scenes of one folder, and what is doubtful about its pictures.
+fn recording(folder: &str, raw: Option<PixelFormat>) -> Result<(Vec<Scene>, Vec<String>), BenchError> {
     if Path::new(folder).join(HEADER).exists() {
         let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Surroundings, &|| ())?;
         if scan.poses().len() < 2 {
             return Err(BenchError::OnePose(folder.to_owned()));
         }
-        scan.digest(hash);
-        return Ok(vec![Scene::Recorded(Arc::new(scan))]);
+        return Ok((vec![Scene::Recorded(Arc::new(scan))], Vec::new()));
     }
 
     let source = StackSource::parse(folder, raw);
@@ -104,9 +107,7 @@ fn recording(
         return Err(BenchError::NoFolder(folder.to_owned()));
     }
 
-    let (scaled, doubtful) = source.at_scales()?;
-    doubts.extend(doubtful);
-
+    let (scaled, doubts) = source.at_scales()?;
     let mut scenes: Vec<StackScene> = Vec::new();
     for stack in scaled {
         // A stack that is small enough is the same at both scales.
@@ -121,11 +122,10 @@ fn recording(
 
         let smaller = stack.smaller(SMALLER);
         for pictures in [Some(Arc::unwrap_or_clone(stack.pictures)), smaller].into_iter().flatten() {
-            pictures.digest(hash);
             scenes.push(scene(planes, pictures));
         }
     }
-    Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())
+    Ok((scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect(), doubts))
 }
 
 /// A photographed stack in which about `planes` planes make the range of focal power.

@@ -117,7 +117,8 @@ impl Clip {
 
         for frame in &self.frames {
             hash.update((frame.width as u64).to_le_bytes());
-            frame.data.iter().for_each(|value| hash.update(value.to_le_bytes()));
+            let bytes: Vec<u8> = frame.data.iter().flat_map(|value| value.to_le_bytes()).collect();
+            hash.update(bytes);
         }
     }
 

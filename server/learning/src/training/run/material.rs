@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::checkpoint::Checkpoint;
@@ -246,10 +247,9 @@ fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, TrainError> {
         return Ok(None);
     }
 
-    let mut clips = Vec::new();
-    for path in paths {
-        clips.extend(footage::clips(path)?);
-    }
+    let read: Vec<_> = paths.par_iter().map(|path| footage::clips(path)).collect();
+    let clips: Vec<Vec<Arc<Clip>>> = read.into_iter().collect::<Result<_, _>>()?;
+    let clips = clips.concat();
 
     let mut hash = Sha256::new();
     for clip in &clips {
