@@ -13,6 +13,7 @@ use parfocal_learning::scans::clip::Clip;
 use parfocal_learning::scans::pictures::{Split, varied};
 use parfocal_learning::scans::scenery::Scenery;
 use parfocal_learning::scans::variety::Variety;
+use parfocal_learning::training::belief::BeliefTrainer;
 use parfocal_learning::training::dqn::DqnTrainer;
 use parfocal_learning::training::dqn::replay::{CompactView, Replay, Transition};
 use parfocal_learning::training::environment::Environment;
@@ -63,20 +64,31 @@ fn updates(clips: &[Arc<Clip>], name: &str, input: Input, batch: usize, times: u
     println!("ours {name}, {batch} transitions: {rate:.1} updates a second, {:.0} transitions", rate * batch as f64);
 }
 
-/// Updates a second of a whole training, including the frames that it plays: on one thread, and on one for each core.
+/// Updates a second of whole trainings, including the frames that they play: on one thread, and on one for each core.
 fn trainings(clips: &[Arc<Clip>]) {
-    for threads in [1, 0] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let (rate, threads) = pool.install(|| {
-            compute_on_this_thread();
-            let recipe = Recipe::parse(shipped("cnn-learned").unwrap()).unwrap().dqn.unwrap();
-            let mut trainer = DqnTrainer::new(Input::Patch, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
-            let update = || {
-                black_box(trainer.update());
-            };
-            (rate(500, update), rayon::current_num_threads())
-        });
-        println!("training cnn-learned, {threads} threads: {rate:.1} updates a second");
+    for (name, times) in [("cnn-learned", 500), ("parfocal-glass", 40)] {
+        for threads in [1, 0] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (rate, threads) = pool.install(|| {
+                compute_on_this_thread();
+                let mut trainer = trainer(name, clips);
+                let update = || {
+                    black_box(trainer.update());
+                };
+                (rate(times, update), rayon::current_num_threads())
+            });
+            println!("training {name}, {threads} threads: {rate:.1} updates a second");
+        }
+    }
+}
+
+/// A training by the recipe `name`, over `clips` alone.
+fn trainer(name: &str, clips: &[Arc<Clip>]) -> Box<dyn Trainer> {
+    let recipe = Recipe::parse(shipped(name).unwrap()).unwrap();
+    let scenery = Scenery::from(clips.to_vec());
+    match (recipe.dqn, recipe.belief) {
+        (Some(dqn), _) => Box::new(DqnTrainer::new(Input::Patch, dqn, scenery, 1, tch::Device::Cpu)),
+        (None, belief) => Box::new(BeliefTrainer::new(belief.unwrap(), scenery, 1, tch::Device::Cpu)),
     }
 }
 
