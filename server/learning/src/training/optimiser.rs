@@ -104,14 +104,8 @@ impl Optimiser {
         &self.flat
     }
 
-    /// Takes one step down the gradient of `loss`. The gradient's norm is clipped to `clip`, the step size scaled by
-    /// `scale`.
-    pub fn minimise(&mut self, loss: &Tensor, clip: f64, scale: f64) {
-        let gradient = self.flat.gradient(loss);
-        self.descend(gradient, clip, scale);
-    }
-
-    /// Takes one step down `gradient`, which holds the gradients of all variables in the order of their names.
+    /// Takes one step down `gradient`, which holds the gradients of all variables in the order of their names. Its norm
+    /// is clipped to `clip`, the step size scaled by `scale`.
     pub fn descend(&mut self, mut gradient: Tensor, clip: f64, scale: f64) {
         tch::no_grad(|| {
             let shrink = clip / (gradient.norm().double_value(&[]) + 1e-6);
@@ -186,7 +180,8 @@ mod tests {
         let variable = store.root().zeros("variable", &[1]);
         let mut optimiser = Optimiser::new(rule, &store);
         for gradient in gradients {
-            optimiser.minimise(&(&variable * *gradient).sum(tch::Kind::Float), clip, scale);
+            let gradient = optimiser.flat().gradient(&(&variable * *gradient).sum(tch::Kind::Float));
+            optimiser.descend(gradient, clip, scale);
         }
         variable.double_value(&[0])
     }
