@@ -61,8 +61,8 @@ impl BenchScenes {
     /// # Errors
     /// If a folder is missing, or what is in it cannot be used.
     pub fn read(folders: &[String], raw: Option<PixelFormat>) -> Result<Self, BenchError> {
-        let read: Vec<_> = folders.par_iter().map(|folder| recording(folder, raw)).collect();
-        let read: Vec<(Vec<Scene>, Vec<String>)> = read.into_iter().collect::<Result<_, _>>()?;
+        let read: Vec<(Vec<Scene>, Vec<String>)> =
+            folders.par_iter().map(|folder| recording(folder, raw)).collect::<Result<_, _>>()?;
         let (recordings, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
 
         let mut hash = Sha256::new();

@@ -222,8 +222,10 @@ impl RecordedScan {
         self.powers.iter().for_each(|power| hash.update(power.get().to_le_bytes()));
         for pose in &self.poses {
             pose.patches.iter().for_each(|patch| hash.update(patch.as_slice()));
-            let wider = pose.wider.iter().flatten().flatten();
-            wider.flat_map(|coarse| coarse.0.iter()).for_each(|value| hash.update(value.to_le_bytes()));
+            for coarse in pose.wider.iter().flatten().flatten() {
+                let bytes: Vec<u8> = coarse.0.iter().flat_map(|value| value.to_le_bytes()).collect();
+                hash.update(bytes);
+            }
         }
     }
 

@@ -247,8 +247,7 @@ fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, TrainError> {
         return Ok(None);
     }
 
-    let read: Vec<_> = paths.par_iter().map(|path| footage::clips(path)).collect();
-    let clips: Vec<Vec<Arc<Clip>>> = read.into_iter().collect::<Result<_, _>>()?;
+    let clips: Vec<Vec<Arc<Clip>>> = paths.par_iter().map(|path| footage::clips(path)).collect::<Result<_, _>>()?;
     let clips = clips.concat();
 
     let mut hash = Sha256::new();
