@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor, nn};
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
 use super::spectrum::{FEATURES, PatchTransform, SHARPNESS, features, spectrum};
-use super::tiles::ViewTrace;
+use super::tiles::{ViewTrace, count_from_other_end};
 use super::weights::{self, WeightsError};
 use super::{Decision, FieldOfView, Observation, Policy};
 use parfocal_base::{BlurRate, FocalPower, IN_FOCUS};
@@ -214,6 +214,20 @@ impl Trace {
     }
 }
 
+/// What [`Trace::input`] would have returned instead of `input` if focal powers were counted from the other end of the
+/// lens's range.
+fn from_other_end(input: &[f32; BELIEF_INPUT]) -> [f32; BELIEF_INPUT] {
+    let mut other = *input;
+    let (stands, moved) = other[2 * FEATURES + CHANGES..NEAR_INPUT].split_at_mut(BINS);
+    stands.reverse();
+    for change in moved {
+        *change = -*change;
+    }
+
+    count_from_other_end(&mut other[SEEN_INPUT + 2..]);
+    other
+}
+
 /// Adds one unit to the two bins around `place` (0..=1), divided so that its mean is `place`.
 pub fn spread_over_bins(place: f64, bins: &mut [f32]) {
     let last = bins.len() - 1;
@@ -331,8 +345,13 @@ fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
 }
 
 /// The belief tracker as a policy. Use one instance per scan.
+///
+/// The network sees each frame twice: as it is, and with focal powers counted [from the other end](from_other_end).
+/// Blur is the same on both sides of the optimum, so both beliefs should be the same, mirrored. They err differently,
+/// and pooled they err less than either.
 pub struct BeliefTracker {
     network: BeliefNetwork,
+    /// That of both ways of counting, `[1, 2, MEMORY]`.
     memory: Tensor,
     trace: Trace,
     // Keeps alive the variables that the network's layers use.
@@ -348,19 +367,23 @@ impl BeliefTracker {
         let store = nn::VarStore::new(Device::Cpu);
         let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         weights::load(&store, bytes)?;
-        let memory = network.blank(1, Device::Cpu);
+        let memory = network.blank(2, Device::Cpu);
         Ok(Self { network, memory, trace: Trace::default(), _store: store })
     }
 
     fn believe(&mut self, seen: &Observation<'_>) -> Vec<f32> {
         let input = self.trace.input(seen.view, seen.focal_power.get());
-        let input = Tensor::from_slice(&input).view([1, 1, BELIEF_INPUT as i64]);
+        let ways = [input, from_other_end(&input)];
+        let inputs = Tensor::from_slice(ways.as_flattened()).view([2, 1, BELIEF_INPUT as i64]);
 
-        let (logits, memory) = tch::no_grad(|| self.network.forward(&input, &self.memory));
+        let (logits, memory) = tch::no_grad(|| self.network.forward(&inputs, &self.memory));
         self.memory = memory;
 
+        // The geometric mean of both beliefs.
+        let logarithms = logits.view([2, -1]).log_softmax(1, Kind::Float);
+        let pooled = (logarithms.get(0) + logarithms.get(1).flip([0])) / 2.0;
         let mut belief = vec![0.0; BINS];
-        logits.view([-1]).softmax(0, Kind::Float).copy_data(&mut belief, BINS);
+        pooled.softmax(0, Kind::Float).copy_data(&mut belief, BINS);
         belief
     }
 }
@@ -388,7 +411,7 @@ impl Policy for BeliefTracker {
     }
 
     fn forget(&mut self) {
-        self.memory = self.network.blank(1, Device::Cpu);
+        self.memory = self.network.blank(2, Device::Cpu);
         self.trace = Trace::knowing(self.trace.blur);
     }
 }
@@ -396,6 +419,60 @@ impl Policy for BeliefTracker {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use parfocal_devices::simulation::blur::gaussian_blur;
+    use parfocal_devices::simulation::texture::texture;
+    use parfocal_imaging::{PATCH_SIDE, Square};
+
+    /// Views of a texture that drifts and is blurred by how far the lens stands from a walking optimum.
+    fn view(frame: usize, focal_power: f64) -> View {
+        let optimum = 0.6 + 0.2 * (frame as f64 / 6.0).sin();
+        let scene = gaussian_blur(&texture(3, 300), 5.0 * (focal_power - optimum).abs());
+        let corner = (100 + 2 * frame, 120 - frame);
+        let part = |Square { x, y, side }| -> Vec<f32> {
+            (0..side * side).map(|i| scene.data[(y + i / side) * scene.width + x + i % side]).collect()
+        };
+        let patch = part(Square { x: corner.0, y: corner.1, side: PATCH_SIDE });
+        View::around(Patch(patch.try_into().unwrap()), corner, (300, 300), part)
+    }
+
+    #[test]
+    fn a_lens_that_counts_from_the_other_end_is_believed_to_be_in_the_same_place() {
+        let weights = include_bytes!("../../../policies/parfocal.safetensors");
+        let mut tracker = BeliefTracker::new(weights).unwrap();
+        let mut other = BeliefTracker::new(weights).unwrap();
+
+        let mut stands = 0.3;
+        let mut travel = 0.0;
+        for frame in 0..24 {
+            let view = view(frame, stands);
+            let at = |focal_power| Observation { view: &view, focal_power: FocalPower::new(focal_power).unwrap() };
+            let Decision { target, belief, .. } = tracker.step(&at(stands));
+            let mirrored = other.look_on(&at(1.0 - stands), FocalPower::new(1.0 - target).unwrap());
+
+            let belief = belief.unwrap();
+            let mirrored = mirrored.unwrap();
+            let differ = belief.iter().zip(mirrored.iter().rev()).any(|(a, b)| (a - b).abs() > 1e-4);
+            assert!(!differ, "frame {frame}: {belief:?} {mirrored:?}");
+            travel += (target - stands).abs();
+            stands = target;
+        }
+        assert!(travel > 0.3, "it moved: {travel}");
+    }
+
+    #[test]
+    fn counted_from_the_other_end_the_same_frames_are_told_mirrored() {
+        let mut trace = Trace::default();
+        let mut other = Trace::default();
+        for (frame, focal_power) in [0.3, 0.44, 0.41, 0.9, 0.88, 0.2].into_iter().enumerate() {
+            let seen = view(frame, focal_power);
+            let expected = from_other_end(&trace.input(&seen, focal_power));
+            let found = other.input(&seen, 1.0 - focal_power);
+            assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-4), "{frame}");
+
+            trace.ask(focal_power + 0.05);
+            other.ask(1.0 - focal_power - 0.05);
+        }
+    }
 
     #[test]
     fn the_best_place_of_known_beliefs() {

@@ -41,6 +41,9 @@ const COMPARED: usize = 4 * BANDS + 3;
 /// Length of the result of [`ViewTrace::see`].
 pub const VIEW_INPUT: usize = BY_ITSELF + AGO.len() * COMPARED;
 
+/// Place of the difference of focal power among the inputs from one comparison.
+const MOVED: usize = 4 * BANDS + 1;
+
 /// Mean squares of the second differences, down and along together, at each of [`LAGS`]; or a function of them.
 type Bands = [f32; BANDS];
 
@@ -96,7 +99,7 @@ impl ViewTrace {
                 let part = &mut compared[which * COMPARED..][..COMPARED];
                 now.compare(earlier, moved, part);
                 part[4 * BANDS] = ((least - 7.0) / 5.0).clamp(-2.0, 3.0);
-                part[4 * BANDS + 1] = 10.0 * (focal_power - earlier.focal_power);
+                part[MOVED] = 10.0 * (focal_power - earlier.focal_power);
             }
             moved = (moved.0 + earlier.motion.0, moved.1 + earlier.motion.1);
             least = least.min(earlier.stands_out);
@@ -172,6 +175,14 @@ impl Now {
         let changes: Vec<Bands> = pairs.iter().flatten().map(|(now, then)| change(now, then)).collect();
         let (mean, deviation) = moments(&changes);
         write(&mut input[BANDS..], &[near, mean, deviation]);
+    }
+}
+
+/// Makes of what [`ViewTrace::see`] returned what it would have returned if focal powers were counted from the other end
+/// of the lens's range.
+pub fn count_from_other_end(input: &mut [f32]) {
+    for part in input[BY_ITSELF..].chunks_exact_mut(COMPARED) {
+        part[MOVED] = -part[MOVED];
     }
 }
 
