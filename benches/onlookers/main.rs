@@ -118,7 +118,7 @@ fn main() {
             let course = |seed| StackCourse::new(Arc::clone(&stack.pictures), stack.planes, seed).expect("is large");
             let scans = StackScans(SEEDS.map(|seed| Arc::new(course(seed))).collect());
             let found = counts(&scans, scans.count());
-            print(&format!("{} {}", source.name(), stack.scale), found);
+            print(&format!("{} {}", source.folder.display(), stack.scale), found);
             for (sum, found) in all.iter_mut().zip(found) {
                 sum.all += found.all;
                 sum.told += found.told;

@@ -2,7 +2,7 @@
 //! how each policy does there compared with the MGM hill-climber.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Component, Path};
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -57,8 +57,34 @@ impl FromStr for Blur {
     }
 }
 
-/// Makes [`SEEDS`] courses over `source` at each scale.
-fn items(source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Vec<Item>, UnfitStack> {
+/// A name for each of `sources`: its folder's. Where others have the same, as `pose0001` of several scans, the folders
+/// around it are named too, as far as it takes to tell them apart.
+fn names(sources: &[StackSource]) -> Vec<String> {
+    let folders: Vec<Vec<String>> = sources.iter().map(folders).collect();
+    let tail = |folders: &[String], length: usize| folders[folders.len().saturating_sub(length)..].join("-");
+
+    let name = |own: &Vec<String>| {
+        let is_clear = |length: &usize| {
+            let alike = |other: &&Vec<String>| tail(other, *length) == tail(own, *length);
+            folders.iter().filter(alike).all(|other| other == own)
+        };
+        tail(own, (1..own.len()).find(is_clear).unwrap_or(own.len()))
+    };
+    folders.iter().map(name).collect()
+}
+
+/// The folders that lead to a stack, and its own.
+fn folders(source: &StackSource) -> Vec<String> {
+    let named = |part: Component<'_>| match part {
+        Component::Normal(name) => Some(name.to_string_lossy().into_owned()),
+        _ => None,
+    };
+    let path = std::path::absolute(&source.folder).unwrap_or_else(|_| source.folder.clone());
+    path.components().filter_map(named).collect()
+}
+
+/// Makes [`SEEDS`] courses over `source`, which is called `name`, at each scale.
+fn items(name: &str, source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
@@ -69,7 +95,7 @@ fn items(source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Ve
             Some(Blur::Rate(rate)) => Some(rate),
             Some(Blur::Measured) => scaled.blur_rate(),
         };
-        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur })
+        Ok(Item { stack: name.to_owned(), scale: scaled.scale, planes: scaled.planes, scans, blur })
     };
 
     let (scaled, doubts) = source.at_scales()?;
@@ -82,7 +108,7 @@ fn items(source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Ve
 /// How the policies did on one stack at one scale.
 #[derive(Debug, Clone, Serialize)]
 pub struct StackResult {
-    /// The stack's folder's name.
+    /// The stack's name: its folder's, and with that of folders around it where other stacks have the same.
     pub stack: String,
     /// `s` or `l`: about 500 or 1000 pixels wide.
     pub scale: &'static str,
@@ -153,7 +179,9 @@ pub fn evaluate_stacks(
         }
     }
 
-    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, blur)).collect::<Result<_, _>>()?;
+    let named: Vec<(String, &StackSource)> = names(sources).into_iter().zip(sources).collect();
+    let read = |(name, source): &(String, &StackSource)| items(name, source, seed, blur);
+    let items: Vec<Vec<Item>> = named.par_iter().map(read).collect::<Result<_, _>>()?;
     let mut stacks = Vec::new();
     let mut all = Vec::new();
 
@@ -344,6 +372,20 @@ mod tests {
             blur: None,
             rows: vec![row(BASELINE, maes[0]), row("own", maes[1]), row(STRONG_BASELINE, 0.8 * maes[0])],
         }
+    }
+
+    #[test]
+    fn stacks_in_folders_of_the_same_name_are_told_apart() {
+        let named = |texts: &[&str]| {
+            let sources: Vec<_> = texts.iter().map(|text| StackSource::parse(text, None)).collect();
+            names(&sources)
+        };
+
+        assert_eq!(named(&["a/board:21", "/b/tissue", "cone.tif"]), ["board", "tissue", "cone.tif"]);
+        assert_eq!(named(&["s-1/pose0001:41", "s-2/pose0001:41", "c/d"]), ["s-1-pose0001", "s-2-pose0001", "d"]);
+        assert_eq!(named(&["/a/x/p", "/b/x/p"]), ["a-x-p", "b-x-p"]);
+        // The same stack twice is one stack, however it is named.
+        assert_eq!(named(&["/a/board:21", "/a/./board:13"]), ["board", "board"]);
     }
 
     #[test]

@@ -98,11 +98,6 @@ impl StackSource {
         }
     }
 
-    /// The folder's name.
-    pub fn name(&self) -> String {
-        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
-    }
-
     /// Reads the stack and reduces it to each of the scales. Also returns warnings about its pictures, as text for
     /// people. A scan is possible despite them.
     ///
