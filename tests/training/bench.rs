@@ -58,6 +58,10 @@ fn a_training_continues_on_the_recordings_that_it_was_begun_on() {
     found[1].clone_from(&moved);
     assert_eq!(again(&run, &found), Ok(LEG));
 
+    let mut of_other_planes = found.clone();
+    of_other_planes[1].push_str(":4");
+    assert!(again(&run, &of_other_planes).unwrap_err().contains("give each folder the same :PLANES"));
+
     stack(Path::new(&stacks[1]), 99);
     assert!(again(&run, &[]).unwrap_err().contains("have changed;"));
 

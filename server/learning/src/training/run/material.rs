@@ -211,12 +211,18 @@ impl KnownSources {
     /// Rejects pictures that differ from those on which the training was begun.
     fn check(&self, now: Option<&Origin>) -> Result<(), TrainError> {
         let Some(begun) = &self.begun else { return Ok(()) };
+        let Kind { name, option } = self.kind;
+        let names = begun.paths.join(", ");
+
         if now.is_some_and(|now| now.sha256 == begun.sha256) {
+            if name == SCANS.name && planes(self.paths()) != planes(&begun.paths) {
+                return Err(TrainError::Differs(format!(
+                    "this training was begun on {names}; give each folder the same :PLANES, or none where there was none"
+                )));
+            }
             return Ok(());
         }
 
-        let Kind { name, option } = self.kind;
-        let names = begun.paths.join(", ");
         Err(TrainError::Differs(if self.asked.is_empty() {
             let has = if name == FOOTAGE.name { "has" } else { "have" };
             format!(
@@ -230,6 +236,11 @@ impl KnownSources {
             )
         }))
     }
+}
+
+/// The planes that each of `folders` is named with. The checksum of their pictures does not tell them.
+fn planes(folders: &[String]) -> Vec<Option<usize>> {
+    folders.iter().map(|folder| StackSource::parse(folder, None).planes).collect()
 }
 
 /// Draws the pictures of `recipe`, unless footage takes the place of all of them.
