@@ -70,6 +70,8 @@ fn a_training_continues_on_the_recordings_that_it_was_begun_on() {
     assert!(train(resume("mgm-learned", &run), u64::MAX));
     let card = std::fs::read_to_string(run.join("MODEL_CARD.md")).unwrap();
     assert!(card.contains("and on 5 recordings of a bench, 1 of them kept for validation"), "{card}");
+    // Six drawn pictures as they are, the same varied, and as many over the recordings.
+    assert!(card.contains("On 18 validation scans, 12 of them varied: "), "{card}");
 
     let without = folder.path().join("without");
     assert!(!train(begin(&small("mgm-learned", 2 * LEG), &without), 1));

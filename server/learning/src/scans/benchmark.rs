@@ -67,6 +67,14 @@ impl Benchmark {
             relief::deep_scenes(Split::Test, count.min(RELIEFS) as u64)?.into_iter().map(Scene::Stack).collect();
         Ok(Self { scenes, conditions: Conditions::Fitting, seed: SEED, count, frames: FRAMES })
     }
+
+    /// Number of scans that are as varied as training scans can be.
+    pub const fn varied(&self) -> usize {
+        match self.conditions {
+            Conditions::VariedFrom(first) => self.count.saturating_sub(first),
+            Conditions::Same(_) | Conditions::Fitting => 0,
+        }
+    }
 }
 
 impl ScanSet for Benchmark {

@@ -262,13 +262,14 @@ impl Run {
                 origin: self.origin.as_deref(),
                 data: &self.material.words(),
             };
-            self.folder.write(CARD, model_card::validated(&made, &row, self.validation.count).as_bytes())?;
+            self.folder.write(CARD, model_card::validated(&made, &row, &self.validation).as_bytes())?;
         }
 
         Ok(row.mae)
     }
 
-    /// Evaluates the best weights on the reference benchmark and adds the figures to their model card.
+    /// Evaluates the best weights on the reference benchmark, stores the figures and adds them to their model card, unless
+    /// both is done.
     ///
     /// # Errors
     /// If the run folder cannot be read or written.
@@ -279,7 +280,8 @@ impl Run {
         }
 
         let card = String::from_utf8_lossy(&self.folder.read(CARD)?).into_owned();
-        if model_card::is_benchmarked(&card) {
+        let is_on_card = model_card::is_benchmarked(&card);
+        if is_on_card && self.folder.path().join(BENCHMARK).exists() {
             return Ok(());
         }
 
@@ -290,7 +292,9 @@ impl Run {
         let figures = serde_json::to_vec_pretty(&BenchmarkFigures::new(&row, count)).unwrap_or_default();
         self.folder.write(BENCHMARK, &figures)?;
 
-        // Last, because a card with these figures means that everything is done.
+        if is_on_card {
+            return Ok(());
+        }
         self.folder.write(CARD, model_card::benchmarked(&card, &row, count).as_bytes())
     }
 

@@ -1,7 +1,7 @@
 //! The model card, as Markdown: what users of trained weights should know about them.
 
 use crate::evaluation::Row;
-use crate::scans::benchmark::SEED;
+use crate::scans::benchmark::{Benchmark, SEED};
 use parfocal_autofocus::shipped::{Design, design};
 
 /// How weights were made.
@@ -16,8 +16,8 @@ pub(super) struct Provenance<'a> {
     pub data: &'a str,
 }
 
-/// The card of weights, with their figures `row` on `count` validation scans.
-pub(super) fn validated(made: &Provenance<'_>, row: &Row, count: usize) -> String {
+/// The card of weights, with their figures `row` on the scans `validation`.
+pub(super) fn validated(made: &Provenance<'_>, row: &Row, validation: &Benchmark) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
 
     let input = match design(made.policy) {
@@ -32,12 +32,14 @@ pub(super) fn validated(made: &Provenance<'_>, row: &Row, count: usize) -> Strin
         "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, \
          beginning with {origin}, on {}.\n\n\
          Input: {input}. Weights: safetensors, float32, PyTorch's names and layouts. Not a medical device.\n\n\
-         On {count} validation scans, half of them varied: {}.\n",
+         On {} validation scans, {} of them varied: {}.\n",
         made.policy,
         env!("CARGO_PKG_VERSION"),
         made.seed,
         made.updates,
         made.data,
+        validation.count,
+        validation.varied(),
         figures(row),
     )
 }
