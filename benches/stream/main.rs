@@ -75,107 +75,37 @@ const CELL: u32 = 512;
 const HALF: u32 = 1024;
 const FULL: u32 = 2048;
 
+/// One viewer of the phantom, on a screen for the smallest size.
+const PHANTOM: Scenario = Scenario {
+    name: "phantom",
+    camera: Camera::Phantom,
+    viewers: 1,
+    screen: CELL,
+    link: None,
+    beside: Beside::Nothing,
+};
+/// The same of a picture.
+const PICTURE: Scenario = Scenario { name: "picture", camera: Camera::Picture, ..PHANTOM };
+/// Bits a second of a slow link.
+const SLOW: Option<u64> = Some(4_000_000);
+
 const SCENARIOS: [Scenario; 16] = [
-    Scenario {
-        name: "phantom",
-        camera: Camera::Phantom,
-        viewers: 0,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "phantom",
-        camera: Camera::Phantom,
-        viewers: 1,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "phantom",
-        camera: Camera::Phantom,
-        viewers: 4,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "phantom",
-        camera: Camera::Phantom,
-        viewers: 16,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "phantom, half",
-        camera: Camera::Phantom,
-        viewers: 1,
-        screen: HALF,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "phantom, full",
-        camera: Camera::Phantom,
-        viewers: 1,
-        screen: FULL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "full and 3 cell",
-        camera: Camera::Phantom,
-        viewers: 4,
-        screen: FULL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "the same, recorded",
-        camera: Camera::Phantom,
-        viewers: 4,
-        screen: FULL,
-        link: None,
-        beside: Beside::Recording,
-    },
-    Scenario {
-        name: "full, 4 Mbit/s",
-        camera: Camera::Phantom,
-        viewers: 1,
-        screen: FULL,
-        link: Some(4_000_000),
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "picture",
-        camera: Camera::Picture,
-        viewers: 1,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "picture",
-        camera: Camera::Picture,
-        viewers: 16,
-        screen: CELL,
-        link: None,
-        beside: Beside::Nothing,
-    },
-    Scenario {
-        name: "picture, 4 Mbit/s",
-        camera: Camera::Picture,
-        viewers: 1,
-        screen: CELL,
-        link: Some(4_000_000),
-        beside: Beside::Nothing,
-    },
-    Scenario { name: "phantom, busy", camera: Camera::Phantom, viewers: 4, screen: CELL, link: None, beside: WITHOUT },
-    Scenario { name: "the same, rt", camera: Camera::Phantom, viewers: 4, screen: CELL, link: None, beside: WITH },
-    Scenario { name: "picture, busy", camera: Camera::Picture, viewers: 4, screen: CELL, link: None, beside: WITHOUT },
-    Scenario { name: "the same, rt", camera: Camera::Picture, viewers: 4, screen: CELL, link: None, beside: WITH },
+    Scenario { viewers: 0, ..PHANTOM },
+    PHANTOM,
+    Scenario { viewers: 4, ..PHANTOM },
+    Scenario { viewers: 16, ..PHANTOM },
+    Scenario { name: "phantom, half", screen: HALF, ..PHANTOM },
+    Scenario { name: "phantom, full", screen: FULL, ..PHANTOM },
+    Scenario { name: "full and 3 cell", viewers: 4, screen: FULL, ..PHANTOM },
+    Scenario { name: "the same, recorded", viewers: 4, screen: FULL, beside: Beside::Recording, ..PHANTOM },
+    Scenario { name: "full, 4 Mbit/s", screen: FULL, link: SLOW, ..PHANTOM },
+    PICTURE,
+    Scenario { viewers: 16, ..PICTURE },
+    Scenario { name: "picture, 4 Mbit/s", link: SLOW, ..PICTURE },
+    Scenario { name: "phantom, busy", viewers: 4, beside: WITHOUT, ..PHANTOM },
+    Scenario { name: "the same, rt", viewers: 4, beside: WITH, ..PHANTOM },
+    Scenario { name: "picture, busy", viewers: 4, beside: WITHOUT, ..PICTURE },
+    Scenario { name: "the same, rt", viewers: 4, beside: WITH, ..PICTURE },
 ];
 
 /// The figures of a row.
