@@ -231,7 +231,7 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
 fn read_shard(file: &Path) -> Result<(String, Shard), Failure> {
     let name = file.display().to_string();
     let text = std::fs::read(file).map_err(|error| format!("cannot read the shard {name}: {error}"))?;
-    let shard = serde_json::from_slice(&text).map_err(|_| MergeError::NoShard(name.clone()))?;
+    let shard = serde_json::from_slice(&text).map_err(|_| MergeError::no_shard(&name))?;
     Ok((name, shard))
 }
 

@@ -106,36 +106,24 @@ pub struct Shard {
 
 /// Why shards cannot be merged.
 #[derive(Debug, thiserror::Error)]
-pub enum MergeError {
-    /// The file is not a shard.
-    #[error("{0} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote")]
-    NoShard(String),
-    /// Two shards are of different evaluations.
-    #[error("{first} and {second} are shards of different evaluations: they differ in {what}")]
-    Differ {
-        /// One file.
-        first: String,
-        /// Another file.
-        second: String,
-        /// The first difference between them.
-        what: &'static str,
-    },
-    /// The same part was given twice.
-    #[error("{first} and {second} are both shard {part}; give each shard once")]
-    Twice {
-        /// One file.
-        first: String,
-        /// Another file.
-        second: String,
-        /// The part that both have.
-        part: Part,
-    },
-    /// Some parts were not given.
-    #[error("shards are missing: {0}; run `parfocal evaluate --shard` for them, with the same arguments")]
-    Missing(String),
-    /// There is nothing to focus on.
-    #[error(transparent)]
-    Blank(#[from] NothingToFocusOn),
+#[error("{0}")]
+pub struct MergeError(String);
+
+impl MergeError {
+    /// The file called `name` is not a shard.
+    pub fn no_shard(name: &str) -> Self {
+        Self(format!("{name} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote"))
+    }
+
+    fn missing(shards: &str) -> Self {
+        Self(format!("shards are missing: {shards}; run `parfocal evaluate --shard` for them, with the same arguments"))
+    }
+}
+
+impl From<NothingToFocusOn> for MergeError {
+    fn from(error: NothingToFocusOn) -> Self {
+        Self(error.to_string())
+    }
 }
 
 impl Shard {
@@ -184,7 +172,7 @@ impl Shard {
 /// If they belong to several evaluations, some are missing, or there was nothing to focus on.
 pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<Outcome>), MergeError> {
     if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
-        return Err(MergeError::NoShard(name.clone()));
+        return Err(MergeError::no_shard(name));
     }
 
     shards.sort_by_key(|(_, shard)| shard.part.index);
@@ -192,26 +180,25 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<
     // The shards are sorted by part, so two copies of a part are neighbours.
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
-        let first = first.clone();
-        let second = second.clone();
-
         if let Some(what) = a.difference(b) {
-            return Err(MergeError::Differ { first, second, what });
+            return Err(MergeError(format!(
+                "{first} and {second} are shards of different evaluations: they differ in {what}"
+            )));
         }
         if a.part == b.part {
-            return Err(MergeError::Twice { first, second, part: a.part });
+            return Err(MergeError(format!("{first} and {second} are both shard {}; give each shard once", a.part)));
         }
     }
 
     let Some(Part { of, .. }) = shards.first().map(|(_, shard)| shard.part) else {
-        return Err(MergeError::Missing("all".to_owned()));
+        return Err(MergeError::missing("all"));
     };
 
     let present = |part: &Part| shards.iter().any(|(_, shard)| shard.part == *part);
     let missing = (1..=of).map(|index| Part { index, of }).filter(|part| !present(part));
     let missing: Vec<String> = missing.take(100).map(|part| part.to_string()).collect();
     if !missing.is_empty() {
-        return Err(MergeError::Missing(missing.join(", ")));
+        return Err(MergeError::missing(&missing.join(", ")));
     }
 
     let shards: Vec<Shard> = shards.into_iter().map(|(_, shard)| shard).collect();

@@ -34,28 +34,9 @@ pub struct Cut {
 /// Why no scan can be cut.
 #[derive(Debug, thiserror::Error)]
 pub enum CutError {
-    /// A pose would see all planes of the stack, or more.
-    #[error("a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; \
-             give --planes at most {}", of - 1)]
-    Planes {
-        /// Planes requested for a pose.
-        planes: usize,
-        /// Planes of the stack.
-        of: usize,
-    },
-    /// The window does not fit.
-    #[error(
-        "a window of {size}x{size} pixels does not fit into pictures of {width}x{height}; \
-         give a smaller --size or --scale"
-    )]
-    Size {
-        /// Side of the window.
-        size: usize,
-        /// Width of the pictures.
-        width: usize,
-        /// Height of the pictures.
-        height: usize,
-    },
+    /// The windows do not fit into the stack.
+    #[error("{0}")]
+    Unfit(String),
     /// The scan cannot be written.
     #[error(transparent)]
     Scan(#[from] ScanError),
@@ -81,10 +62,15 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     let (width, height) = stack.size();
     let of = stack.planes().len();
     if planes >= of {
-        return Err(CutError::Planes { planes, of });
+        return Err(CutError::Unfit(format!(
+            "a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; give --planes at \
+             most {}",
+            of - 1
+        )));
     }
     if size < LEAST_SIDE || size > width || size > height {
-        return Err(CutError::Size { size, width, height });
+        let window = format!("a window of {size}x{size} pixels does not fit into pictures of {width}x{height}");
+        return Err(CutError::Unfit(format!("{window}; give a smaller --size or --scale")));
     }
 
     let mut rng = ChaCha8Rng::seed_from_u64(cut.seed);

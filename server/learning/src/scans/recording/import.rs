@@ -1,20 +1,45 @@
 //! Imports a scan: a folder of pictures named by pose and focal power, recorded by any program.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::import_error::ImportError;
 use super::{PosePictures, header, shot};
 use crate::scans::mosaics::RawMosaics;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
-use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording};
+use parfocal_devices::camera::recorded::{
+    LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording, poses as numbered,
+};
 use parfocal_imaging::{
     DecodeError, GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
 };
+
+/// Why a folder cannot be imported. The message names the file or folder, and says what is wrong.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct ImportError(String);
+
+impl ImportError {
+    /// `path` is wrong: the file's name makes no sense, or its content is not a picture.
+    fn of(path: &Path, reason: impl Display) -> Self {
+        Self(format!("{}: {reason}", path.display()))
+    }
+
+    /// `path` holds no pictures of a scan.
+    fn empty(path: &Path) -> Self {
+        Self(format!("there is no picture named like pose0001_f0.350.png in {}", path.display()))
+    }
+}
+
+impl From<ScanError> for ImportError {
+    fn from(error: ScanError) -> Self {
+        Self(error.to_string())
+    }
+}
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
@@ -40,7 +65,7 @@ impl Imported {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match parse(&name) {
                 None => {}
-                Some(Err(reason)) => return Err(ImportError::File { path, reason }),
+                Some(Err(reason)) => return Err(ImportError::of(&path, reason)),
                 Some(Ok((pose, power))) => poses.entry(pose).or_default().push((power, path)),
             }
         }
@@ -49,21 +74,23 @@ impl Imported {
             stack.sort_by(|a, b| a.0.get().total_cmp(&b.0.get()));
             if let Some(pair) = stack.windows(2).find(|pair| pair[0].0 == pair[1].0) {
                 let reason = format!("{} is of the same pose and focal power", pair[0].1.display());
-                return Err(ImportError::File { path: pair[1].1.clone(), reason });
+                return Err(ImportError::of(&pair[1].1, reason));
             }
         }
 
         let (Some(&first), Some(&last)) = (poses.keys().next(), poses.keys().next_back()) else {
-            return Err(ImportError::Empty(folder.to_owned()));
+            return Err(ImportError::empty(folder));
         };
 
         let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
         if !missing.is_empty() {
-            return Err(ImportError::MissingPoses { folder: folder.to_owned(), missing });
+            let are = format!("{} in {}", numbered(&missing), folder.display());
+            return Err(ImportError(format!("there is no picture of {are}; pose numbers must have no gaps")));
         }
 
         if poses.len() > MOST_POSES {
-            return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
+            let holds = format!("{} holds {} poses", folder.display(), poses.len());
+            return Err(ImportError(format!("{holds}; a scan has at most {MOST_POSES}: import it in parts")));
         }
 
         let imported = Self { poses, bits, raw };
@@ -74,12 +101,16 @@ impl Imported {
     fn check_powers(&self) -> Result<(), ImportError> {
         let powers = self.powers();
         if let [one] = powers[..] {
-            return Err(ImportError::OnePower(one.get()));
+            let one = one.get();
+            return Err(ImportError(format!("a scan needs at least two focal powers; every picture is at {one:.3}")));
         }
         for (&pose, stack) in &self.poses {
             let lacks = |power: &&FocalPower| !stack.iter().any(|(have, _)| have == *power);
             if let Some(power) = powers.iter().find(lacks) {
-                return Err(ImportError::MissingPower { pose, power: power.get() });
+                let power = power.get();
+                return Err(ImportError(format!(
+                    "pose {pose} has no picture at focal power {power:.3}, which other poses have"
+                )));
             }
         }
         Ok(())
@@ -125,7 +156,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
                 return Err(ScanError::other(out, &difference).into());
             }
         } else {
-            let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
+            let patch = patch(&pictures).ok_or_else(|| ImportError::empty(out))?;
             recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
         }
         progress();
@@ -199,7 +230,8 @@ impl Reader {
         let needed = (16 - largest.leading_zeros() as u8).max(8);
         let bits = given.unwrap_or(needed);
         if bits < needed {
-            return Err(ImportError::Bits { path, largest, bits, needed });
+            let holds = format!("{} holds a sample of {largest}", path.display());
+            return Err(ImportError(format!("{holds}, which is more than {bits} bit; give --bits {needed} or more")));
         }
 
         let white = u16::MAX >> (16 - bits.min(16));
@@ -214,18 +246,18 @@ impl Reader {
     }
 
     fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), ImportError> {
-        if size.0 < LEAST_SIDE || size.1 < LEAST_SIDE {
-            return Err(ImportError::TooSmall { path: path.to_owned(), size });
+        let (width, height) = size;
+        let is = format!("{} is {width}x{height} pixels", path.display());
+        if width < LEAST_SIDE || height < LEAST_SIDE {
+            return Err(ImportError(format!("{is}; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}")));
         }
 
-        match &self.first {
-            None => self.first = Some((path.to_owned(), size)),
-            Some((first, first_size)) if *first_size != size => {
-                let first = first.clone();
-                let other = path.to_owned();
-                return Err(ImportError::Sizes { first, size: *first_size, other, other_size: size });
-            }
-            Some(_) => {}
+        let (first, (first_width, first_height)) = self.first.get_or_insert_with(|| (path.to_owned(), size));
+        if (*first_width, *first_height) != size {
+            let first = first.display();
+            return Err(ImportError(format!(
+                "{is}, but {first} is {first_width}x{first_height}; all pictures of a scan must have one size"
+            )));
         }
         Ok(())
     }
@@ -252,11 +284,11 @@ impl Reader {
 }
 
 fn unreadable(path: &Path) -> impl Fn(io::Error) -> ImportError {
-    |error| ImportError::Unreadable { path: path.to_owned(), error }
+    |error| ImportError(format!("cannot read {}: {error}", path.display()))
 }
 
 fn unusable(path: &Path) -> impl Fn(DecodeError) -> ImportError {
-    |error| ImportError::File { path: path.to_owned(), reason: error.to_string() }
+    |error| ImportError::of(path, error)
 }
 
 /// The files in `folder` and in the folders directly in it, sorted.

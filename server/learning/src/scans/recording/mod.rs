@@ -3,13 +3,11 @@
 mod devices;
 mod from_stack;
 mod import;
-mod import_error;
 mod phantom;
 
 pub use devices::{Devices, Stepper, StepperError};
 pub use from_stack::{Cut, CutError, Window, from_stack, windows};
-pub use import::{Imported, import};
-pub use import_error::ImportError;
+pub use import::{ImportError, Imported, import};
 pub use phantom::PhantomPoses;
 
 use super::recorded::{capture_order, patch_at, sharpest};

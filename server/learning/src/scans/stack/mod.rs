@@ -42,17 +42,28 @@ impl FocalStack {
     pub fn new(mut planes: Vec<Plane>) -> Result<Self, StackError> {
         planes.sort_by(|a, b| a.position.total_cmp(&b.position));
         if planes.len() < LEAST_PLANES {
-            return Err(StackError::TooFew(planes.len()));
+            let count = planes.len();
+            return Err(StackError(format!(
+                "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {count}; take \
+                 more between them"
+            )));
         }
 
         for pair in planes.windows(2) {
-            let [first, second] = [&pair[0], &pair[1]].map(|plane| plane.name.clone());
-            let sizes = [&pair[0], &pair[1]].map(|plane| (plane.picture.width, plane.picture.height));
-            if sizes[0] != sizes[1] {
-                return Err(StackError::Sizes { first, other: second, sizes });
+            let [first, second] = [&pair[0], &pair[1]].map(|plane| &plane.name);
+            let [(width, height), other] =
+                [&pair[0], &pair[1]].map(|plane| (plane.picture.width, plane.picture.height));
+            if (width, height) != other {
+                return Err(StackError(format!(
+                    "{second} is {}x{} pixels, but {first} is {width}x{height}; all pictures of a stack must have one \
+                     size",
+                    other.0, other.1
+                )));
             }
-            if pair[0].position >= pair[1].position {
-                return Err(StackError::Twice { first, second, position: pair[1].position });
+            let position = pair[1].position;
+            if pair[0].position >= position {
+                let both = format!("{first} and {second} are both at position {position}");
+                return Err(StackError(format!("{both}; leave one out")));
             }
         }
         Ok(Self { planes })
@@ -72,7 +83,10 @@ impl FocalStack {
         raw: Option<PixelFormat>,
     ) -> Result<Self, StackError> {
         if folder.is_file() && is_raw(folder) {
-            return Err(StackError::OneMosaic(folder.to_owned()));
+            let folder = folder.display();
+            return Err(StackError(format!(
+                "{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}"
+            )));
         }
         if folder.is_file() {
             return Self::new(pages::planes(folder, list, scale)?);
@@ -87,12 +101,10 @@ impl FocalStack {
         let mut reconstructor = Reconstructor::default();
         let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
-            let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
+            let bytes = std::fs::read(&path).map_err(|error| StackError::unreadable(&path, &error))?;
             let picture =
                 if is_raw(&path) { mosaics.read(&path, &bytes).map(Picture::Mosaic) } else { decode(&bytes, false) };
-            let picture =
-                picture.map_err(|error| StackError::Unusable { path: path.clone(), reason: error.to_string() })?;
-            let gray = picture.into_gray(&mut reconstructor);
+            let gray = picture.map_err(|error| StackError::of(&path, error))?.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
 
@@ -125,7 +137,13 @@ impl FocalStack {
         let distances = self.planes.windows(2).map(|pair| pair[1].position - pair[0].position);
         let step = distances.fold(f64::INFINITY, f64::min);
         let steps = (position(last) - position(0)) / step;
-        let uneven = |of| StackError::Uneven { step, found: last + 1, of };
+        let uneven = |of: usize| {
+            StackError(format!(
+                "the positions are too uneven: with steps of {step}, the least between two pictures, {} of {of} places \
+                 would have a picture; take pictures at even distances",
+                last + 1
+            ))
+        };
         if steps.round() as usize >= MOST_POSITIONS.min(2 * (last + 1)) {
             return Err(uneven(steps.round() as usize + 1));
         }

@@ -25,13 +25,13 @@ struct Depth {
 /// # Errors
 /// If a page or the list cannot be read, or the pages vary in more than focus.
 pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, StackError> {
-    let bytes = std::fs::read(path).map_err(|source| StackError::File { path: path.to_owned(), source })?;
-    let unusable = |reason: String| StackError::Unusable { path: path.to_owned(), reason };
-    let file = PictureFile::open(&bytes).map_err(|error| unusable(error.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|error| StackError::unreadable(path, &error))?;
+    let file = PictureFile::open(&bytes).map_err(|error| StackError::of(path, error))?;
 
     let depth = match list {
         Some(list) => of_list(list, file.pages())?,
-        None => depth(&file.description().unwrap_or_default(), file.pages()).map_err(unusable)?,
+        None => depth(&file.description().unwrap_or_default(), file.pages())
+            .map_err(|reason| StackError::of(path, reason))?,
     };
     tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
 
@@ -40,7 +40,7 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
     let placed = depth.pages.iter().zip(&depth.positions);
     placed
         .map(|(&page, &position)| {
-            let picture = file.read(page, false).map_err(|error| unusable(error.to_string()))?;
+            let picture = file.read(page, false).map_err(|error| StackError::of(path, error))?;
             let gray = picture.into_gray(&mut reconstructor);
             let name = format!("page {} of {name}", page + 1);
             Ok(Plane { name, position, picture: in_blocks(&gray, scale) })
@@ -49,12 +49,12 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
 }
 
 fn of_list(list: &Path, count: usize) -> Result<Depth, StackError> {
-    let wrong = |reason: String| StackError::Unusable { path: list.to_owned(), reason };
     let mut pages = Vec::new();
     let mut positions = Vec::new();
     for (name, position) in listed(list)? {
         let page = name.parse::<usize>().ok().filter(|page| (1..=count).contains(page));
-        pages.push(page.ok_or_else(|| wrong(format!("'{name}' must be the number of a page, from 1 to {count}")))? - 1);
+        let wrong = || StackError::of(list, format!("'{name}' must be the number of a page, from 1 to {count}"));
+        pages.push(page.ok_or_else(wrong)? - 1);
         positions.push(position);
     }
     let source = format!("positions of {}", list.display());

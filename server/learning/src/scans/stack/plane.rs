@@ -1,8 +1,10 @@
 //! One picture of a focal stack, and why pictures are none.
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
-use parfocal_devices::camera::footage;
+use parfocal_devices::camera::footage::FootageError;
 use parfocal_imaging::GrayImage;
 
 /// Least number of pictures in which a peak and an order can be recognised.
@@ -19,72 +21,25 @@ pub struct Plane {
     pub picture: GrayImage,
 }
 
-/// Why pictures are not a focal stack.
+/// Why pictures are not a focal stack. The message says what is wrong, and where.
 #[derive(Debug, thiserror::Error)]
-pub enum StackError {
-    /// The folder cannot be read, or has no pictures.
-    #[error(transparent)]
-    Folder(#[from] footage::FootageError),
-    /// A picture cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// A file is not a picture, its pages are not a stack, or the list of positions makes no sense.
-    #[error("{}: {reason}", path.display())]
-    Unusable {
-        /// Path of the file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// One raw mosaic.
-    #[error("{} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}", .0.display())]
-    OneMosaic(PathBuf),
-    /// Too few pictures.
-    #[error(
-        "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {0}; \
-         take more between them"
-    )]
-    TooFew(usize),
-    /// Pictures of different sizes.
-    #[error("{other} is {}x{} pixels, but {first} is {}x{}; all pictures of a stack must have one size",
-            sizes[1].0, sizes[1].1, sizes[0].0, sizes[0].1)]
-    Sizes {
-        /// The first picture.
-        first: String,
-        /// A picture of another size.
-        other: String,
-        /// Width and height of each, in pixels.
-        sizes: [(usize, usize); 2],
-    },
-    /// Two pictures at one position.
-    #[error("{first} and {second} are both at position {position}; leave one out")]
-    Twice {
-        /// One picture.
-        first: String,
-        /// The other.
-        second: String,
-        /// Position of both.
-        position: f64,
-    },
-    /// Positions that do not fit a regular grid.
-    #[error(
-        "the positions are too uneven: with steps of {step}, the least between two pictures, {found} \
-         of {of} places would have a picture; take pictures at even distances"
-    )]
-    Uneven {
-        /// Least distance between two pictures.
-        step: f64,
-        /// Places with a picture.
-        found: usize,
-        /// Number of places on the grid.
-        of: usize,
-    },
-    /// The pictures do not show a focal stack.
-    #[error("{0}")]
-    Unfit(String),
+#[error("{0}")]
+pub struct StackError(pub(super) String);
+
+impl StackError {
+    /// The file at `path` is not a picture or list that can be used.
+    pub(super) fn of(path: &Path, reason: impl Display) -> Self {
+        Self(format!("{}: {reason}", path.display()))
+    }
+
+    /// The file at `path` cannot be read.
+    pub(super) fn unreadable(path: &Path, error: &io::Error) -> Self {
+        Self(format!("cannot read {}: {error}", path.display()))
+    }
+}
+
+impl From<FootageError> for StackError {
+    fn from(error: FootageError) -> Self {
+        Self(error.to_string())
+    }
 }

@@ -12,8 +12,8 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// Names and positions from a list of `name,position`; a first line without a number is a heading.
 pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
-    let wrong = |reason: String| StackError::Unusable { path: list.to_owned(), reason };
-    let text = std::fs::read_to_string(list).map_err(|error| wrong(format!("cannot read the list: {error}")))?;
+    let unreadable = |error| StackError::of(list, format!("cannot read the list: {error}"));
+    let text = std::fs::read_to_string(list).map_err(unreadable)?;
     let mut placed = Vec::new();
 
     for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()) {
@@ -21,7 +21,10 @@ pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
         match entry {
             Some((name, Ok(position))) if position.is_finite() => placed.push((name.to_owned(), position)),
             Some((_, Err(_))) if number == 1 => {}
-            _ => return Err(wrong(format!("line {number} must be a file's name, a comma and a position"))),
+            _ => {
+                let wrong = format!("line {number} must be a file's name, a comma and a position");
+                return Err(StackError::of(list, wrong));
+            }
         }
     }
 
