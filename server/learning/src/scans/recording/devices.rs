@@ -13,7 +13,7 @@ use parfocal_devices::camera::{Camera, CameraError, FrameImage};
 use parfocal_devices::lens::Lens;
 use parfocal_imaging::{GrayImage, PatchArea, Reconstructor, RgbImage, content_area, rgb_to_gray};
 
-/// Longest wait for a frame.
+/// Longest wait for a frame, once the lens has settled.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Largest allowed difference between the focal power that was set and the one read back: twice the hysteresis of a
 /// tunable lens.
@@ -123,9 +123,9 @@ impl Devices {
 
     /// The first frame whose exposure began at `moment` or later.
     fn frame_since(&mut self, moment: Moment) -> Result<FrameImage, RecordError> {
-        let asked = self.clock.now();
+        let waits_from = self.clock.now().max(moment);
         loop {
-            let waited = self.clock.now().since(asked);
+            let waited = self.clock.now().since(waits_from);
             let left = TIMEOUT.checked_sub(waited).ok_or(CameraError::Timeout(TIMEOUT))?;
             let frame = self.camera.next_frame(left)?;
             if frame.exposed_at >= moment + frame.exposure {
