@@ -180,8 +180,11 @@ function fakeCaches() {
       return {
         kept,
         match: async (/** @type {string | Request} */ what) => kept.get(pathOf(what))?.clone(),
-        put: async (/** @type {string} */ what, /** @type {Response} */ answer) =>
-          kept.set(pathOf(what), answer),
+        put: async (/** @type {string} */ what, /** @type {Response} */ answer) => {
+          // A browser puts nothing into the cache before it has all of the body.
+          await answer.clone().arrayBuffer();
+          kept.set(pathOf(what), answer);
+        },
         delete: async (/** @type {string} */ what) => kept.delete(pathOf(what)),
         addAll: async (/** @type {string[]} */ paths) => {
           const answers = await Promise.all(paths.map((path) => network.fetch(path)));
@@ -194,10 +197,12 @@ function fakeCaches() {
   };
 }
 
-/** The network's answer. Tests replace it. */
+/** The network's answer, which tests replace, and the workers' timers, which only tests let run. */
 const network = {
-  /** @type {(what: string | Request) => Promise<Response>} */
+  /** @type {(what: string | Request, options?: { signal?: AbortSignal }) => Promise<Response>} */
   fetch: () => Promise.reject(new TypeError("Failed to fetch")),
+  /** @type {(() => void)[]} */
+  timers: [],
 };
 
 const down = () => Promise.reject(new TypeError("Failed to fetch"));
@@ -227,7 +232,8 @@ function worker(version, caches) {
       on[name] = run;
     },
   };
-  const fetch = (/** @type {string | Request} */ what) => network.fetch(what);
+  const fetch = (/** @type {string | Request} */ what, /** @type {{ signal?: AbortSignal }} */ options) =>
+    network.fetch(what, options);
   vm.runInNewContext(SCRIPT, {
     self,
     caches,
@@ -235,8 +241,8 @@ function worker(version, caches) {
     URL,
     Response,
     AbortController,
-    setTimeout,
-    clearTimeout,
+    setTimeout: (/** @type {() => void} */ run) => network.timers.push(run),
+    clearTimeout: () => {},
   });
 
   const lives = async (/** @type {string} */ name) => {
@@ -304,6 +310,39 @@ test("the server’s page comes first; a proxy’s error does not replace the on
   assert.equal(await one.get("/surgeon"), "newer");
   network.fetch = down;
   assert.equal(await one.get("/surgeon"), "newer");
+});
+
+test("a network that dies within the page opens the kept page, and leaves it kept", async () => {
+  const one = worker("one", fakeCaches());
+  network.fetch = server("one");
+  await one.start();
+  const headers = { "parfocal-page-version": "one" };
+
+  network.fetch = async () => {
+    const broken = new ReadableStream({
+      pull: (body) => {
+        body.enqueue(new TextEncoder().encode("page of"));
+        body.error(new TypeError("network error"));
+      },
+    });
+    return new Response(broken, { headers });
+  };
+  assert.equal(await one.get("/surgeon"), "page of one", "the connection is reset");
+
+  network.fetch = async (_, { signal } = {}) => {
+    const silent = new ReadableStream({
+      start: (body) => signal?.addEventListener("abort", () => body.error(signal.reason)),
+    });
+    return new Response(silent, { headers });
+  };
+  network.timers = [];
+  const opened = one.get("/surgeon");
+  await settle();
+  for (const run of network.timers) run();
+  assert.equal(await opened, "page of one", "the rest does not come in time");
+
+  network.fetch = down;
+  assert.equal(await one.get("/surgeon"), "page of one", "it is still kept");
 });
 
 test("a tablet that is not let in any more opens nothing without a network", async () => {

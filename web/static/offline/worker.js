@@ -47,7 +47,7 @@ async function forgetOtherVersions() {
 }
 
 /**
- * The server's page, or the kept one if the server does not answer.
+ * The server's page, or the kept one if the server does not answer in time.
  *
  * @param {Request} request
  * @returns {Promise<Response>}
@@ -60,6 +60,8 @@ async function openPage(request) {
   const timer = kept && setTimeout(() => controller.abort(), PATIENCE_MS);
   try {
     const answer = await fetch(request, { signal: controller.signal });
+    // The network may die after the headers. A page that came in part is no answer, and must not replace the kept one.
+    await answer.clone().arrayBuffer();
     if (timer) clearTimeout(timer);
     // A proxy answers with such a status while the server is down.
     if (kept && answer.status >= 500) return kept;
