@@ -247,6 +247,9 @@ test("a new answer to a question replaces the one that was refused", async () =>
   outbox.add("/answers", { session: "s", value: 9 }, "s/1/sharpness");
   await settle();
   assert.equal(outbox.refused("s").length, 1);
+  const kept = outbox.refusedFor("s/1/sharpness").map(({ body, refusal }) => [body.value, refusal]);
+  assert.deepEqual(kept, [[9, "not on the scale"]], "the page can show it again, and why it was refused");
+  assert.deepEqual(outbox.refusedFor("s/1/sharp"), []);
 
   outbox.add("/answers", { session: "s", value: 5 }, "s/1/sharpness");
   await settle();

@@ -152,6 +152,25 @@ test("a full device loses no text, and a text being written is not replaced by a
   assert.equal(remarks.text, "Theirs");
 });
 
+test("a text that was refused stays, and is not replaced by what the server has", () => {
+  const { ask } = openPage();
+  /** @type {TextAnswer} */
+  const remarks = ask(REMARKS, "Short");
+  remarks.write("Too long");
+  remarks.giveNow();
+  remarks.show("refused", "too long");
+  remarks.take("Short");
+  remarks.want();
+  remarks.take("Short");
+  assert.deepEqual([remarks.text, remarks.status], ["Too long", "too long"]);
+
+  remarks.write("Shorter");
+  remarks.giveNow();
+  remarks.show("saved");
+  remarks.take("Theirs");
+  assert.equal(remarks.text, "Theirs");
+});
+
 test("an emptied text gives nothing, and says so where an answer stands", () => {
   const { ask, given } = openPage();
   /** @type {TextAnswer} */

@@ -30,6 +30,7 @@ const LATE_MS = 2000;
  * @property {Record<string, any>} body
  * @property {boolean} [stored]
  * @property {boolean} [sending]
+ * @property {string} [refusal] why the server refused it
  */
 
 /**
@@ -220,7 +221,16 @@ export class Outbox {
    * @param {string} slot
    */
   pending(slot) {
-    return this.waiting.filter((entry) => entry.slot === slot || entry.slot?.startsWith(`${slot}/`));
+    return this.waiting.filter((entry) => isFor(slot, entry));
+  }
+
+  /**
+   * The refused entries for `slot` and for its parts that this device still keeps, oldest first.
+   *
+   * @param {string} slot
+   */
+  refusedFor(slot) {
+    return this.refused().filter((entry) => isFor(slot, entry));
   }
 
   /** Tries to send now, without waiting any longer. */
@@ -303,6 +313,7 @@ export class Outbox {
     if (error instanceof Refused && error.final) {
       this.#entries.delete(entry.id);
       this.#refused.set(entry.id, entry);
+      entry.refusal = error.message;
       this.#tell(entry, "refused", error.message);
       return true;
     }
@@ -365,4 +376,14 @@ export class Outbox {
   #tell(entry, state, reason = null, heard = true) {
     for (const listener of [...this.#listeners]) listener({ entry, state, reason, heard });
   }
+}
+
+/**
+ * Whether `entry` is for `slot` or for one of its parts.
+ *
+ * @param {string} slot
+ * @param {Entry} entry
+ */
+function isFor(slot, entry) {
+  return entry.slot === slot || entry.slot?.startsWith(`${slot}/`);
 }

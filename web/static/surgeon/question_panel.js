@@ -34,7 +34,9 @@ export class QuestionPanel {
 
     const answers = state.questions.map((question) => this.#answer(question, state));
     for (const answer of answers) {
-      // The answer was given before the page was loaded again, and is not on the server yet.
+      const refused = this.#outbox.refusedFor(slotOf(this.#place, answer.question.id)).at(-1);
+      if (refused) answer.show("refused", refused.refusal);
+      // The answer was given before the questions were drawn again, and is not on the server yet.
       if (this.#isPending(answer.question.id)) answer.show("waiting");
     }
     this.#questionnaire = new Questionnaire(answers);
@@ -54,7 +56,9 @@ export class QuestionPanel {
   #answer(question, state) {
     const slot = slotOf(this.#place, question.id);
     let answered = state.answers[question.id];
-    for (const { body } of this.#outbox.pending(slot)) answered = onTopOf(answered, body.value);
+    for (const { body } of [...this.#outbox.refusedFor(slot), ...this.#outbox.pending(slot)]) {
+      answered = onTopOf(answered, body.value);
+    }
 
     return answerTo(question, answered, {
       settings: state.settings,

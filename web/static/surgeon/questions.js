@@ -201,7 +201,8 @@ class Answer {
   /** Marks what is still to be answered. */
   want() {
     this.wanted = true;
-    this.note(this.begun ?? say("not-answered"));
+    // It already says why an answer was refused.
+    if (this.reached !== "refused") this.note(this.begun ?? say("not-answered"));
   }
 
   /** Removes the marks. */
@@ -230,6 +231,8 @@ class Answer {
    * @param {boolean} [busy]
    */
   take(value, busy = false) {
+    // The server does not have a refused answer, so it stays in sight until the surgeon gives another.
+    if (this.reached === "refused") return;
     if (this.accept(value, busy)) this.show("saved");
   }
 
