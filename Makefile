@@ -25,7 +25,7 @@ container: package
 run:
 	@.ci/setup build
 	@cargo build $(CARGO_FLAGS) --release --locked $(FEATURES)
-	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
+	@exec "$${CARGO_TARGET_DIR:-target}/release/parfocal" serve --bind $(BIND) $(ARGS)
 
 test:
 	@.ci/setup test
