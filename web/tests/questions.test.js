@@ -55,7 +55,7 @@ function openPage(store = fakeStore()) {
 
 /** @typedef {import("../static/surgeon/questions.js").ScaleAnswer} ScaleAnswer */
 /** @typedef {import("../static/surgeon/questions.js").TextAnswer} TextAnswer */
-/** @typedef {import("../static/surgeon/questions.js").SusAnswer} SusAnswer */
+/** @typedef {import("../static/surgeon/questions.js").ItemsAnswer} ItemsAnswer */
 /** @typedef {import("../static/surgeon/questions.js").RankingAnswer} RankingAnswer */
 
 test("a 0 among points leaves what was there, and anything else replaces it", () => {
@@ -183,7 +183,7 @@ test("an emptied text gives nothing, and says so where an answer stands", () => 
 
 test("each item of the usability scale is given alone, and all ten make an answer", () => {
   const { ask, given } = openPage();
-  /** @type {SusAnswer} */
+  /** @type {ItemsAnswer} */
   const usability = ask(USABILITY);
   usability.choose(2, 4);
   assert.deepEqual(given, [{ question: "usability", value: [0, 0, 4, 0, 0, 0, 0, 0, 0, 0], part: 2 }]);
@@ -245,7 +245,7 @@ test("going on marks what is still open, and answering takes the marks back", ()
   const sharpness = ask(SHARPNESS);
   /** @type {TextAnswer} */
   const remarks = ask(REMARKS);
-  /** @type {SusAnswer} */
+  /** @type {ItemsAnswer} */
   const usability = ask(USABILITY, [1, 1, 0, 1, 1, 1, 1, 1, 0, 1]);
   const questionnaire = new Questionnaire([sharpness, remarks, usability]);
   remarks.write("Not given yet");
@@ -290,7 +290,7 @@ const SHARED = { id: "shared", kind: "ranking", text: "Which was best?", ties: t
 
 test("each scale and each pair of a workload index is given alone, and all make an answer", () => {
   const { ask, given } = openPage();
-  /** @type {import("../static/surgeon/questions.js").WorkloadAnswer} */
+  /** @type {ItemsAnswer} */
   const workload = ask(WORKLOAD);
   assert.deepEqual(workload.points, [0, 0, 0, 0, 0, 0], "nothing is marked before the surgeon marks it");
 
@@ -311,7 +311,7 @@ test("each scale and each pair of a workload index is given alone, and all make 
 
 test("a workload index half filled before a reload goes on where it was", () => {
   const { ask } = openPage();
-  /** @type {import("../static/surgeon/questions.js").WorkloadAnswer} */
+  /** @type {ItemsAnswer} */
   const workload = ask(WORKLOAD, [0, 21, 0, 0, 2, 0]);
   assert.deepEqual([workload.points, workload.status], [[0, 21, 0, 0, 2, 0], "2 of 6 answered · Saved"]);
 });
@@ -331,7 +331,7 @@ test("the lower end of a line is an answer, and a line that was not touched is n
 
 test("settings may share a place where the protocol allows it", () => {
   const { ask, given } = openPage();
-  /** @type {import("../static/surgeon/questions.js").PlacesAnswer} */
+  /** @type {ItemsAnswer} */
   const shared = ask(SHARED);
   for (const setting of [0, 1, 2]) shared.choose(setting, 1);
   assert.deepEqual(

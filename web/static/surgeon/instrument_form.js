@@ -1,65 +1,40 @@
-// Forms for workload indices, and for a ranking in which settings may share a place.
+// Forms of questions that have several items: the System Usability Scale, workload indices, and a ranking in which
+// settings may share a place.
 
 import { make } from "../shared/dom.js";
 import { say } from "../shared/language.js";
 import { drawScale, drawWords } from "./choices.js";
 import { drawTrack } from "./track.js";
 
-/** @typedef {import("./question_form.js").Drawn} Drawn */
-
 /** Number of gradations of a workload scale: 0 to 100 in steps of 5. */
 const GRADATIONS = 21;
 
+/** @typedef {import("./choices.js").Choices} Item */
+/** @typedef {(item: number) => (point: number) => void} Choose returns the function that gives an item its point */
+
 /**
- * @param {import("./questions.js").WorkloadAnswer} answer
+ * The items of a form, and all that it shows, in order.
+ *
+ * @typedef {{ className: string, nodes: (HTMLElement | false)[], items: Item[] }} Form
+ */
+
+/**
+ * @param {import("./questions.js").ItemsAnswer} answer
  * @param {HTMLElement} heading
  * @param {() => void} changed
- * @returns {Drawn}
+ * @returns {import("./question_form.js").Drawn}
  */
-export function drawWorkload(answer, heading, changed) {
-  const choose = (/** @type {number} */ item, /** @type {number} */ point) => {
+export function drawItems(answer, heading, changed) {
+  const { className, nodes, items } = formOf(answer, (item) => (point) => {
     answer.choose(item, point);
     changed();
-  };
-
-  const scales = answer.scales.map(({ title, text, low, high }, item) => {
-    const inWords = (/** @type {number} */ value) => say("gradation", { value: (value - 1) * 5 });
-    const line = { label: title, low, high, min: 1, max: GRADATIONS, graded: true, inWords };
-    const track = drawTrack(line, (value) => choose(item, value));
-    const about = make("p", { className: "about" }, text);
-    return {
-      element: make("fieldset", {}, make("legend", {}, title), about, track.element, gap()),
-      show: track.show,
-    };
   });
 
-  const pairs = answer.pairs.map(({ first, second }, index) => {
-    const item = scales.length + index;
-    const names = [first, second].map((place) => answer.scales[place]?.title ?? "");
-    const choices = drawWords(`${answer.question.id}-${item}`, names, (point) => choose(item, point), "pair");
-    const label = say("pair-label", { first: names[0] ?? "", second: names[1] ?? "" });
-    return {
-      element: make("fieldset", { "aria-label": label }, choices.element, gap()),
-      show: choices.check,
-    };
-  });
-
-  const items = [...scales, ...pairs];
-  const compare = make("p", { className: "about" }, say("pair-choose"));
   return {
-    nodes: [
-      heading,
-      make(
-        "div",
-        { className: "sus" },
-        ...scales.map(({ element }) => element),
-        pairs.length > 0 && compare,
-        ...pairs.map(({ element }) => element),
-      ),
-    ],
+    nodes: [heading, make("div", { className }, ...nodes)],
     draw: () => {
-      for (const [item, { element, show }] of items.entries()) {
-        show(answer.points[item] || null);
+      for (const [item, { element, check }] of items.entries()) {
+        check(answer.points[item] || null);
         element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
       }
     },
@@ -68,41 +43,83 @@ export function drawWorkload(answer, heading, changed) {
 }
 
 /**
- * @param {import("./questions.js").PlacesAnswer} answer
- * @param {HTMLElement} heading
- * @param {() => void} changed
- * @returns {Drawn}
+ * @param {import("./questions.js").ItemsAnswer} answer
+ * @param {Choose} choose
+ * @returns {Form}
  */
-export function drawPlaces(answer, heading, changed) {
-  const ends = { points: answer.points.length, low: say("best"), high: say("worst") };
-  const settings = answer.points.map((_, item) => {
-    const scale = drawScale(`${answer.question.id}-${item}`, ends, (place) => {
-      answer.choose(item, place);
-      changed();
-    });
-    const element = make(
-      "fieldset",
-      {},
-      make("legend", {}, say("setting-number", { setting: item + 1 })),
-      scale.element,
-    );
-    return { element, check: scale.check };
+function formOf({ question, points }, choose) {
+  switch (question.kind) {
+    case "sus":
+      return usability(question.id, question, choose);
+    case "nasa-tlx":
+      return workload(question.id, question.scales, [], choose);
+    case "surg-tlx":
+      return workload(question.id, question.scales, question.pairs, choose);
+    default:
+      return places(question.id, points.length, choose);
+  }
+}
+
+/**
+ * @param {string} id
+ * @param {{ items: string[], low: string, high: string }} scale
+ * @param {Choose} choose
+ * @returns {Form}
+ */
+function usability(id, { items: texts, low, high }, choose) {
+  const items = texts.map((text, item) => {
+    const { element, check } = drawScale(`${id}-${item}`, { points: 5, low, high }, choose(item));
+    return { element: make("fieldset", {}, make("legend", {}, `${item + 1}. ${text}`), element), check };
+  });
+  return { className: "sus", nodes: items.map(({ element }) => element), items };
+}
+
+/**
+ * @param {string} id
+ * @param {Api.Scale[]} scales
+ * @param {Api.Pair[]} pairs
+ * @param {Choose} choose
+ * @returns {Form}
+ */
+function workload(id, scales, pairs, choose) {
+  const rated = scales.map(({ title, text, low, high }, item) => {
+    const inWords = (/** @type {number} */ value) => say("gradation", { value: (value - 1) * 5 });
+    const line = { label: title, low, high, min: 1, max: GRADATIONS, graded: true, inWords };
+    const track = drawTrack(line, choose(item));
+    const about = make("p", { className: "about" }, text);
+    const element = make("fieldset", {}, make("legend", {}, title), about, track.element, gap());
+    return { element, check: track.show };
+  });
+
+  const compared = pairs.map(({ first, second }, index) => {
+    const item = scales.length + index;
+    const names = [first, second].map((place) => scales[place]?.title ?? "");
+    const { element, check } = drawWords(`${id}-${item}`, names, choose(item), "pair");
+    const label = say("pair-label", { first: names[0] ?? "", second: names[1] ?? "" });
+    return { element: make("fieldset", { "aria-label": label }, element, gap()), check };
+  });
+
+  const compare = pairs.length > 0 && make("p", { className: "about" }, say("pair-choose"));
+  const nodes = [...rated.map(({ element }) => element), compare, ...compared.map(({ element }) => element)];
+  return { className: "sus", nodes, items: [...rated, ...compared] };
+}
+
+/**
+ * @param {string} id
+ * @param {number} settings how many there are
+ * @param {Choose} choose
+ * @returns {Form}
+ */
+function places(id, settings, choose) {
+  const ends = { points: settings, low: say("best"), high: say("worst") };
+  const items = Array.from({ length: settings }, (_, item) => {
+    const { element, check } = drawScale(`${id}-${item}`, ends, choose(item));
+    const legend = make("legend", {}, say("setting-number", { setting: item + 1 }));
+    return { element: make("fieldset", {}, legend, element), check };
   });
 
   const about = make("p", { className: "about" }, say("give-places"));
-  return {
-    nodes: [
-      heading,
-      make("div", { className: "sus places" }, about, ...settings.map(({ element }) => element)),
-    ],
-    draw: () => {
-      for (const [item, { element, check }] of settings.entries()) {
-        check(answer.points[item] || null);
-        element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
-      }
-    },
-    wantedPart: () => settings.find((_, item) => answer.wantedParts[item])?.element,
-  };
+  return { className: "sus places", nodes: [about, ...items.map(({ element }) => element)], items };
 }
 
 /** The mark of an unanswered item. It always takes up its space. */

@@ -3,8 +3,8 @@
 import { make, setText } from "../shared/dom.js";
 import { say, words } from "../shared/language.js";
 import { drawScale, drawWords } from "./choices.js";
-import { drawPlaces, drawWorkload } from "./instrument_form.js";
-import { PlacesAnswer, ScaleAnswer, SusAnswer, TextAnswer, WorkloadAnswer } from "./questions.js";
+import { drawItems } from "./instrument_form.js";
+import { ItemsAnswer, ScaleAnswer, TextAnswer } from "./questions.js";
 import { drawRanking } from "./ranking.js";
 import { drawTrack } from "./track.js";
 
@@ -82,9 +82,7 @@ export function questionBox(answer, changed) {
 function drawKind(answer, changed) {
   if (answer instanceof TextAnswer) return drawText(answer, changed);
   if (answer instanceof ScaleAnswer) return drawScaleQuestion(answer, changed);
-  if (answer instanceof SusAnswer) return drawSus(answer, changed);
-  if (answer instanceof WorkloadAnswer) return drawWorkload(answer, heading(answer.question), changed);
-  if (answer instanceof PlacesAnswer) return drawPlaces(answer, heading(answer.question), changed);
+  if (answer instanceof ItemsAnswer) return drawItems(answer, heading(answer.question), changed);
   return drawRanking(answer, heading(answer.question), changed);
 }
 
@@ -158,33 +156,4 @@ function drawPoints(question, choose) {
     default:
       throw new Error(`question ${question.id} has no scale`);
   }
-}
-
-/**
- * @param {SusAnswer} answer
- * @param {() => void} changed
- * @returns {Drawn}
- */
-function drawSus(answer, changed) {
-  const ends = { points: 5, low: answer.low, high: answer.high };
-  const scales = answer.items.map((_, item) =>
-    drawScale(`${answer.question.id}-${item}`, ends, (point) => {
-      answer.choose(item, point);
-      changed();
-    }),
-  );
-  const items = scales.map(({ element }, item) =>
-    make("fieldset", {}, make("legend", {}, `${item + 1}. ${answer.items[item]}`), element),
-  );
-
-  return {
-    nodes: [heading(answer.question), make("div", { className: "sus" }, ...items)],
-    draw: () => {
-      for (const [item, element] of items.entries()) {
-        scales[item]?.check(answer.points[item] ?? null);
-        element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
-      }
-    },
-    wantedPart: () => items.find((_, item) => answer.wantedParts[item]),
-  };
 }

@@ -346,8 +346,12 @@ export class ScaleAnswer extends Answer {
   }
 }
 
-/** A questionnaire of several items. Each is answered with a point, counted from 1; 0 if it is not answered. */
-class ItemsAnswer extends Answer {
+/**
+ * Several items, each answered with a point, counted from 1; 0 if it is not answered. The items are those of the System
+ * Usability Scale; the scales of a workload index, and then its pairs of scales, of which 1 or 2 is chosen; or the
+ * settings, each with its place, which others may share.
+ */
+export class ItemsAnswer extends Answer {
   points;
   /** @type {boolean[]} */
   #wantedItems;
@@ -415,61 +419,6 @@ class ItemsAnswer extends Answer {
     this.points = [...value];
     this.#wantedItems = this.#wantedItems.map((wanted, item) => wanted && value[item] === 0);
     return isNews;
-  }
-}
-
-/** The ten items of the System Usability Scale. */
-export class SusAnswer extends ItemsAnswer {
-  items;
-  /** What the ends of each item's scale mean. */
-  low;
-  high;
-
-  /**
-   * @param {Api.Question} question
-   * @param {Api.AnswerValue | undefined} answered
-   * @param {Context} context
-   * @param {{ items: string[], low: string, high: string }} scale
-   */
-  constructor(question, answered, context, { items, low, high }) {
-    super(question, answered, context, items.length);
-    this.items = items;
-    this.low = low;
-    this.high = high;
-  }
-}
-
-/**
- * A workload index: for each scale a gradation, counted from 1, and for each pair of scales which one was chosen, 1 or
- * 2.
- */
-export class WorkloadAnswer extends ItemsAnswer {
-  scales;
-  pairs;
-
-  /**
-   * @param {Api.Question} question
-   * @param {Api.AnswerValue | undefined} answered
-   * @param {Context} context
-   * @param {Api.Scale[]} scales
-   * @param {Api.Pair[]} pairs
-   */
-  constructor(question, answered, context, scales, pairs) {
-    super(question, answered, context, scales.length + pairs.length);
-    this.scales = scales;
-    this.pairs = pairs;
-  }
-}
-
-/** The place of each setting, counted from 1. Settings may share a place. */
-export class PlacesAnswer extends ItemsAnswer {
-  /**
-   * @param {Api.Question} question
-   * @param {Api.AnswerValue | undefined} answered
-   * @param {Context} context
-   */
-  constructor(question, answered, context) {
-    super(question, answered, context, context.settings);
   }
 }
 
@@ -553,7 +502,7 @@ export class RankingAnswer extends Answer {
   }
 }
 
-/** @typedef {TextAnswer | ScaleAnswer | SusAnswer | WorkloadAnswer | PlacesAnswer | RankingAnswer} AnyAnswer */
+/** @typedef {TextAnswer | ScaleAnswer | ItemsAnswer | RankingAnswer} AnyAnswer */
 
 /**
  * @param {Api.Question} question
@@ -570,14 +519,14 @@ export function answerTo(question, answered, context) {
     case "recognition":
       return new ScaleAnswer(question, answered, context);
     case "sus":
-      return new SusAnswer(question, answered, context, question);
+      return new ItemsAnswer(question, answered, context, question.items.length);
     case "nasa-tlx":
-      return new WorkloadAnswer(question, answered, context, question.scales, []);
+      return new ItemsAnswer(question, answered, context, question.scales.length);
     case "surg-tlx":
-      return new WorkloadAnswer(question, answered, context, question.scales, question.pairs);
+      return new ItemsAnswer(question, answered, context, question.scales.length + question.pairs.length);
     case "ranking":
       return question.ties
-        ? new PlacesAnswer(question, answered, context)
+        ? new ItemsAnswer(question, answered, context, context.settings)
         : new RankingAnswer(question, answered, context);
   }
 }
