@@ -5,6 +5,7 @@ import { Framing } from "../static/shared/framing.js";
 import { Gestures } from "../static/shared/gestures.js";
 import { Hold, isHoldKey } from "../static/shared/hold.js";
 import { Pointing } from "../static/shared/pointing.js";
+import { settle } from "./around.js";
 
 /** What came with a picture whose patch has its middle at `x`, `y`. */
 function header(x = 256, y = 136, choices = 0) {
@@ -147,11 +148,11 @@ test("keys move the place step by step, and only where they end is sent", () => 
   assert.deepEqual(done.sent[1], [7, null]);
 });
 
-test("the focus is held by a short press until the next one, or as long as a long press lasts", () => {
+test("the focus is held by a short press until the next one, or as long as a long press lasts", async () => {
   let now = 0;
   /** @type {boolean[]} */
   const asked = [];
-  const hold = new Hold({ ask: (held) => asked.push(held), now: () => now });
+  const hold = new Hold({ ask: async (held) => void asked.push(held), now: () => now });
   const press = (/** @type {number} */ ms) => {
     hold.press("pedal");
     hold.press("pedal");
@@ -160,16 +161,42 @@ test("the focus is held by a short press until the next one, or as long as a lon
   };
 
   press(200);
+  await settle();
   assert.deepEqual(asked, [true]);
   press(200);
+  await settle();
   assert.deepEqual(asked, [true, false]);
   press(900);
+  await settle();
   assert.deepEqual(asked, [true, false, true, false]);
   // A second finger changes nothing.
   hold.press("finger");
   assert.equal(hold.release("pedal"), false);
   hold.leave();
+  await settle();
   assert.deepEqual(asked.slice(4), [true]);
+});
+
+test("a release is sent only when its hold is answered, so that it cannot overtake it", async () => {
+  /** @type {boolean[]} */
+  const asked = [];
+  let answer = () => {};
+  const ask = (/** @type {boolean} */ held) => {
+    asked.push(held);
+    return new Promise((/** @type {(value: void) => void} */ resolve) => {
+      answer = resolve;
+    });
+  };
+  let now = 0;
+  const hold = new Hold({ ask, now: () => now });
+  hold.press("finger");
+  now = 900;
+  hold.release("finger");
+  await settle();
+  assert.deepEqual(asked, [true]);
+  answer();
+  await settle();
+  assert.deepEqual(asked, [true, false]);
 });
 
 test("a pedal's keys hold the focus, and fields keep those that they use", () => {

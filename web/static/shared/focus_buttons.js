@@ -20,7 +20,7 @@ export function tellPointing(element, trouble) {
 
 /**
  * @param {import("./pointing.js").Pointing} pointing
- * @param {(hold: boolean) => void} ask asks the server to hold or to release the focus
+ * @param {(hold: boolean) => Promise<void>} ask asks the server to hold or to release the focus; never rejects
  */
 export function focusButtons(pointing, ask) {
   const centre = byId("centre", HTMLButtonElement);

@@ -24,8 +24,10 @@ export class Hold {
   held = false;
   /** What is pressed, and since when. @type {{ by: string, at: number, began: boolean } | null} */
   #press = null;
+  /** Resolves once everything that was asked for is answered. @type {Promise<unknown>} */
+  #answered = Promise.resolve();
 
-  /** @param {{ ask: (hold: boolean) => void, now: () => number }} parts */
+  /** @param {{ ask: (hold: boolean) => Promise<void>, now: () => number }} parts */
   constructor(parts) {
     this.#parts = parts;
   }
@@ -60,6 +62,7 @@ export class Hold {
   /** @param {boolean} hold */
   #ask(hold) {
     this.held = hold;
-    this.#parts.ask(hold);
+    // One after another: on a poor network a release could overtake its hold, and the focus would stay held.
+    this.#answered = this.#answered.then(() => this.#parts.ask(hold));
   }
 }

@@ -81,9 +81,9 @@ const pointing = viewer.pointBy(
   (frame, at) => post("/api/surgeon/patch", { session: state?.session ?? null, frame, at }),
   (trouble) => tellPointing(byId("trouble"), trouble),
 );
-const focus = focusButtons(pointing, (hold) => {
+const focus = focusButtons(pointing, async (hold) => {
   const segment = state?.segment;
-  if (segment) act({ action: hold ? "hold-focus" : "release-focus", segment });
+  if (segment) await act({ action: hold ? "hold-focus" : "release-focus", segment });
 });
 const voice = openVoiceOutbox();
 const comments = new Comments(outbox, drafts, here, voice);
@@ -228,6 +228,8 @@ async function act(action) {
       notice.ask(refused ? "tap-to-continue" : "tap-unanswered");
     }
     if (refused && error.status < 500) await refresh();
+    // Otherwise the next press would end a hold that never began.
+    focus.follow(state, over);
     if (isStillMeant(action)) {
       tellTrouble(byId("trouble"), error, say("act-unanswered"));
     }
