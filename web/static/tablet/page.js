@@ -6,13 +6,16 @@ import { byId, make, setText } from "../shared/dom.js";
 import { say } from "../shared/language.js";
 import { storeOn } from "../shared/storage.js";
 import { tellTrouble } from "../shared/trouble.js";
+import { uuid } from "../shared/uuid.js";
 import { speakAsThePage } from "../surgeon/languages.js";
-import { device } from "./device.js";
+import { Origins } from "../surgeon/origin.js";
 import { tryAll } from "./trials.js";
 import { partWords, summary } from "./words.js";
 
 speakAsThePage();
 const store = storeOn(() => localStorage);
+/** Names the tablet as the surgeon's page does. */
+const origins = new Origins(store, { page: () => performance.now(), wall: () => Date.now() }, uuid);
 
 /** @param {import("./words.js").Tried[]} tried */
 function draw(tried) {
@@ -31,7 +34,7 @@ go.onclick = async () => {
   const tried = await tryAll(store);
   draw(tried);
   try {
-    await post("/api/surgeon/tablet-trials", { device: device(store), tried });
+    await post("/api/surgeon/tablet-trials", { device: origins.device(), tried });
     setText(byId("result"), say("tablet-told"));
   } catch (error) {
     tellTrouble(byId("result"), error, say("tablet-not-told"));
