@@ -35,11 +35,29 @@ export function diskStoreOn(factory, name) {
     return opening;
   };
 
+  /**
+   * Begins a transaction.
+   *
+   * @param {IDBTransactionMode} mode
+   * @param {IDBTransactionOptions} [options]
+   */
+  async function begin(mode, options) {
+    const opened = open();
+    const database = await opened;
+    try {
+      return database.transaction(KEPT, mode, options);
+    } catch {
+      // The browser has closed the database, as tablets do to a page that was out of sight. It can be opened again.
+      if (opening === opened) opening = null;
+      return (await open()).transaction(KEPT, mode, options);
+    }
+  }
+
   return {
     async all() {
       try {
-        const database = await open();
-        return await done(database.transaction(KEPT).objectStore(KEPT).getAll());
+        const transaction = await begin("readonly");
+        return await done(transaction.objectStore(KEPT).getAll());
       } catch {
         return null;
       }
@@ -47,9 +65,8 @@ export function diskStoreOn(factory, name) {
 
     async put(thing) {
       try {
-        const database = await open();
         // By default browsers leave it to the operating system when data reach the disk.
-        const transaction = database.transaction(KEPT, "readwrite", { durability: "strict" });
+        const transaction = await begin("readwrite", { durability: "strict" });
         transaction.objectStore(KEPT).put(thing);
         // By itself the browser commits only after the page has heard of it, and never if the page closes before.
         transaction.commit();
@@ -62,8 +79,7 @@ export function diskStoreOn(factory, name) {
 
     async remove(id) {
       try {
-        const database = await open();
-        const transaction = database.transaction(KEPT, "readwrite");
+        const transaction = await begin("readwrite");
         transaction.objectStore(KEPT).delete(id);
         await ended(transaction);
       } catch {
