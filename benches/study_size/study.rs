@@ -13,7 +13,7 @@ use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_base::step::StepRecord;
 use parfocal_records::store::telemetry::run_writer;
-use parfocal_session::conductor::StudySite;
+use parfocal_session::conductor::StudyPlace;
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
 use parfocal_trial::phase::Phase;
@@ -112,8 +112,8 @@ async fn change(trial: &Trial, change: Change) {
 async fn session(trial: &mut Trial, number: usize, steps: usize) -> SessionId {
     let code = format!("S-{number:03}");
     trial.conductor.add_participant(Role::Operator, &code).await.expect("the code is sound");
-    let site = StudySite { study: STUDY.to_owned(), site: SITE.to_owned() };
-    let session = trial.conductor.create_in_study(Role::Operator, &code, "size", site).await;
+    let site = StudyPlace { study: STUDY.to_owned(), site: SITE.to_owned() };
+    let session = trial.conductor.create(Role::Operator, &code, "size", Some(site)).await;
     let session = session.expect("there is a place");
     trial.conductor.act(Role::Operator, session, Action::Start).await.expect("it was prepared");
 

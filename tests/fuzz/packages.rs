@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 
 use parfocal_results::package::{PackageSource, Sessions, check, exports_of, left_out, write};
 use parfocal_results::study_export::export_study;
-use parfocal_session::conductor::StudySite;
+use parfocal_session::conductor::StudyPlace;
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
 use parfocal_trial::protocol::Protocol;
@@ -191,8 +191,8 @@ async fn change(trial: &Trial, change: Change) {
 
 /// A session of `participant`, with a written comment and a spoken one.
 async fn session(trial: &mut Trial, participant: &str) {
-    let place = StudySite { study: STUDY.to_owned(), site: "leeds".to_owned() };
-    let session = trial.conductor.create_in_study(Role::Operator, participant, "pair", place).await.unwrap();
+    let place = StudyPlace { study: STUDY.to_owned(), site: "leeds".to_owned() };
+    let session = trial.conductor.create(Role::Operator, participant, "pair", Some(place)).await.unwrap();
     trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
 
     let segment = trial.view().segment.unwrap();

@@ -153,7 +153,7 @@ async fn a_session(trial: &mut Trial) -> parfocal_base::ids::SessionId {
     let operator = Actor { role: Role::Operator, account: Some(operator.account) };
     let researcher = Actor { role: Role::Researcher, account: Some(researcher.account) };
 
-    let session = trial.conductor.create(operator.clone(), PARTICIPANT, "paper").await.unwrap();
+    let session = trial.conductor.create(operator.clone(), PARTICIPANT, "paper", None).await.unwrap();
     trial.conductor.act(operator.clone(), session, Action::Start).await.unwrap();
     trial.whole_setting().await;
     // An abort stops the lens first, and is recorded after that.

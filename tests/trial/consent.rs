@@ -23,7 +23,7 @@ fn withdraw() -> Action {
 async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
     let folder = tempfile::tempdir().unwrap();
     let trial = with_instruments(folder.path()).await;
-    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments").await.unwrap();
+    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments", None).await.unwrap();
     let refused = trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("version '2.1'")), "{refused}");
     assert_eq!(trial.view().phase, Phase::Ready);

@@ -152,7 +152,7 @@ async fn invalid_corrections_are_refused() {
     assert!(matches!(refused, ConductError::Invalid(_)), "{refused}");
     assert_eq!(trial.store.reader().corrections(session).await.unwrap(), []);
 
-    let under_way = trial.conductor.create(Role::Operator, PARTICIPANT, "practice").await.unwrap();
+    let under_way = trial.conductor.create(Role::Operator, PARTICIPANT, "practice", None).await.unwrap();
     trial.conductor.act(Role::Operator, under_way, Action::Start).await.unwrap();
     let refused = correct(&trial, under_way, participant(PARTICIPANT, "S-02")).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("once it has ended")), "{refused}");

@@ -139,7 +139,7 @@ impl Trial {
 
     /// Makes and starts a session with `protocol`.
     pub async fn begin(&self, protocol: &str) -> SessionId {
-        let session = self.conductor.create(Role::Operator, PARTICIPANT, protocol).await.unwrap();
+        let session = self.conductor.create(Role::Operator, PARTICIPANT, protocol, None).await.unwrap();
         self.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
         session
     }

@@ -38,7 +38,7 @@ pub fn consent() -> Consent {
 
 /// Makes a session, records the consent, and starts it.
 pub async fn begin(trial: &Trial) -> SessionId {
-    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments").await.unwrap();
+    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments", None).await.unwrap();
     trial.conductor.record_consent(Role::Operator, NewConsent { session, consent: consent() }).await.unwrap();
     trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
     session

@@ -173,7 +173,7 @@ async fn a_restarted_server_continues_at_the_same_place_and_loses_at_most_a_seco
 async fn one_session_at_a_time_and_only_with_known_codes_and_protocols() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;
-    let create = |by, participant, protocol| trial.conductor.create(by, participant, protocol);
+    let create = |by, participant, protocol| trial.conductor.create(by, participant, protocol, None);
     assert!(matches!(create(Role::Surgeon, PARTICIPANT, "paper").await, Err(ConductError::Forbidden(_))));
     assert!(matches!(create(Role::Operator, "S-99", "paper").await, Err(ConductError::NotFound(_))));
     let unknown = create(Role::Operator, PARTICIPANT, "papers").await.unwrap_err();

@@ -94,8 +94,8 @@ impl Site {
 
     /// Runs a session of `surgeon`, whose ratings of the settings depend on `taste`.
     async fn session(&mut self, surgeon: &str, taste: u8) -> SessionId {
-        let place = StudySite { study: STUDY.to_owned(), site: self.site.to_owned() };
-        let made = self.trial.conductor.create_in_study(Role::Operator, surgeon, "rated", place);
+        let place = StudyPlace { study: STUDY.to_owned(), site: self.site.to_owned() };
+        let made = self.trial.conductor.create(Role::Operator, surgeon, "rated", Some(place));
         let session = made.await.unwrap();
         self.trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
         for setting in 0..6_u8 {
@@ -120,8 +120,8 @@ impl Site {
     /// Makes what the report must tell apart: an aborted and a withdrawn session, a corrected code and a corrected
     /// rating, and erased words.
     async fn complicate(&mut self) {
-        let place = StudySite { study: STUDY.to_owned(), site: self.site.to_owned() };
-        let aborted = self.trial.conductor.create_in_study(Role::Operator, "S-07", "rated", place).await.unwrap();
+        let place = StudyPlace { study: STUDY.to_owned(), site: self.site.to_owned() };
+        let aborted = self.trial.conductor.create(Role::Operator, "S-07", "rated", Some(place)).await.unwrap();
         let abort = Action::Abort { reason: "the light failed".to_owned() };
         self.trial.conductor.act(Role::Operator, aborted, abort).await.unwrap();
         self.trial.conductor.dismiss(Role::Operator, aborted).unwrap();
@@ -315,8 +315,8 @@ async fn a_packages_recordings_state_their_duration_and_the_exports_keep_theirs_
     let data = folder.path().join("data");
     let mut site = Site::open(&data, 5, "leeds").await;
     let session = site.session("S-02", 1).await;
-    let place = StudySite { study: STUDY.to_owned(), site: "leeds".to_owned() };
-    let spoken = site.trial.conductor.create_in_study(Role::Operator, "S-03", "rated", place).await.unwrap();
+    let place = StudyPlace { study: STUDY.to_owned(), site: "leeds".to_owned() };
+    let spoken = site.trial.conductor.create(Role::Operator, "S-03", "rated", Some(place)).await.unwrap();
     site.trial.conductor.act(Role::Operator, spoken, Action::Start).await.unwrap();
     let mut comment = site.trial.comment("");
     comment.said = CommentContent::Voice;

@@ -100,7 +100,7 @@ async fn sessions_outside_a_study_never_share_the_seed_of_its_sets() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = opened(folder.path()).await;
     let inside = whole(&mut trial, PARTICIPANT, "leeds").await;
-    let outside = trial.conductor.create(Role::Operator, "S-02", "pair").await.unwrap();
+    let outside = trial.conductor.create(Role::Operator, "S-02", "pair", None).await.unwrap();
     let seed = async |session| trial.store.reader().session(session).await.unwrap().unwrap().made.seed;
     assert!(seed(inside).await != seed(outside).await);
     assert_eq!(trial.store.reader().enrolment(outside).await.unwrap(), None);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::export::{ExportError, export};
-use parfocal_session::conductor::{ConductError, Studies, StudySite};
+use parfocal_session::conductor::{ConductError, Studies, StudyPlace};
 use parfocal_session::reports::StudyDetail;
 use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
@@ -182,8 +182,8 @@ async fn missing_parts_of_a_study_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let trial = opened(folder.path()).await;
     let ask = async |study: &str, site: &str, protocol: &str| {
-        let place = StudySite { study: study.to_owned(), site: site.to_owned() };
-        refusal(trial.conductor.create_in_study(Role::Operator, PARTICIPANT, protocol, place).await)
+        let place = StudyPlace { study: study.to_owned(), site: site.to_owned() };
+        refusal(trial.conductor.create(Role::Operator, PARTICIPANT, protocol, Some(place)).await)
     };
 
     assert!(ask("another", "leeds", "pair").await.contains("there is no study 'another'; there are: scope-2026"));

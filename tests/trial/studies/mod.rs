@@ -12,7 +12,7 @@ mod places;
 use std::path::Path;
 
 use parfocal_base::ids::SessionId;
-use parfocal_session::conductor::{ConductError, StudySite};
+use parfocal_session::conductor::{ConductError, StudyPlace};
 use parfocal_session::reports::StudyDetail;
 use parfocal_trial::account::AccountRole;
 use parfocal_trial::action::Action;
@@ -124,8 +124,8 @@ pub async fn detail(trial: &Trial) -> StudyDetail {
 
 /// Prepares a session of `participant` in the study at `site`.
 pub async fn prepare(trial: &Trial, participant: &str, site: &str) -> Result<SessionId, ConductError> {
-    let place = StudySite { study: STUDY.to_owned(), site: site.to_owned() };
-    trial.conductor.create_in_study(Role::Operator, participant, "pair", place).await
+    let place = StudyPlace { study: STUDY.to_owned(), site: site.to_owned() };
+    trial.conductor.create(Role::Operator, participant, "pair", Some(place)).await
 }
 
 /// Runs a session of `participant` in the study at `site` from its start to its end, and closes it.

@@ -20,7 +20,7 @@ use super::surgeon::Act;
 use super::{App, AppState};
 use parfocal_autofocus::PolicyEntry;
 use parfocal_base::ids::SessionId;
-use parfocal_session::conductor::{ProtocolSummary, StudySite};
+use parfocal_session::conductor::{ProtocolSummary, StudyPlace};
 use parfocal_session::reports::OpenStudy;
 use parfocal_trial::account::Account;
 use parfocal_trial::action::Focus;
@@ -229,15 +229,6 @@ struct NewSession {
     study: Option<StudyPlace>,
 }
 
-/// A study and the site at which a session is made.
-#[derive(Debug, Deserialize, ToSchema)]
-struct StudyPlace {
-    /// The study's name.
-    study: String,
-    /// The site's name.
-    site: String,
-}
-
 type View = Json<Option<Arc<OperatorView>>>;
 
 /// The session under way; null if there is none.
@@ -255,16 +246,10 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
     (status = 409, description = "A session is under way, or the study allows no such session"),
     (status = 422, description = "The study has no such site or protocol")))]
 async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
-    match new.study {
-        Some(StudyPlace { study, site }) => {
-            by.personally()?;
-            let place = StudySite { study, site };
-            app.conductor.create_in_study(by.actor(), &new.participant, &new.protocol, place).await?;
-        }
-        None => {
-            app.conductor.create(by.actor(), &new.participant, &new.protocol).await?;
-        }
+    if new.study.is_some() {
+        by.personally()?;
     }
+    app.conductor.create(by.actor(), &new.participant, &new.protocol, new.study).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
 

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha12Rng;
 use uuid::Uuid;
 
 use super::course::Course;
-use super::{ConductError, Pen, Shared, StudySite};
+use super::{ConductError, Pen, Shared, StudyPlace};
 use parfocal_base::PolicyName;
 use parfocal_base::boxed;
 use parfocal_base::ids::{SegmentId, SessionId};
@@ -38,7 +38,7 @@ impl Shared {
         by: Actor,
         participant: &str,
         protocol: &str,
-        place: Option<StudySite>,
+        place: Option<StudyPlace>,
     ) -> Result<SessionId, ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;
@@ -85,7 +85,7 @@ impl Shared {
     /// The next place in the list of a study's site, by the protocol as it was when the study was planned.
     async fn draw_in_study(
         &self,
-        StudySite { study, site }: StudySite,
+        StudyPlace { study, site }: StudyPlace,
         protocol: &str,
         participant: &str,
     ) -> Result<DrawnOrder, ConductError> {

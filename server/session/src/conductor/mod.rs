@@ -27,7 +27,9 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use rand_chacha::ChaCha12Rng;
+use serde::Deserialize;
 use tokio::sync::{Mutex, Notify, watch};
+use utoipa::ToSchema;
 
 pub(crate) use course::{Course, RunClock, outstanding};
 pub(crate) use erasures::words_left;
@@ -100,9 +102,9 @@ struct Shared {
     to_record: Notify,
 }
 
-/// The site of a study in which a session is to be made.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StudySite {
+/// A study and the site at which a session is made.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct StudyPlace {
     /// The study's name.
     pub study: String,
     /// The site's name.
@@ -226,42 +228,19 @@ impl Conductor {
         Ok(self.shared.store.add_participant(code, self.shared.clock.wall()).await?)
     }
 
-    /// Makes a session for `participant` by `protocol` and draws its allocation. The session waits for
-    /// [`Action::Start`].
+    /// Makes a session for `participant` by `protocol` and draws its allocation; with a `place` in a study, the session
+    /// gets the next place in the list of that site. It waits for [`Action::Start`].
     ///
     /// # Errors
-    /// If a session is under way already, or participant or protocol is unknown.
+    /// If a session is under way already, participant or protocol is unknown, or the study allows no such session.
     pub async fn create(
         &self,
         by: impl Into<Actor>,
         participant: &str,
         protocol: &str,
+        place: Option<StudyPlace>,
     ) -> Result<SessionId, ConductError> {
-        self.create_where(by.into(), participant, protocol, None).await
-    }
-
-    /// Makes a session for `participant` by `protocol` of the study `place.study`: it gets the next place in the list
-    /// of `place.site`.
-    ///
-    /// # Errors
-    /// If a session is under way already, the participant is unknown, or the study allows no such session.
-    pub async fn create_in_study(
-        &self,
-        by: impl Into<Actor>,
-        participant: &str,
-        protocol: &str,
-        place: StudySite,
-    ) -> Result<SessionId, ConductError> {
-        self.create_where(by.into(), participant, protocol, Some(place)).await
-    }
-
-    async fn create_where(
-        &self,
-        by: Actor,
-        participant: &str,
-        protocol: &str,
-        place: Option<StudySite>,
-    ) -> Result<SessionId, ConductError> {
+        let by = by.into();
         let participant = participant.to_owned();
         let protocol = protocol.to_owned();
         self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol, place).await }).await
