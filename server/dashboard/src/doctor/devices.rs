@@ -62,7 +62,7 @@ fn described(info: &LensInfo) -> Finding {
     if status.is_empty() {
         return Finding::well(LENS, found);
     }
-    Finding::wrong(LENS, format!("{found} It reports: {}.", status.join("; ")), "Follow docs/bench.md, \"Lens\".")
+    Finding::wrong(LENS, format!("{found} It reports: {}.", status.join("; ")), "Follow docs/bench.md, \"The lens\".")
 }
 
 /// A device's name and message as one sentence.
