@@ -353,6 +353,21 @@ test("an entry that another tab has sent is no longer waiting here", async () =>
   assert.deepEqual(outbox.waiting, []);
 });
 
+test("an entry that was refused here and that another tab has sent is no longer held here", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [new Refused(404, "no such session", true)];
+  const { id } = outbox.add("/comments", { session: "s", text: "a" });
+  await settle();
+  const other = openPage(page.store, page.time, page.newId);
+  other.open();
+  await settle();
+  assert.deepEqual(texts(other.server), ["a"]);
+
+  outbox.doneElsewhere(`parfocal.outbox.${id}`);
+  assert.deepEqual([outbox.refused("s"), outbox.held("s")], [[], 0]);
+});
+
 test("each entry has its number among all of the device, and its age", async () => {
   const page = openPage();
   const outbox = page.open();

@@ -330,9 +330,12 @@ export class Outbox {
    * @param {string} name the entry's name in storage
    */
   doneElsewhere(name) {
-    const entry = this.#entries.get(name.slice(PREFIX.length));
-    if (!name.startsWith(PREFIX) || !entry || entry.sending) return;
-    this.#entries.delete(entry.id);
+    if (!name.startsWith(PREFIX)) return;
+    const id = name.slice(PREFIX.length);
+    const entry = this.#entries.get(id) ?? this.#refused.get(id);
+    if (!entry || entry.sending) return;
+    this.#entries.delete(id);
+    this.#refused.delete(id);
     this.#tell(entry, "saved");
   }
 
