@@ -10,6 +10,7 @@ use super::which::{LensChoice, dioptre, go};
 use crate::cli::output::{Failure, print_result};
 use parfocal_base::FocalPower;
 use parfocal_base::files::replace;
+use parfocal_base::plot::{Axis, Plot};
 
 /// Arguments of `parfocal lens sweep`.
 #[derive(Debug, clap::Args)]
@@ -84,41 +85,18 @@ fn table(stops: &[Stop]) -> String {
 
 /// Plots positions read back over those requested, both in dioptres; the line is where they agree.
 fn plot(stops: &[Stop]) -> String {
-    const SIDE: f64 = 400.0;
-    const MARGIN: f64 = 50.0;
-    let ends = |pick: fn(f64, f64) -> f64, start| stops.iter().map(|stop| stop.asked_dioptre).fold(start, pick);
-    let min = ends(f64::min, f64::INFINITY);
-    let max = ends(f64::max, f64::NEG_INFINITY);
+    let positions = stops.iter().flat_map(|stop| [stop.asked_dioptre, stop.read_back_dioptre]);
+    let hundredths = positions.map(|dioptre| dioptre * 100.0);
+    let least = hundredths.clone().fold(f64::INFINITY, f64::min).floor() / 100.0;
+    let most = hundredths.fold(f64::NEG_INFINITY, f64::max).ceil() / 100.0;
 
-    let along = |value: f64| MARGIN + (value - min) / (max - min) * SIDE;
-    let up = |value: f64| MARGIN + SIDE - (value - min) / (max - min) * SIDE;
-    let low = MARGIN;
-    let high = MARGIN + SIDE;
-    let middle = MARGIN + SIDE / 2.0;
-    let whole = SIDE + 2.0 * MARGIN;
-
-    let mut dots = String::new();
-    for stop in stops {
-        let x = along(stop.asked_dioptre);
-        let y = up(stop.read_back_dioptre);
-        let _ = writeln!(dots, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"/>");
-    }
-
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {whole} {whole}\" \
-         font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"{whole}\" height=\"{whole}\" fill=\"white\"/>\n\
-         <rect x=\"{low}\" y=\"{low}\" width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" stroke=\"gray\"/>\n\
-         <line x1=\"{low}\" y1=\"{high}\" x2=\"{high}\" y2=\"{low}\" stroke=\"gray\"/>\n\
-         <g fill=\"#0a58ca\">\n{dots}</g>\n\
-         <g text-anchor=\"middle\"><text x=\"{low}\" y=\"{0}\">{min:.2}</text>\
-         <text x=\"{high}\" y=\"{0}\">{max:.2}</text>\
-         <text x=\"{middle}\" y=\"{0}\">asked, dpt</text>\
-         <text x=\"20\" y=\"{middle}\" transform=\"rotate(-90 20 {middle})\">read back, dpt</text>\
-         <text x=\"{middle}\" y=\"30\">largest difference {1:.3} dpt</text></g>\n</svg>\n",
-        high + 20.0,
-        worst(stops)
-    )
+    let mut plot = Plot::default();
+    let axis = |label| Axis { label, from: least, to: most };
+    let mut panel = plot.panel(axis("asked, dpt"), axis("read back, dpt"));
+    panel.line("where both agree", "#999999", [(least, least), (most, most)]);
+    let name = format!("read back; largest difference {:.3} dpt", worst(stops));
+    panel.dots(&name, "#0a58ca", stops.iter().map(|stop| (stop.asked_dioptre, stop.read_back_dioptre)));
+    plot.svg()
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Failure> {
