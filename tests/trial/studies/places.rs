@@ -115,6 +115,11 @@ fn a_place_whose_order_has_become_known_is_not_given_again() {
     // A spare place opens instead.
     let sessions = [known, completed("S-02", 2)];
     assert_eq!(next(&study, &sessions, "S-03"), Ok(3));
+
+    // The order stays known if the place was given again before that, and nobody unblinded the later session.
+    let [known, other] = sessions;
+    let sessions = [known, aborted("S-04", 1), other];
+    assert_eq!(next(&study, &sessions, "S-03"), Ok(3));
 }
 
 #[test]
@@ -155,6 +160,18 @@ fn a_second_session_of_a_surgeon_is_what_the_study_says() {
     let once = [aborted("S-01", 1)];
     assert_eq!(next(&with_rules("next-spare", "keep", "refuse"), &once, "S-01"), Ok(2));
     assert!(is_a_repetition(&next(&with_rules("keep", "keep", "refuse"), &once, "S-01"), "S-01"));
+}
+
+#[test]
+fn a_second_session_at_another_site_opens_a_spare_place_there() {
+    let study = with_rules("keep", "keep", "next-spare");
+    let elsewhere = Enrolled { site: "london".to_owned(), ..completed("S-01", 1) };
+    // The second session takes no planned surgeon's place, as long as it is in the list.
+    let sessions = [elsewhere, completed("S-01", 1), completed("S-02", 2)];
+    assert_eq!(next(&study, &sessions, "S-03"), Ok(3));
+    let all = [&sessions[..], &[completed("S-03", 3)]].concat();
+    let refused = next(&study, &all, "S-04");
+    assert!(is_used_up(&refused, 3), "{refused:?}");
 }
 
 #[test]

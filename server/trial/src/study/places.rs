@@ -40,18 +40,13 @@ impl Enrolled {
         self.corrected_participant.as_ref().unwrap_or(&self.participant)
     }
 
-    /// What happens to the session's place; none if the session is valid, that is, neither withdrawn nor aborted.
+    /// What the rules say of the session's place; none if the session is valid, that is, neither withdrawn nor aborted.
     const fn replacement(&self, rules: PlaceRules) -> Option<Replacement> {
-        let rule = match (self.withdrawn, self.status) {
-            (true, _) => rules.withdrawn,
-            (false, SessionStatus::Aborted) => rules.aborted,
-            (false, SessionStatus::UnderWay | SessionStatus::Completed) => return None,
-        };
-        // A person who knows the order could tell it to the next surgeon.
-        Some(match rule {
-            Replacement::SamePlace if self.unblinded => Replacement::NextSpare,
-            rule => rule,
-        })
+        match (self.withdrawn, self.status) {
+            (true, _) => Some(rules.withdrawn),
+            (false, SessionStatus::Aborted) => Some(rules.aborted),
+            (false, SessionStatus::UnderWay | SessionStatus::Completed) => None,
+        }
     }
 
     /// Whether another session of the same surgeon with the same protocol is a repetition: this session is valid, or
@@ -78,24 +73,26 @@ pub fn next_place(
         return Err(Refusal::Conflict(format!("{participant} withdrew from the study; choose another participant")));
     }
 
-    let list: Vec<&Enrolled> =
-        sessions.iter().filter(|session| session.site == site.name && session.protocol == protocol).collect();
     // Counts sessions at all sites: a surgeon who works at two sites is still one surgeon.
-    let repeats = sessions
-        .iter()
-        .any(|session| session.surgeon() == participant && session.protocol == protocol && session.stands(rules));
+    let standing: Vec<&Enrolled> =
+        sessions.iter().filter(|session| session.protocol == protocol && session.stands(rules)).collect();
+    let repeats = standing.iter().any(|session| session.surgeon() == participant);
     if repeats && rules.repeated == Repetition::Refuse {
         return Err(Refusal::Conflict(format!(
             "{participant} has a session by this protocol, and the study allows no second one"
         )));
     }
 
-    if let Some(place) = given_back(&list, rules) {
+    let list: Vec<&Enrolled> =
+        sessions.iter().filter(|session| session.site == site.name && session.protocol == protocol).collect();
+    let freed = freed_places(&list, rules);
+    if let Some((&place, _)) = freed.iter().find(|(_, rule)| **rule == Replacement::SamePlace) {
         return Ok(place);
     }
 
     let next = list.iter().map(|session| session.place).max().unwrap_or(0) + 1;
-    let opened = spares_opened(&list, rules) + usize::from(repeats);
+    let replaced = freed.values().filter(|rule| **rule == Replacement::NextSpare).count();
+    let opened = replaced + repetitions(&standing, site) + usize::from(repeats);
     let places = site.places();
     let open = places.min(site.surgeons + opened);
     if next > open {
@@ -107,29 +104,24 @@ pub fn next_place(
     Ok(next)
 }
 
-/// The first place that its latest session freed.
-fn given_back(list: &[&Enrolled], rules: PlaceRules) -> Option<usize> {
-    let places: BTreeSet<usize> = list.iter().map(|session| session.place).collect();
-    places.into_iter().find(|&place| {
-        let mut at_this_place = list.iter().filter(move |session| session.place == place);
-        // Once the order of a place is known, no session may take it again.
-        let known = at_this_place.clone().any(|session| session.unblinded);
-        let latest = at_this_place.next_back();
-        !known && latest.is_some_and(|session| session.replacement(rules) == Some(Replacement::SamePlace))
-    })
+/// The places of a list that their latest sessions freed, and what happens to each.
+fn freed_places(list: &[&Enrolled], rules: PlaceRules) -> BTreeMap<usize, Replacement> {
+    let known: BTreeSet<usize> = list.iter().filter(|session| session.unblinded).map(|session| session.place).collect();
+    let latest: BTreeMap<usize, &Enrolled> = list.iter().map(|session| (session.place, *session)).collect();
+    let freed = latest.into_iter().filter_map(|(place, session)| {
+        let rule = match session.replacement(rules)? {
+            // A person who knows the order could tell it to the next surgeon.
+            Replacement::SamePlace if known.contains(&place) => Replacement::NextSpare,
+            rule => rule,
+        };
+        Some((place, rule))
+    });
+    freed.collect()
 }
 
-/// The number of spare places that the sessions of a list have opened.
-fn spares_opened(list: &[&Enrolled], rules: PlaceRules) -> usize {
-    let mut latest = BTreeMap::new();
-    for session in list {
-        latest.insert(session.place, session);
-    }
-    let opens = latest.into_values().filter(|session| session.replacement(rules) == Some(Replacement::NextSpare));
-    let replaced = opens.count();
-
-    let mut standing = BTreeSet::new();
-    let standing_sessions = list.iter().filter(|session| session.stands(rules));
-    let repeated = standing_sessions.filter(|session| !standing.insert(session.surgeon())).count();
-    replaced + repeated
+/// How many of the sessions that stand are at `site` and not their surgeon's first. Each opened a spare place there.
+fn repetitions(standing: &[&Enrolled], site: &Site) -> usize {
+    let mut known = BTreeSet::new();
+    let repeated = standing.iter().filter(|session| !known.insert(session.surgeon()));
+    repeated.filter(|session| session.site == site.name).count()
 }
