@@ -407,6 +407,39 @@ async fn a_backup_is_made_while_the_server_writes_and_put_back_when_it_is_gone()
     assert_eq!(failed(&verify_database(&data, None).await.unwrap()), [""; 0]);
 }
 
+/// A server that was killed leaves its latest records in the log. Somebody then moves the database away, without it.
+#[tokio::test]
+async fn a_log_without_its_database_is_kept_and_read_into_no_other_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let (trial, _) = with_session(&data).await;
+    let out = folder.path().join("backup.db");
+    let clock = trial.clock.clone();
+    backup(&data, &out, clock.clone()).await.unwrap();
+    let database = data.join("parfocal.db");
+    let log = data.join("parfocal.db-wal");
+    let latest = std::fs::read(&log).unwrap();
+    assert!(!latest.is_empty(), "the latest records are in the log");
+    trial.store.close().await;
+    drop(trial);
+    std::fs::remove_file(&database).unwrap();
+    std::fs::write(&log, &latest).unwrap();
+
+    let refused = Store::open(&data, &a_run(&a_clock())).await.unwrap_err().to_string();
+    assert!(refused.contains("parfocal.db-wal") && refused.contains("parfocal restore"), "{refused}");
+    assert_eq!(std::fs::read(&log).unwrap(), latest, "nothing of it is lost");
+
+    let restored = restore(&data, &out, clock).await.unwrap();
+    assert_eq!((restored.kept, restored.relation), (None, Relation::Nothing));
+    assert_eq!(failed(&verify_database(&data, None).await.unwrap()), [""; 0]);
+    Store::open(&data, &a_run(&a_clock())).await.unwrap().close().await;
+    let aside =
+        |path: &PathBuf| path.to_string_lossy().contains("parfocal-replaced-") && path.extension().unwrap() == "db-wal";
+    let aside: Vec<PathBuf> = files(&data).into_iter().filter(aside).collect();
+    assert_eq!(aside.len(), 1, "{:?}", files(&data));
+    assert_eq!(std::fs::read(&aside[0]).unwrap(), latest);
+}
+
 #[tokio::test]
 async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
     const PAGE: usize = 4096;

@@ -21,7 +21,7 @@ use parfocal_base::clock::Clock;
 use parfocal_base::files::{folder_of, make_private, sync_folder_of};
 
 /// What SQLite adds to a database's name for the files of its log.
-const LOG_SUFFIXES: [&str; 2] = ["-wal", "-shm"];
+const LOG_SUFFIXES: [&str; 3] = ["-wal", "-shm", "-journal"];
 
 /// Why nothing was backed up or restored.
 #[derive(Debug, thiserror::Error)]
@@ -256,16 +256,14 @@ pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Resul
     access_log.close().await;
     synced(copy.path())?;
 
-    let kept = if there { Some(set_aside(&database, clock.wall()).await?) } else { None };
+    let aside = set_aside(&database, there, clock.wall()).await?;
     if let Err(error) = copy.persist(&database) {
-        if let Some(kept) = &kept {
-            put_back(&database, kept);
-        }
+        put_back(&database, &aside);
         return Err(BackupError::File { path: database, error: error.error });
     }
     sync_folder_of(&database);
     let replaced = replaced.map(|head| head.to_string());
-    Ok(Restored { backup: head.to_string(), replaced, kept, relation })
+    Ok(Restored { backup: head.to_string(), replaced, kept: there.then_some(aside), relation })
 }
 
 /// Opens the database `file`; `None` if this version cannot read it.
@@ -293,13 +291,16 @@ async fn relation(present: Option<&Reader>, backup: &Path, head: &Head) -> Resul
 }
 
 /// Gives the database a second, dated name beside it, and returns that. The new database can then replace it in one
-/// step.
-async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupError> {
-    // Moves the log into the file, so that one file holds everything. A damaged database keeps its log.
-    let folded = Reader::fold_log(database).await;
-    let log = sibling(database, "-wal");
-    if folded.is_ok() && log.metadata().is_ok_and(|log| log.len() > 0) {
-        return Err(BackupError::Open(database.to_owned()));
+/// step. If the database is not `there`, a log of it may be, which SQLite would read into the new database: it gets
+/// another name too.
+async fn set_aside(database: &Path, there: bool, now: Timestamp) -> Result<PathBuf, BackupError> {
+    if there {
+        // Moves the log into the file, so that one file holds everything. A damaged database keeps its log.
+        let folded = Reader::fold_log(database).await;
+        let log = sibling(database, "-wal");
+        if folded.is_ok() && log.metadata().is_ok_and(|log| log.len() > 0) {
+            return Err(BackupError::Open(database.to_owned()));
+        }
     }
 
     let stamp = now.strftime("%Y%m%dT%H%M%SZ");
@@ -308,12 +309,15 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
         _ => database.with_file_name(format!("parfocal-replaced-{stamp}-{number}.db")),
     };
     // Several restores within a second are possible; a hundred are not.
-    let kept = (0..100).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
+    let is_free = |path: &PathBuf| !path.exists() && !sibling(path, "-wal").exists();
+    let kept = (0..100).map(name).find(is_free).unwrap_or_else(|| name(0));
 
-    // Where the file system has no links, a copy keeps the database at its place as well.
-    std::fs::hard_link(database, &kept)
-        .or_else(|_| std::fs::copy(database, &kept).map(|_| ()))
-        .map_err(BackupError::file(&kept))?;
+    if there {
+        // Where the file system has no links, a copy keeps the database at its place as well.
+        std::fs::hard_link(database, &kept)
+            .or_else(|_| std::fs::copy(database, &kept).map(|_| ()))
+            .map_err(BackupError::file(&kept))?;
+    }
     for suffix in LOG_SUFFIXES {
         match std::fs::rename(sibling(database, suffix), sibling(&kept, suffix)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -332,7 +336,7 @@ fn put_back(database: &Path, kept: &Path) {
     let moved = |suffix| sibling(kept, suffix).exists();
     let back = |suffix| std::fs::rename(sibling(kept, suffix), sibling(database, suffix));
     if LOG_SUFFIXES.into_iter().filter(|&suffix| moved(suffix)).all(|suffix| back(suffix).is_ok()) {
-        // The database itself was never gone: `kept` is a second name or a copy of it.
+        // The database itself was never moved: `kept`, if there is one, is a second name or a copy of it.
         let _ = std::fs::remove_file(kept);
     }
 }

@@ -116,6 +116,7 @@ impl Store {
     pub async fn open_locked(locked: LockedFolder, run: &ServerRun) -> Result<Self, StoreError> {
         let LockedFolder { folder, lock } = locked;
         let file = folder.join(DATABASE);
+        check_log(&folder, &file)?;
         let options = SqliteConnectOptions::new()
             .filename(&file)
             .create_if_missing(true)
@@ -284,6 +285,22 @@ impl Store {
         sqlx::query(pragma).execute(&self.inner.trial).await?;
         Ok(())
     }
+}
+
+/// Refuses a folder whose database `file` is missing while its log is there: SQLite would make a new database and delete
+/// the log, which has the latest records of the missing one.
+fn check_log(folder: &Path, file: &Path) -> Result<(), StoreError> {
+    let name = format!("{DATABASE}-wal");
+    let bytes = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
+    if bytes(file) > 0 || bytes(&folder.join(&name)) == 0 {
+        return Ok(());
+    }
+
+    let reason = format!(
+        "{DATABASE} is missing or empty, but {name} with its latest records is there; put that database back beside \
+         it, or restore a backup with `parfocal restore`"
+    );
+    Err(StoreError::Folder { folder: folder.to_owned(), reason })
 }
 
 async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
