@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 use parfocal_results::package::{self, PackageSource, Sessions, exports_of};
 use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports};
 use parfocal_trial::erasure::{Erasable, NewErasure};
+use parfocal_trial::remark::NewComment;
 use serde_json::Value;
 
 use super::*;
@@ -55,7 +56,9 @@ async fn data_of(folder: &Path, seed: u64, sites: &[&str]) {
         trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
         let segment = trial.view().segment.unwrap();
         trial.surgeon(Action::Acknowledge { segment }).await;
-        trial.say(&said).await;
+        // A faulty page may send any number as that of a frame.
+        let comment = NewComment { frame: Some(u64::MAX), ..trial.comment(&said) };
+        trial.conductor.comment(comment).await.unwrap();
         trial.conductor.act(Role::Operator, session, Action::Abort { reason: "time is up".to_owned() }).await.unwrap();
         trial.conductor.dismiss(Role::Operator, session).unwrap();
     }
@@ -112,6 +115,8 @@ async fn other_programs_read_what_was_said_with_its_types_and_labels() {
 
     let expected: BTreeSet<String> = said().into_iter().collect();
     assert_eq!(texts(&found["comments"]), expected, "Parquet");
+    let frames: BTreeSet<String> = rows(&package, "comments").into_iter().map(|row| row["frame"].clone()).collect();
+    assert_eq!(frames, BTreeSet::from([u64::MAX.to_string()]), "CSV");
     // SPSS pads texts with spaces, so readers remove spaces at the end.
     let trimmed: BTreeSet<String> = expected.iter().map(|text| text.trim_end().to_owned()).collect();
     assert_eq!(texts(&found["spss_comments"]), trimmed, "SPSS");

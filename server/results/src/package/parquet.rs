@@ -118,8 +118,8 @@ impl ColumnCells {
 
     /// Takes the next cell. An empty one has a definition level of 0 and no value.
     fn take(&mut self, cell: &str) -> Result<(), ParquetError> {
-        self.levels.push(i16::from(!cell.is_empty()));
         if cell.is_empty() {
+            self.levels.push(0);
             return Ok(());
         }
 
@@ -136,10 +136,19 @@ impl ColumnCells {
                 let time = cell.parse::<Timestamp>().map_err(|_| nonsense())?;
                 values.push(time.as_microsecond());
             }
-            Values::Integers(values) => values.push(cell.parse().map_err(|_| nonsense())?),
+            Values::Integers(values) => match cell.parse() {
+                Ok(number) => values.push(number),
+                // Only a faulty page sends a number beyond Parquet's, such as that of a frame. The CSV file has it.
+                Err(_) if cell.parse::<u64>().is_ok() => {
+                    self.levels.push(0);
+                    return Ok(());
+                }
+                Err(_) => return Err(nonsense()),
+            },
             Values::Numbers(values) => values.push(cell.parse().map_err(|_| nonsense())?),
             Values::Booleans(values) => values.push(cell.parse().map_err(|_| nonsense())?),
         }
+        self.levels.push(1);
         Ok(())
     }
 
