@@ -124,6 +124,49 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
 }
 
 #[tokio::test]
+async fn a_note_that_was_changed_is_erased_in_all_its_versions() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, comment) = session(&mut trial).await;
+    let answers = trial.store.reader().answers(session).await.unwrap();
+    let point = answers.iter().find(|(_, answer)| answer.question == "sharpness").unwrap().1.clone();
+
+    let versions = [words("note on"), "note on a vessel".to_owned(), "a vessel".to_owned()];
+    let mut old = String::new();
+    for new in versions {
+        let changes = [
+            FieldChange::Note { record: comment.key, old: old.clone(), new: new.clone() },
+            FieldChange::Note { record: point.key, old: old.clone(), new: new.clone() },
+        ];
+        for change in changes {
+            let correction = NewCorrection { change, reason: "on second thoughts".to_owned() };
+            trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+        }
+        old = new;
+    }
+    let other = AnswerValue::Point(if point.value == AnswerValue::Point(1) { 2 } else { 1 });
+    let change = FieldChange::Value { record: point.key, old: point.value, new: other };
+    let correction = NewCorrection { change, reason: "slipped".to_owned() };
+    trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+
+    let corrections = trial.store.reader().corrections(session).await.unwrap();
+    for first in &corrections[..2] {
+        let erasure = NewErasure {
+            subject: Erasable::Correction,
+            record: first.number.to_string(),
+            reason: "names a patient".to_owned(),
+        };
+        trial.conductor.erase(Role::Researcher, session, erasure).await.unwrap();
+    }
+    assert_eq!(holding(folder.path(), "note on Frau"), NOWHERE);
+    assert_eq!(holding(folder.path(), "note on a vessel"), NOWHERE);
+    let erasures = trial.store.reader().erasures(session).await.unwrap();
+    assert_eq!(erasures.len(), 6, "the corrected value stays: {erasures:?}");
+    let checks = verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+}
+
+#[tokio::test]
 async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");

@@ -4,7 +4,7 @@ use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Erased, Erasure, Reader, StoreError};
+use parfocal_records::store::{Correction, Erased, Erasure, Reader, StoreError};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -127,7 +127,8 @@ impl Shared {
         Ok(erased?)
     }
 
-    /// The record itself and the notes on it, because a note may repeat the words.
+    /// The record itself and the notes on it, because a note may repeat the words. A note is erased in all its versions,
+    /// because a correction also has what stood there before it.
     async fn with_its_notes(
         &self,
         session: SessionId,
@@ -136,6 +137,7 @@ impl Shared {
     ) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let corrections = reader.corrections(session).await?;
+        let mut about = record.clone();
         let (has_words, refusal) = match subject {
             Erasable::Comment => {
                 let comments = reader.comments(session).await?;
@@ -151,18 +153,22 @@ impl Shared {
             }
             _ => {
                 let stored = corrections.iter().find(|stored| stored.number.to_string() == record);
-                let has_words = stored.map(|stored| stored.correction.field == Field::Note);
-                (has_words, "only a note can be erased; this correction is a value")
+                let correction = stored.map(|stored| &stored.correction).ok_or_else(no_such_record)?;
+                about.clone_from(&correction.record);
+                (Some(correction.field == Field::Note), "only a note can be erased; this correction is a value")
             }
         };
         if !has_words.ok_or_else(no_such_record)? {
             return Err(Refusal::conflict(refusal).into());
         }
 
-        let notes = corrections.iter().filter(|stored| stored.correction.record == record);
-        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string())).collect::<Vec<_>>();
-        let mut records = vec![(subject, record)];
-        records.extend(notes);
+        let mut records = Vec::new();
+        if subject != Erasable::Correction {
+            records.push((subject, record));
+        }
+        let is_note = |correction: &Correction| correction.field == Field::Note && correction.record == about;
+        let notes = corrections.iter().filter(|stored| is_note(&stored.correction));
+        records.extend(notes.map(|stored| (Erasable::Correction, stored.number.to_string())));
         Ok(records)
     }
 
