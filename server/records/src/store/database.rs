@@ -26,7 +26,7 @@ use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
 use super::values::nanoseconds;
 use super::writes::{Counts, Turn, Writes, write_on};
-use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
+use super::{Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.
 #[derive(Debug, Clone)]
@@ -233,27 +233,6 @@ impl Store {
     ) -> Result<T, StoreError> {
         let turn = self.telemetry_turn().await;
         turn.write(&self.inner.telemetry, write).await
-    }
-
-    /// Records that a device started or stopped working.
-    ///
-    /// # Errors
-    /// If the disk or database fails.
-    #[boxed]
-    pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
-        self.write(async |connection| {
-            let number = Insert::into("device_events")
-                .set("device", &event.device)
-                .set("working", event.working)
-                .set("message", &event.message)
-                .recorded(self.inner.run, Stamp { wall: event.wall, at: event.at })
-                .execute(connection)
-                .await?;
-
-            chain::append(connection, "device", &number.to_string(), &event.wall.to_string()).await?;
-            Ok(())
-        })
-        .await
     }
 
     /// Adds participant `code`. A participant that exists already stays as it is.

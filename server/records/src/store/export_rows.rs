@@ -1,29 +1,93 @@
-//! The rows of an export that come straight from the database. Long tables such as telemetry come row by row, because
-//! they are too large to gather first.
+//! The rows of an export that come straight from the database.
 
 use futures_util::TryStreamExt;
 use jiff::Timestamp;
+use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
-use sqlx::{FromRow, Row as _};
 
 use super::chain::entry;
+use super::export::stored::StoredRow;
 use super::export::{
-    AccessRow, ActorRow, ChainRow, ChainSaltRow, ExportError, Folder, PolicyStepRow, Row, RunRow, StudyEventRow,
-    TelemetryRow, WeightsRow, WithdrawalRow,
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, ExportError, Folder,
+    PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, VoicePieceRow, WeightsRow, WithdrawalRow,
 };
-use super::values::{parsed, parsed_if_any};
+use super::values::parsed;
 use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
 
-/// A row of a table that is written while it is read.
-pub(super) trait LongRow: Row + for<'r> FromRow<'r, SqliteRow> {
+/// A row of a session.
+pub(super) trait RowOfSession: StoredRow {
     /// Selects the rows of a session, the only parameter.
     const SQL: &'static str;
 }
 
+/// The starts of the server that recorded something of the session.
+impl RowOfSession for RunRow {
+    const SQL: &'static str =
+        "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
+                 SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
+                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
+                 UNION SELECT frame_run FROM comments WHERE session = ?1
+                 UNION SELECT run FROM corrections WHERE session = ?1
+                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1
+                 UNION SELECT run FROM voice_pieces WHERE session = ?1)
+             ORDER BY run";
+}
+
+/// The events of camera and lens, from the start of every run that served the session to the end of the session, so that
+/// the state in which it began is among them.
+impl RowOfSession for DeviceRow {
+    const SQL: &'static str = "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
+         WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (
+             SELECT 1 FROM events AS e WHERE e.session = ?1 AND e.kind IN ('completed', 'aborted')
+                 AND (e.run, e.monotonic_ns) < (d.run, d.monotonic_ns))
+         ORDER BY number";
+}
+
+impl RowOfSession for AccessRow {
+    const SQL: &'static str = "SELECT * FROM accesses WHERE session = ? ORDER BY number";
+}
+
+impl RowOfSession for CorrectionRow {
+    const SQL: &'static str = "SELECT *, (SELECT wall FROM erasures
+             WHERE subject = 'correction' AND record = CAST(c.number AS TEXT)) AS erased
+         FROM corrections AS c WHERE session = ? ORDER BY number";
+}
+
+impl RowOfSession for ConsentRow {
+    const SQL: &'static str = "SELECT * FROM consents WHERE session = ? ORDER BY number";
+}
+
+impl RowOfSession for ErasureRow {
+    const SQL: &'static str = "SELECT * FROM erasures WHERE session = ? ORDER BY number";
+}
+
+/// The withdrawn sessions of the session's protocol.
+impl RowOfSession for WithdrawalRow {
+    const SQL: &'static str = "SELECT s.session, s.protocol, s.place, e.wall, e.role
+         FROM (SELECT session, protocol, protocol_sha256,
+                 row_number() OVER (PARTITION BY protocol_sha256 ORDER BY rowid) AS place FROM sessions) AS s
+             JOIN events AS e ON e.session = s.session AND e.kind = 'withdrawn'
+         WHERE s.protocol_sha256 = (SELECT protocol_sha256 FROM sessions WHERE session = ?)
+         ORDER BY s.place";
+}
+
+/// The accounts behind the records of the session.
+impl RowOfSession for ActorRow {
+    const SQL: &'static str = "SELECT * FROM actors WHERE session = ? ORDER BY number";
+}
+
+/// The pieces of all recordings, in the order they were kept, without their sound.
+impl RowOfSession for VoicePieceRow {
+    const SQL: &'static str =
+        "SELECT number, session, comment, piece, media_type, through_ms, ended, bytes, sha256, wall,
+             run, monotonic_ns
+         FROM voice_pieces WHERE session = ? ORDER BY number";
+}
+
 /// Holds caused by the policy are left out, because they would reveal it: only learned policies take time to start and
 /// to compute.
-impl LongRow for TelemetryRow {
+impl RowOfSession for TelemetryRow {
     const SQL: &'static str = concat!(
         "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, ",
         held_openly!(),
@@ -34,7 +98,7 @@ impl LongRow for TelemetryRow {
 }
 
 /// The part of the telemetry that reveals the policy.
-impl LongRow for PolicyStepRow {
+impl RowOfSession for PolicyStepRow {
     const SQL: &'static str =
         "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros, t.latency_micros, t.held
          FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
@@ -43,7 +107,7 @@ impl LongRow for PolicyStepRow {
 }
 
 /// The weights of the session's learned policies, run by run.
-impl LongRow for WeightsRow {
+impl RowOfSession for WeightsRow {
     const SQL: &'static str =
         "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
          WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
@@ -51,7 +115,7 @@ impl LongRow for WeightsRow {
 }
 
 /// The salts that a blinded export withholds, except those of the server's starts.
-impl LongRow for ChainSaltRow {
+impl RowOfSession for ChainSaltRow {
     const SQL: &'static str = "SELECT number, chain_salts.salt FROM chain_salts JOIN chain USING (number)
          WHERE chain.session = ?1 AND (chain.kind = 'telemetry' OR chain.kind = 'event' AND chain.key IN (
              SELECT session || '/' || number FROM events WHERE session = ?1 AND kind = 'unblinded'))
@@ -59,17 +123,23 @@ impl LongRow for ChainSaltRow {
 }
 
 impl Reader {
-    /// The starts of the server that recorded something of `session`.
-    pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<RunRow>, StoreError> {
-        let sql = "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
-                 SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
-                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
-                 UNION SELECT frame_run FROM comments WHERE session = ?1
-                 UNION SELECT run FROM corrections WHERE session = ?1
-                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1
-                 UNION SELECT run FROM voice_pieces WHERE session = ?1)
-             ORDER BY run";
-        self.rows(sql, &session, run_row).await
+    /// The rows `R` of `session`.
+    pub(super) async fn export_rows<R: RowOfSession>(&self, session: SessionId) -> Result<Vec<R>, StoreError> {
+        self.rows(R::SQL, &session, R::read).await
+    }
+
+    /// Writes the table with the rows `R` of `session` into `folder`, row by row: it is too large to gather first.
+    pub(super) async fn export_long<R: RowOfSession>(
+        &self,
+        session: SessionId,
+        folder: &mut Folder,
+    ) -> Result<(), ExportError> {
+        let mut file = folder.begin::<R>()?;
+        let mut rows = sqlx::query(R::SQL).bind(session.to_string()).fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            file.row(&R::read(&row)?).await?;
+        }
+        file.end().await
     }
 
     /// The sites of study `study` that this database runs, as JSON, and when it was planned.
@@ -86,50 +156,15 @@ impl Reader {
         session: SessionId,
     ) -> Result<Vec<StudyEventRow>, StoreError> {
         let rows = sqlx::query(
-            "SELECT * FROM study_events WHERE study = ? AND (session IS NULL OR session = ?) ORDER BY number",
+            "SELECT *, session AS about_session FROM study_events
+             WHERE study = ? AND (session IS NULL OR session = ?) ORDER BY number",
         )
         .bind(study)
         .bind(session.to_string())
         .fetch_all(self.pool())
         .await?;
 
-        rows.iter().map(study_event_row).collect()
-    }
-
-    /// The accounts behind the records of `session`.
-    pub(super) async fn export_actors(&self, session: SessionId) -> Result<Vec<ActorRow>, StoreError> {
-        let rows = sqlx::query_as("SELECT * FROM actors WHERE session = ? ORDER BY number");
-        Ok(rows.bind(session.to_string()).fetch_all(self.pool()).await?)
-    }
-
-    /// Writes the long table with the rows `R` of `session` into `folder`.
-    pub(super) async fn export_long<R: LongRow>(
-        &self,
-        session: SessionId,
-        folder: &mut Folder,
-    ) -> Result<(), ExportError> {
-        let mut file = folder.begin::<R>()?;
-        let mut rows = sqlx::query(R::SQL).bind(session.to_string()).fetch(self.pool());
-        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
-            file.row(&R::from_row(&row).map_err(StoreError::from)?).await?;
-        }
-        file.end().await
-    }
-
-    /// The accesses to `session`.
-    pub(super) async fn export_accesses(&self, session: SessionId) -> Result<Vec<AccessRow>, StoreError> {
-        self.rows("SELECT * FROM accesses WHERE session = ? ORDER BY number", &session, access_row).await
-    }
-
-    /// The withdrawn sessions of the protocol of `session`.
-    pub(super) async fn export_withdrawals(&self, session: SessionId) -> Result<Vec<WithdrawalRow>, StoreError> {
-        let sql = "SELECT s.session, s.protocol, s.place, e.wall, e.role
-             FROM (SELECT session, protocol, protocol_sha256,
-                     row_number() OVER (PARTITION BY protocol_sha256 ORDER BY rowid) AS place FROM sessions) AS s
-                 JOIN events AS e ON e.session = s.session AND e.kind = 'withdrawn'
-             WHERE s.protocol_sha256 = (SELECT protocol_sha256 FROM sessions WHERE session = ?)
-             ORDER BY s.place";
-        self.rows(sql, &session, withdrawal_row).await
+        rows.iter().map(StudyEventRow::read).collect()
     }
 
     /// Passes every row of the chain to `take`, with all its columns.
@@ -147,42 +182,6 @@ impl Reader {
     }
 }
 
-fn run_row(row: &SqliteRow) -> Result<RunRow, StoreError> {
-    Ok(RunRow {
-        run: row.try_get("run")?,
-        wall: parsed(row, "wall")?,
-        monotonic_ns: row.try_get("monotonic_ns")?,
-        version: row.try_get("version")?,
-        camera: row.try_get("camera")?,
-        lens: row.try_get("lens")?,
-        calibration: row.try_get("calibration")?,
-        blur: row.try_get("blur")?,
-    })
-}
-
-fn access_row(row: &SqliteRow) -> Result<AccessRow, StoreError> {
-    Ok(AccessRow {
-        number: row.try_get("number")?,
-        wall: parsed(row, "wall")?,
-        run: row.try_get("run")?,
-        monotonic_ns: row.try_get("monotonic_ns")?,
-        role: row.try_get("role")?,
-        kind: row.try_get("kind")?,
-        session: parsed(row, "session")?,
-        detail: row.try_get("detail")?,
-    })
-}
-
-fn withdrawal_row(row: &SqliteRow) -> Result<WithdrawalRow, StoreError> {
-    Ok(WithdrawalRow {
-        session: parsed(row, "session")?,
-        protocol: row.try_get("protocol")?,
-        place: row.try_get("place")?,
-        wall: parsed(row, "wall")?,
-        role: row.try_get("role")?,
-    })
-}
-
 fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
     let entry = entry(row)?;
     Ok(ChainRow {
@@ -198,21 +197,5 @@ fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
         sealed: Some(entry.sealed),
         sealed_salt: row.try_get("sealed_salt")?,
         content: Some(entry.content),
-    })
-}
-
-fn study_event_row(row: &SqliteRow) -> Result<StudyEventRow, StoreError> {
-    Ok(StudyEventRow {
-        study: row.try_get("study")?,
-        number: row.try_get("number")?,
-        wall: parsed(row, "wall")?,
-        run: row.try_get("run")?,
-        monotonic_ns: row.try_get("monotonic_ns")?,
-        role: row.try_get("role")?,
-        person: row.try_get("person")?,
-        kind: row.try_get("kind")?,
-        about_session: parsed_if_any(row, "session")?,
-        commitment: row.try_get("commitment")?,
-        reason: row.try_get("reason")?,
     })
 }

@@ -17,6 +17,7 @@ mod chain;
 mod consents;
 mod corrections;
 mod database;
+mod device_events;
 mod erasures;
 mod error;
 pub mod export;

@@ -13,7 +13,7 @@ use super::motion::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::values::moment;
 use super::values::{parsed, stamp};
-use super::{DeviceEvent, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
+use super::{Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
 use parfocal_base::FocalPower;
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_trial::phase::SessionStatus;
@@ -219,27 +219,6 @@ impl Reader {
         }
 
         Ok(RunClocks(clocks))
-    }
-
-    /// The events of camera and lens in `session`, each with its number and its run. They go from the start of every
-    /// run that served the session to the end of the session, so they include the state in which it began.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn device_events(&self, session: SessionId) -> Result<Vec<(i64, i64, DeviceEvent)>, StoreError> {
-        let sql = "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
-             WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (
-                 SELECT 1 FROM events AS e WHERE e.session = ?1 AND e.kind IN ('completed', 'aborted')
-                     AND (e.run, e.monotonic_ns) < (d.run, d.monotonic_ns))
-             ORDER BY number";
-        let event = |row: &SqliteRow| {
-            let Stamp { wall, at } = stamp(row)?;
-            let device = row.try_get("device")?;
-            let working = row.try_get("working")?;
-            let message = row.try_get("message")?;
-            Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
-        };
-        self.rows(sql, &session, event).await
     }
 
     /// The focal power of the last command to the lens in `segment`, from telemetry; `None` if no policy was asked

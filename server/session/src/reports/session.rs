@@ -176,7 +176,7 @@ impl Reports {
         }
 
         let made = lines.first().map(|(at, _)| *at);
-        for (_, run, DeviceEvent { wall, at, device, message, .. }) in devices {
+        for (run, DeviceEvent { wall, at, device, message, .. }) in devices {
             let at = clocks.wall(run, at);
             if Some(at) >= made {
                 let text = format!("The {device}: {message}");

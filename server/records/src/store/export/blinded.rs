@@ -8,8 +8,8 @@ use serde_json::{Map, Value, json};
 
 use super::ExportError;
 use super::description::{
-    AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
-    SegmentRow, SessionRow, TelemetryRow,
+    AccessRow, ActorRow, AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow,
+    RecordingRow, RunRow, SegmentRow, SessionRow, TelemetryRow, VoicePieceRow, WithdrawalRow,
 };
 use super::folder::Folder;
 use super::study::ExportedStudy;
@@ -18,8 +18,8 @@ use crate::store::remarks::{said_columns, withdrawn};
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
-    Answer, Comment, DeviceEvent, Erased, Head, Reader, RunClocks, SessionLine, StoreError, StoredConsent,
-    StoredCorrection, StoredErasure, VoiceRecording, standings,
+    Answer, Comment, Erased, Head, Reader, RunClocks, SessionLine, StoreError, StoredCorrection, VoiceRecording,
+    standings,
 };
 use parfocal_base::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal_base::{FocalPower, PatchPlace};
@@ -58,8 +58,6 @@ pub struct Blinded {
     pub(super) voice: BTreeMap<IdempotencyKey, VoiceRecording>,
     pub(super) answers: Vec<(i64, Answer)>,
     pub(super) corrections: Vec<StoredCorrection>,
-    consents: Vec<StoredConsent>,
-    erasures: Vec<StoredErasure>,
     pub(super) erased: Erased,
     pub(super) clocks: RunClocks,
     grace: Grace,
@@ -74,7 +72,6 @@ impl Blinded {
         let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
 
         let clocks = reader.run_clocks().await?;
-        let erasures = reader.erasures(session).await?;
 
         // Nothing that reveals the policies gets past this point.
         let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
@@ -96,9 +93,7 @@ impl Blinded {
             voice: reader.voice(session).await?,
             answers: reader.answers(session).await?,
             corrections: reader.corrections(session).await?,
-            consents: reader.consents(session).await?,
-            erased: Erased::by(&erasures),
-            erasures,
+            erased: Erased::by(&reader.erasures(session).await?),
             study: ExportedStudy::of(reader, session).await?,
         })
     }
@@ -119,9 +114,10 @@ impl Blinded {
         recordings: &[RecordingRow],
         folder: &mut Folder,
     ) -> Result<(), ExportError> {
+        let session = self.session();
         let mut copies = Map::new();
-        let runs = reader.export_runs(self.session()).await?;
-        let devices = reader.device_events(self.session()).await?;
+        let runs: Vec<RunRow> = reader.export_rows(session).await?;
+        let devices: Vec<DeviceRow> = reader.export_rows(session).await?;
         let own = self.own_rows(&runs, &devices);
 
         copy(folder, &mut copies, &runs).await?;
@@ -130,21 +126,21 @@ impl Blinded {
         copy(folder, &mut copies, &self.comment_rows()).await?;
         copy(folder, &mut copies, &self.answer_rows()).await?;
         copy(folder, &mut copies, &self.event_rows()).await?;
-        copy(folder, &mut copies, &device_rows(devices)).await?;
+        copy(folder, &mut copies, &devices).await?;
         copy(folder, &mut copies, recordings).await?;
-        copy(folder, &mut copies, &reader.export_accesses(self.session()).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<AccessRow>(session).await?).await?;
         copy(folder, &mut copies, &self.score_rows()).await?;
-        copy(folder, &mut copies, &self.correction_rows()).await?;
-        copy(folder, &mut copies, &self.consent_rows()).await?;
-        copy(folder, &mut copies, &self.erasure_rows()).await?;
-        copy(folder, &mut copies, &reader.export_withdrawals(self.session()).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<CorrectionRow>(session).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<ConsentRow>(session).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<ErasureRow>(session).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<WithdrawalRow>(session).await?).await?;
         copy(folder, &mut copies, &self.study.rows).await?;
         copy(folder, &mut copies, &self.study.places).await?;
         copy(folder, &mut copies, &self.study.events).await?;
-        copy(folder, &mut copies, &reader.export_actors(self.session()).await?).await?;
+        copy(folder, &mut copies, &reader.export_rows::<ActorRow>(session).await?).await?;
         let voice = self.write_voice(reader, folder).await?;
         copy(folder, &mut copies, &voice).await?;
-        copy(folder, &mut copies, &self.voice_piece_rows()).await?;
+        copy(folder, &mut copies, &reader.export_rows::<VoicePieceRow>(session).await?).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
@@ -156,7 +152,7 @@ impl Blinded {
         reader.export_chain(async |row| chain.row(&own.told_of(row)).await).await?;
         chain.end().await?;
 
-        reader.export_long::<TelemetryRow>(self.session(), folder).await
+        reader.export_long::<TelemetryRow>(session, folder).await
     }
 
     /// The description of the whole export, without its tables.
@@ -182,13 +178,13 @@ impl Blinded {
     }
 
     /// The rows of the chain that the export shows whole.
-    fn own_rows(&self, runs: &[RunRow], devices: &[(i64, i64, DeviceEvent)]) -> OwnRows {
+    fn own_rows(&self, runs: &[RunRow], devices: &[DeviceRow]) -> OwnRows {
         let unblinding = |(_, event): &&(i64, Event)| matches!(event.kind, EventKind::Unblinded { .. });
         let key = |(_, event): &(i64, Event)| format!("{}/{}", self.session(), event.number);
         OwnRows {
             session: self.session().to_string(),
             runs: runs.iter().map(|row| row.run.to_string()).collect(),
-            devices: devices.iter().map(|(number, ..)| number.to_string()).collect(),
+            devices: devices.iter().map(|row| row.number.to_string()).collect(),
             unblindings: self.events.iter().filter(unblinding).map(key).collect(),
             study: self.study.keys().collect(),
         }
@@ -337,56 +333,6 @@ impl Blinded {
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
-    fn correction_rows(&self) -> Vec<CorrectionRow> {
-        let row = |StoredCorrection { number, run, correction }: &StoredCorrection| CorrectionRow {
-            number: *number,
-            session: correction.session,
-            subject: correction.subject.name(),
-            record: correction.record.clone(),
-            field: correction.field.name(),
-            old_value: correction.old.clone(),
-            new_value: correction.new.clone(),
-            reason: correction.reason.clone(),
-            role: correction.by,
-            wall: correction.stamp.wall,
-            run: *run,
-            monotonic_ns: nanoseconds(correction.stamp.at),
-            erased: self.erased.at(Erasable::Correction, &number),
-        };
-        self.corrections.iter().map(row).collect()
-    }
-
-    fn consent_rows(&self) -> Vec<ConsentRow> {
-        let row = |stored: &StoredConsent| ConsentRow {
-            number: stored.number,
-            session: self.session(),
-            text_version: stored.consent.text_version.clone(),
-            given_on: stored.consent.given_on.to_string(),
-            obtained_by: stored.consent.obtained_by.clone(),
-            medium: stored.consent.medium.name(),
-            role: stored.by,
-            wall: stored.stamp.wall,
-            run: stored.run,
-            monotonic_ns: nanoseconds(stored.stamp.at),
-        };
-        self.consents.iter().map(row).collect()
-    }
-
-    fn erasure_rows(&self) -> Vec<ErasureRow> {
-        let row = |StoredErasure { number, run, erasure }: &StoredErasure| ErasureRow {
-            number: *number,
-            session: erasure.session,
-            subject: erasure.subject.name(),
-            record: erasure.record.clone(),
-            reason: erasure.reason.clone(),
-            role: erasure.by,
-            wall: erasure.stamp.wall,
-            run: *run,
-            monotonic_ns: nanoseconds(erasure.stamp.at),
-        };
-        self.erasures.iter().map(row).collect()
-    }
-
     fn event_rows(&self) -> Vec<EventRow> {
         let row = |(run, event): &(i64, Event)| {
             let (reason, emergency) = match &event.kind {
@@ -470,18 +416,4 @@ impl OwnRows {
 async fn copy<R: Row>(folder: &mut Folder, copies: &mut Map<String, Value>, rows: &[R]) -> Result<(), ExportError> {
     copies.insert(R::TABLE.name.to_owned(), objects(rows));
     folder.table(rows).await
-}
-
-fn device_rows(events: Vec<(i64, i64, DeviceEvent)>) -> Vec<DeviceRow> {
-    let row = |(number, run, event): (i64, i64, DeviceEvent)| DeviceRow {
-        number,
-        wall: event.wall,
-        run,
-        monotonic_ns: nanoseconds(event.at),
-        device: event.device,
-        working: event.working,
-        message: event.message,
-    };
-
-    events.into_iter().map(row).collect()
 }

@@ -57,7 +57,7 @@ table! {
     description:
         "The server starts that recorded the session; each gives the wall time that belongs to its monotonic clock",
     key: [run],
-    row:
+    stored row:
     /// A start of the server.
     #[derive(Debug, Clone)]
     RunRow {
@@ -289,15 +289,15 @@ table! {
         "Corrections by researchers, in order; the other tables keep the original values; of several corrections of \
          the same field the latest counts",
     key: [number],
-    row:
+    stored row:
     /// A correction.
     #[derive(Debug, Clone)]
     CorrectionRow {
         number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
-        subject: &'static str = means("Kind of record corrected: session, answer or comment").open(),
+        subject: String = means("Kind of record corrected: session, answer or comment").open(),
         record: String = means("Key of the answer or comment, or id of the session").open(),
-        field: &'static str = means(
+        field: String = means(
             "Field corrected: participant, value (of an answer, as JSON) or note (beside an answer or a comment)",
         ).open(),
         old_value: String = means("Value before the correction; empty if there was none, or it was erased").sealed(),
@@ -315,7 +315,7 @@ table! {
     name: "consents",
     description: "Consents of the participant; the latest counts",
     key: [number],
-    row:
+    stored row:
     /// A consent.
     #[derive(Debug, Clone)]
     ConsentRow {
@@ -324,7 +324,7 @@ table! {
         text_version: String = means("Version of the consent text").open(),
         given_on: String = means("Day of the consent, YYYY-MM-DD").open(),
         obtained_by: String = means("Initials or code of the person who obtained the consent").sealed(),
-        medium: &'static str = means("Form of the consent: paper or screen").open(),
+        medium: String = means("Form of the consent: paper or screen").open(),
         role: Role = means("Role that made the record: operator").open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
@@ -336,13 +336,13 @@ table! {
     name: "erasures",
     description: "Erasures of words: the erased record stays, with the hash of its words",
     key: [number],
-    row:
+    stored row:
     /// An erasure.
     #[derive(Debug, Clone)]
     ErasureRow {
         number: i64 = means("Number of the record in the database, from 1").open(),
         session: SessionId = SESSION.open(),
-        subject: &'static str = means(
+        subject: String = means(
             "Kind of record erased: answer, comment or correction, or event or study-event, of which the reason was \
              erased",
         ).open(),
@@ -363,7 +363,7 @@ table! {
     description:
         "The sessions of the same protocol whose participants withdrew; no export has their data",
     key: [session],
-    row:
+    stored row:
     /// A withdrawn session.
     #[derive(Debug, Clone)]
     WithdrawalRow {
@@ -459,7 +459,7 @@ table! {
          after the device has worked for a second. The rows reach from the start of each server run that served the \
          session to the end of the session, so they include the state at its beginning",
     key: [number],
-    row:
+    stored row:
     /// A change in the state of camera or lens.
     #[derive(Debug, Clone)]
     DeviceRow {
@@ -524,7 +524,7 @@ table! {
     description:
         "Views of the session's focal path and recordings, and exports of the session, this one included",
     key: [number],
-    row:
+    stored row:
     /// A look at the evidence.
     #[derive(Debug, Clone)]
     AccessRow {
@@ -586,7 +586,7 @@ table! {
     description:
         "Events of the study as a whole, and of this session in it; missing numbers belong to other sessions",
     key: [study, number],
-    row:
+    stored row:
     /// An event of a study.
     #[derive(Debug, Clone)]
     StudyEventRow {
@@ -617,9 +617,9 @@ table! {
         "The personal account behind each record; a record without a row was made through a role's link, by the \
          command line or by the server",
     key: [number],
-    row:
+    stored row:
     /// The account behind a record.
-    #[derive(Debug, Clone, sqlx::FromRow)]
+    #[derive(Debug, Clone)]
     ActorRow {
         number: i64 = means("Number of the row in the database, from 1").open(),
         kind: String = means("Kind of record, as in chain.csv").open(),
@@ -666,7 +666,7 @@ table! {
     name: "voice_pieces",
     description: "The pieces of the recordings of voice comments, in the order in which the server recorded them",
     key: [number],
-    row:
+    stored row:
     /// A piece of a recording.
     #[derive(Debug, Clone)]
     VoicePieceRow {
@@ -675,11 +675,11 @@ table! {
         comment: IdempotencyKey = means("Key of the comment, as in comments.csv").open(),
         piece: u32 =
             means("Number of the piece in the recording, from 1; the pieces in this order are the file").open(),
-        media_type: &'static str = means("Media type of the piece, as the browser recorded it").open(),
+        media_type: String = means("Media type of the piece, as the browser recorded it").open(),
         through_ms: i64 = means(
             "Duration of the recording up to the end of the piece, as the page measured it",
         ).in_unit("ms").open(),
-        ended: Option<&'static str> =
+        ended: Option<String> =
             means("Why the recording ended, as in voice; empty if the piece is not the last").open(),
         bytes: i64 = means("Length of the piece").in_unit("bytes").open(),
         sha256: String = means("SHA-256 of the piece; it stays when the sound is erased").open(),
@@ -733,9 +733,9 @@ table! {
     name: "chain_salts",
     description: "The salts of sealed columns, which are withheld until unblinding",
     key: [number],
-    row:
+    stored row:
     /// The salt of a row's sealed columns.
-    #[derive(Debug, Clone, sqlx::FromRow)]
+    #[derive(Debug, Clone)]
     ChainSaltRow {
         number: i64 = means("Number of the row of chain.csv"),
         salt: String = means("Random bytes that keep the sealed columns from being guessed"),
@@ -749,9 +749,9 @@ table! {
          policy_steps.csv. An expert may still guess a policy from the focal path, and from frames that are missing \
          because the loop waited",
     key: [run, frame],
-    row:
+    stored row:
     /// A step of the control loop, without the columns that reveal the policy.
-    #[derive(Debug, Clone, sqlx::FromRow)]
+    #[derive(Debug, Clone)]
     TelemetryRow {
         setting: i64 = SETTING,
         run: i64 = RUN,
@@ -797,9 +797,9 @@ table! {
     description:
         "The weights of the session's learned policies in each server start that served the session",
     key: [run, policy],
-    row:
+    stored row:
     /// The weights that a learned policy had in a start of the server.
-    #[derive(Debug, Clone, sqlx::FromRow)]
+    #[derive(Debug, Clone)]
     WeightsRow {
         run: i64 = RUN,
         policy: String = means("Name of the policy"),
@@ -811,9 +811,9 @@ table! {
     name: "policy_steps",
     description: "The columns of each step that reveal the policy; to be joined with telemetry.csv by run and frame",
     key: [run, frame],
-    row:
+    stored row:
     /// The columns of a step of the control loop that reveal the policy.
-    #[derive(Debug, Clone, sqlx::FromRow)]
+    #[derive(Debug, Clone)]
     PolicyStepRow {
         setting: i64 = SETTING,
         run: i64 = RUN,

@@ -8,6 +8,7 @@ mod error;
 mod folder;
 mod recordings;
 mod scores;
+pub(in crate::store) mod stored;
 mod study;
 pub(in crate::store) mod table;
 mod unblinded;
@@ -20,8 +21,8 @@ use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
 pub(super) use self::description::{
-    AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
-    WithdrawalRow,
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, PolicyStepRow,
+    RunRow, StudyEventRow, TelemetryRow, VoicePieceRow, WeightsRow, WithdrawalRow,
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;

@@ -214,7 +214,7 @@ impl Meaning {
 }
 
 /// Defines a table and the struct of its rows. Each field has the name of its column and says what
-/// the column means.
+/// the column means. A `stored row` is one that comes straight from the database.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! export_table {
@@ -262,6 +262,31 @@ macro_rules! export_table {
                 )+
                 csv.write_record(None::<&[u8]>)?;
                 Ok(bytes)
+            }
+        }
+    };
+    (
+        name: $table:literal,
+        description: $description:literal,
+        key: [$($key:ident),+],
+        stored row:
+        $(#[$attribute:meta])*
+        $row:ident { $($field:ident: $cell:ty = $meaning:expr,)+ }
+    ) => {
+        $crate::export_table! {
+            name: $table,
+            description: $description,
+            key: [$($key),+],
+            row:
+            $(#[$attribute])*
+            $row { $($field: $cell = $meaning,)+ }
+        }
+
+        impl $crate::store::export::stored::StoredRow for $row {
+            fn read(row: &::sqlx::sqlite::SqliteRow) -> Result<Self, $crate::store::StoreError> {
+                use $crate::store::export::stored::StoredCell;
+
+                Ok(Self { $($field: StoredCell::read(row, stringify!($field))?,)+ })
             }
         }
     };

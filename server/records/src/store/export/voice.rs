@@ -4,9 +4,8 @@ use sha2::{Digest, Sha256};
 
 use super::ExportError;
 use super::blinded::Blinded;
-use super::description::{VoicePieceRow, VoiceRow};
+use super::description::VoiceRow;
 use super::folder::Folder;
-use crate::store::values::nanoseconds;
 use crate::store::{LatestCorrections, Reader, VoiceRecording};
 use parfocal_trial::correction::Subject;
 use parfocal_trial::erasure::Erasable;
@@ -56,28 +55,5 @@ impl Blinded {
             });
         }
         Ok(rows)
-    }
-
-    /// The pieces of all recordings, in the order they were kept.
-    pub(super) fn voice_piece_rows(&self) -> Vec<VoicePieceRow> {
-        let mut rows = Vec::new();
-        for (comment, recorded) in &self.voice {
-            rows.extend(recorded.pieces.iter().map(|piece| VoicePieceRow {
-                number: piece.number,
-                session: self.session(),
-                comment: *comment,
-                piece: piece.piece,
-                media_type: piece.media_type.name(),
-                through_ms: piece.through_ms,
-                ended: piece.ended.map(Ending::name),
-                bytes: piece.bytes,
-                sha256: piece.sha256.clone(),
-                wall: piece.stamp.wall,
-                run: piece.run,
-                monotonic_ns: nanoseconds(piece.stamp.at),
-            }));
-        }
-        rows.sort_by_key(|row| row.number);
-        rows
     }
 }
