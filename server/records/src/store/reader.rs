@@ -11,12 +11,10 @@ use sqlx::{AssertSqlSafe, Connection as _, Row, migrate::Migrate};
 
 use super::motion::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR, check_names};
-use super::values::moment;
-use super::values::{parsed, stamp};
+use super::values::{moment, parsed, stamp, status};
 use super::{Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
 use parfocal_base::FocalPower;
 use parfocal_base::ids::{SegmentId, SessionId};
-use parfocal_trial::phase::SessionStatus;
 
 /// Rows that are read ahead of the caller that takes them. With fewer, two threads wait for each other over and over
 /// while telemetry is read.
@@ -25,8 +23,8 @@ const ROWS_AHEAD: usize = 1024;
 /// Selects the lines of the list of sessions.
 const SESSION_LINES: &str = "SELECT session, wall, participant, protocol, practice,
              (SELECT study FROM study_sessions AS m WHERE m.session = s.session) AS study,
-             (SELECT kind FROM events AS e
-                 WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
+             EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'completed') AS completed,
+             EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'aborted') AS aborted,
              (SELECT count(*) FROM events AS e
                  WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
              (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
@@ -288,7 +286,6 @@ async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, Stor
 }
 
 fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
-    let ended: Option<String> = row.try_get("ended")?;
     let emergency: Option<bool> = row.try_get("emergency")?;
     Ok(SessionLine {
         session: parsed(row, "session")?,
@@ -298,11 +295,7 @@ fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
         protocol: row.try_get("protocol")?,
         practice: row.try_get("practice")?,
         study: row.try_get("study")?,
-        status: match ended.as_deref() {
-            None => SessionStatus::UnderWay,
-            Some("completed") => SessionStatus::Completed,
-            Some(_) => SessionStatus::Aborted,
-        },
+        status: status(row)?,
         finished_settings: row.try_get("finished")?,
         settings: row.try_get("settings")?,
         comments: row.try_get("comments")?,

@@ -11,7 +11,7 @@ use super::chain;
 use super::insert::Insert;
 use super::session_events::insert_event;
 use super::studies::{Enrolment, enrol};
-use super::values::{parsed, stamp};
+use super::values::{named, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use parfocal_base::PolicyName;
 use parfocal_base::boxed;
@@ -203,7 +203,7 @@ impl Reader {
             protocol_toml: row.try_get("protocol_toml")?,
             protocol_sha256: row.try_get("protocol_sha256")?,
             practice: row.try_get("practice")?,
-            algorithm: algorithm(&row)?,
+            algorithm: named(&row, "algorithm", "a session", Algorithm::named)?,
             seed: seed(&row)?,
             set_index: index(&row)?,
             commitment: row.try_get("commitment")?,
@@ -268,19 +268,12 @@ impl Reader {
 }
 
 fn event(row: &SqliteRow) -> Result<Event, StoreError> {
-    let role: String = row.try_get("role")?;
-    let by = Role::named(&role).ok_or_else(|| StoreError::Damaged(format!("unknown role '{role}'")))?;
-
     let payload: String = row.try_get("payload")?;
     let kind: EventKind =
         serde_json::from_str(&payload).map_err(|error| StoreError::Damaged(format!("event {payload}: {error}")))?;
     let Stamp { wall, at } = stamp(row)?;
+    let by = named(row, "role", "an event", Role::named)?;
     Ok(Event { number: row.try_get("number")?, by, account: account(row)?, at, wall, kind })
-}
-
-pub(super) fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {
-    let name: String = row.try_get("algorithm")?;
-    Algorithm::named(&name).ok_or_else(|| StoreError::Damaged(format!("unknown algorithm '{name}'")))
 }
 
 pub(super) fn seed(row: &SqliteRow) -> Result<Seed, StoreError> {

@@ -12,7 +12,7 @@ use sqlx::sqlite::SqliteRow;
 use super::error::Wrong;
 use super::insert::Insert;
 use super::remarks::is_erased;
-use super::values::{parsed, stamp};
+use super::values::{named, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -232,7 +232,7 @@ impl Reader {
             let audio: Vec<u8> = row.try_get("audio")?;
             match &mut whole {
                 Some((_, sound)) => sound.extend(audio),
-                None => whole = Some((media_type(&row)?, audio)),
+                None => whole = Some((named(&row, "media_type", "a recording", MediaType::named)?, audio)),
             }
         }
         Ok(whole)
@@ -307,24 +307,17 @@ pub(super) fn erased_words(pieces: usize) -> String {
 
 fn stored(row: &SqliteRow) -> Result<StoredPiece, StoreError> {
     let ended: Option<String> = row.try_get("ended")?;
-    let ended = ended.map(|name| {
-        Ending::named(&name).ok_or_else(|| StoreError::Damaged(format!("a recording that ended by '{name}'")))
-    });
+    let ended = ended.map(|_| named(row, "ended", "a recording", Ending::named));
 
     Ok(StoredPiece {
         number: row.try_get("number")?,
         run: row.try_get("run")?,
         piece: row.try_get("piece")?,
-        media_type: media_type(row)?,
+        media_type: named(row, "media_type", "a recording", MediaType::named)?,
         through_ms: row.try_get("through_ms")?,
         ended: ended.transpose()?,
         bytes: row.try_get("bytes")?,
         sha256: row.try_get("sha256")?,
         stamp: stamp(row)?,
     })
-}
-
-fn media_type(row: &SqliteRow) -> Result<MediaType, StoreError> {
-    let name: String = row.try_get("media_type")?;
-    MediaType::named(&name).ok_or_else(|| StoreError::Damaged(format!("a recording of type '{name}'")))
 }

@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 
 use super::{AccountLine, PassphraseHash, StoredAccount, StoredSignIn};
-use crate::store::values::parsed;
+use crate::store::values::{named, parsed};
 use crate::store::{Reader, StoreError};
 use parfocal_trial::account::{Account, AccountName, AccountRole};
 
@@ -105,11 +105,10 @@ fn set_by_another(row: &SqliteRow) -> Result<bool, StoreError> {
 
 fn account(row: &SqliteRow) -> Result<Account, StoreError> {
     let name: String = row.try_get("account")?;
-    let role: String = row.try_get("role")?;
     Ok(Account {
         account: AccountName::new(&name).map_err(|_| StoreError::Damaged(format!("account '{name}'")))?,
         display: row.try_get("display")?,
-        role: AccountRole::named(&role).ok_or_else(|| StoreError::Damaged(format!("unknown role '{role}'")))?,
+        role: named(row, "role", "an account", AccountRole::named)?,
         disabled: row.try_get("disabled")?,
     })
 }

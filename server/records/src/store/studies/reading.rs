@@ -6,7 +6,7 @@ use sqlx::sqlite::SqliteRow;
 
 use super::{Enrolment, StoredStudy};
 use crate::store::actors::account;
-use crate::store::values::{parsed, parsed_if_any, status};
+use crate::store::values::{named, parsed, parsed_if_any, status};
 use crate::store::{Reader, StoreError};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
@@ -32,7 +32,10 @@ impl Reader {
     /// If the database fails or holds data that this version cannot read.
     #[boxed]
     pub async fn study(&self, name: &str) -> Result<Option<StoredStudy>, StoreError> {
-        let row = sqlx::query("SELECT definition, sites FROM studies WHERE study = ?").bind(name);
+        let row = sqlx::query(
+            "SELECT definition, sites, seed FROM studies LEFT JOIN study_seeds USING (study) WHERE study = ?",
+        )
+        .bind(name);
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
 
         let unreadable = |error: &dyn std::fmt::Display| StoreError::Damaged(format!("study {name}: {error}"));
@@ -41,11 +44,13 @@ impl Reader {
         let definition = Definition::parse(&definition, name, &protocols).map_err(|error| unreadable(&error))?;
         let sites: String = row.try_get("sites")?;
         let sites = serde_json::from_str(&sites).map_err(|error| unreadable(&error))?;
+        let seed: Option<String> = row.try_get("seed")?;
+        let no_seed = || unreadable(&"its seed is not 64 hexadecimal digits");
 
         Ok(Some(StoredStudy {
             definition,
             sites,
-            seed: self.study_seed(name).await?,
+            seed: seed.map(|seed| Seed::from_hex(&seed).ok_or_else(no_seed)).transpose()?,
             events: self.study_events(name).await?,
             sessions: self.enrolled(name).await?,
         }))
@@ -58,19 +63,6 @@ impl Reader {
                 .map_err(|error| StoreError::Damaged(format!("study {study}, protocol {error}")))
         };
         self.rows(sql, &study, protocol).await
-    }
-
-    async fn study_seed(&self, study: &str) -> Result<Option<Seed>, StoreError> {
-        let seed: Option<String> = sqlx::query_scalar("SELECT seed FROM study_seeds WHERE study = ?")
-            .bind(study)
-            .fetch_optional(self.pool())
-            .await?;
-
-        let read = |text: String| {
-            Seed::from_hex(&text)
-                .ok_or_else(|| StoreError::Damaged(format!("study {study}: its seed is not 64 hexadecimal digits")))
-        };
-        seed.map(read).transpose()
     }
 
     /// The events of study `study`, in order.
@@ -136,18 +128,16 @@ impl Reader {
 }
 
 fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
-    let way: String = row.try_get("role")?;
-    let kind: String = row.try_get("kind")?;
     let session = parsed_if_any(row, "session")?;
+    let commitment = row.try_get("commitment")?;
     let account = account(row)?;
 
     Ok(StudyEvent {
         number: row.try_get("number")?,
-        way: Channel::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
+        way: named(row, "role", "an event of a study", Channel::named)?,
         signature: Signature { person: row.try_get("person")?, reason: row.try_get("reason")?, account },
         wall: parsed(row, "wall")?,
-        kind: StudyEventKind::of(&kind, session, row.try_get("commitment")?)
-            .ok_or_else(|| StoreError::Damaged(format!("unknown event '{kind}' of a study")))?,
+        kind: named(row, "kind", "an event of a study", |kind| StudyEventKind::of(kind, session, commitment))?,
     })
 }
 
