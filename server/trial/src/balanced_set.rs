@@ -35,6 +35,15 @@ pub struct Member {
     pub status: SessionStatus,
     /// Whether the session was unblinded.
     pub unblinded: bool,
+    /// Whether the participant withdrew.
+    pub withdrawn: bool,
+}
+
+impl Member {
+    /// Whether its order must stay secret: its answers count, or may still count, and it is blinded.
+    fn needs_its_secret(&self) -> bool {
+        self.status != SessionStatus::Aborted && !self.withdrawn && !self.unblinded
+    }
 }
 
 impl BalancedSet {
@@ -65,10 +74,9 @@ impl BalancedSet {
             ));
         }
 
-        // Two sessions have the same place if the first was aborted and freed it.
+        // Two sessions have the same place if the first was aborted or withdrawn and freed it.
         let place = self.members.iter().find(|member| member.session == session).map(|member| member.place);
-        let blinded_twin = others()
-            .find(|other| Some(other.place) == place && other.status != SessionStatus::Aborted && !other.unblinded);
+        let blinded_twin = others().find(|other| Some(other.place) == place && other.needs_its_secret());
         if let Some(Member { participant, made, .. }) = blinded_twin {
             return Err(Refusal::Conflict(format!(
                 "the session of {participant} made at {made} took this one's place and has the same order; \
@@ -104,6 +112,7 @@ mod tests {
             place,
             status,
             unblinded: false,
+            withdrawn: false,
         }
     }
 
@@ -159,6 +168,15 @@ mod tests {
         assert_eq!(set([aborted(1, 0), unblinded(completed(2, 0))]).check_unblinding(session(1)), Ok(()));
         assert_eq!(set([aborted(1, 0), aborted(2, 0)]).check_unblinding(session(1)), Ok(()));
         assert_eq!(set([aborted(1, 0), completed(2, 1)]).check_unblinding(session(1)), Ok(()));
+    }
+
+    #[test]
+    fn the_session_that_took_the_place_of_a_withdrawn_one_can_be_unblinded() {
+        let withdrawn = Member { withdrawn: true, ..completed(1, 0) };
+        let both = [withdrawn, completed(2, 0)];
+        assert_eq!(set(both.clone()).check_unblinding(session(2)), Ok(()));
+        let refused = set(both).check_unblinding(session(1)).unwrap_err();
+        assert!(refused.to_string().contains("session of S-02 made at"), "{refused}");
     }
 
     #[test]

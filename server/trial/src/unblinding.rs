@@ -152,7 +152,7 @@ mod tests {
 
     fn member(session: SessionId, place: usize, status: SessionStatus) -> Member {
         let made = Timestamp::UNIX_EPOCH;
-        Member { session, participant: "S-01".to_owned(), made, place, status, unblinded: false }
+        Member { session, participant: "S-01".to_owned(), made, place, status, unblinded: false, withdrawn: false }
     }
 
     /// Circumstances in which another session of the set is under way.

@@ -44,7 +44,8 @@ impl Reader {
         let sql = "SELECT session, participant, wall, set_index,
                  EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'completed') AS completed,
                  EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'aborted') AS aborted,
-                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded') AS unblinded
+                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded') AS unblinded,
+                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'withdrawn') AS withdrawn
              FROM sessions AS s WHERE seed = ? ORDER BY rowid";
         Ok(BalancedSet { seed, members: self.rows(sql, &seed.to_hex(), member).await? })
     }
@@ -58,5 +59,6 @@ fn member(row: &SqliteRow) -> Result<Member, StoreError> {
         place: index(row)?,
         status: status(row)?,
         unblinded: row.try_get("unblinded")?,
+        withdrawn: row.try_get("withdrawn")?,
     })
 }
