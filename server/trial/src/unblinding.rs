@@ -8,7 +8,7 @@ use super::refusal::Refusal;
 use super::role::Role;
 use super::session::{SessionState, decide};
 use super::study::definition::StudyName;
-use super::study::state::check_unblinding_reason;
+use super::study::state::check_names_no_policy;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
@@ -75,7 +75,7 @@ impl Circumstances {
                 study.name
             )));
         }
-        check_unblinding_reason(reason, &study.policies)
+        check_names_no_policy(reason, &study.policies)
     }
 
     fn check_unblinding(&self, session: SessionId, despite_outstanding: bool) -> Result<(), Refusal> {

@@ -48,6 +48,22 @@ async fn one_session_is_unblinded_only_in_an_emergency_that_somebody_signs() {
 }
 
 #[tokio::test]
+async fn nobody_who_knows_a_policy_names_it_where_every_export_shows_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
+    emergency(&trial, session, "an adverse event").await.unwrap();
+
+    let close = async |reason: &str| {
+        let signature = signed(reason);
+        trial.conductor.change_study(Role::Researcher, STUDY.to_owned(), Change::Close, signature).await
+    };
+    let naming = close("setting 2 was mgm-hill-climber").await.unwrap_err().to_string();
+    assert!(naming.contains("the reason names the policy 'mgm-hill-climber'"), "{naming}");
+    close("an adverse event").await.unwrap();
+}
+
+#[tokio::test]
 async fn a_session_under_way_is_unblinded_in_an_emergency_and_continues() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = opened(folder.path()).await;

@@ -111,7 +111,8 @@ impl StudyState {
     /// Checks whether the person with this signature may make `change`.
     ///
     /// # Errors
-    /// If the change does not fit the state of the study, or the person may not make it.
+    /// If the change does not fit the state of the study, the person may not make it, or the reason names a policy that
+    /// an unblinded session has made known.
     pub fn check(
         &self,
         change: Change,
@@ -120,6 +121,10 @@ impl StudyState {
         circumstances: StudyCircumstances<'_>,
     ) -> Result<(), Refusal> {
         check_way(way)?;
+        if circumstances.sessions.iter().any(|session| session.unblinded) {
+            check_names_no_policy(&signature.reason, policies(circumstances.definition))?;
+        }
+
         match change {
             Change::Open { despite_concerns } => self.check_open(circumstances, despite_concerns),
             Change::Close => self.check_close(),
@@ -211,8 +216,7 @@ impl StudyState {
                 definition.may_unblind.join("; ")
             )));
         }
-        let policies = definition.protocols.iter().flat_map(|protocol| &protocol.policies);
-        check_unblinding_reason(&signature.reason, policies)
+        check_names_no_policy(&signature.reason, policies(definition))
     }
 
     fn check_withdrawal(&self, session: SessionId, circumstances: StudyCircumstances<'_>) -> Result<(), Refusal> {
@@ -256,11 +260,17 @@ pub fn check_way(way: Channel) -> Result<(), Refusal> {
     }
 }
 
-/// Checks that the reason for an unblinding names none of `policies`, because every export shows the reason.
+/// The policies that the study compares.
+fn policies(definition: &Definition) -> impl Iterator<Item = &PolicyName> {
+    definition.protocols.iter().flat_map(|protocol| &protocol.policies)
+}
+
+/// Checks that the reason for an unblinding, or for a change after one, names none of `policies`, because every export
+/// shows the reason.
 ///
 /// # Errors
 /// If the reason names one of the policies.
-pub fn check_unblinding_reason<'a>(
+pub fn check_names_no_policy<'a>(
     reason: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
 ) -> Result<(), Refusal> {
