@@ -19,6 +19,7 @@ use super::{Access, AccessLog, Head, Reader, StoreError};
 use parfocal_base::boxed;
 use parfocal_base::clock::Clock;
 use parfocal_base::files::{folder_of, make_private, sync_folder_of};
+use parfocal_recording::room;
 
 /// What SQLite adds to a database's name for the files of its log.
 const LOG_SUFFIXES: [&str; 3] = ["-wal", "-shm", "-journal"];
@@ -175,16 +176,22 @@ impl VerifiedCopy {
     }
 }
 
-/// Records a backup, and copies the database of `recorder` into a new file in `folder`.
+/// Records a backup, and copies the database of `access_log` into a new file in `folder`, which is in its data folder.
 ///
 /// # Errors
-/// If the file cannot be written, the database cannot be read, or the copy does not verify.
+/// If the disk has no room for the copy, the file cannot be written, the database cannot be read, or the copy does not
+/// verify.
 #[boxed]
 pub async fn verified_copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
+    let needed = access_log.reader().bytes().await?;
+    // Comments and answers of a session need the reserve. If the free space is unknown, writing reports a full disk.
+    if room(folder).is_ok_and(|room| room.spare() < needed) {
+        return Err(BackupError::NoRoom { path: folder.to_owned(), needed });
+    }
     copy_into(access_log, temporary_in(folder)?, "the backup").await
 }
 
-/// Records a backup, and copies the database of `recorder` into `file`. Errors call the copy `what`.
+/// Records a backup, and copies the database of `access_log` into `file`. Errors call the copy `what`.
 async fn copy_into(access_log: &AccessLog, file: NamedTempFile, what: &str) -> Result<VerifiedCopy, BackupError> {
     access_log.record(&Access::BackedUp).await?;
     // A connection of its own: its thread has the priority of this one, and the server's readers stay free.

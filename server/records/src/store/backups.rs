@@ -14,7 +14,6 @@ use super::backup::{BackupError, VerifiedCopy, verified_copy};
 use super::{AccessLog, Reader, StoreError};
 use crate::downloads::{Downloads, Stage};
 use parfocal_base::priority;
-use parfocal_recording::room;
 use parfocal_trial::account::AccountName;
 
 /// The folder within the data folder in which backups are made.
@@ -133,17 +132,13 @@ async fn make(access_log: AccessLog, folder: PathBuf) -> Result<FinishedBackup, 
 
     let broken = || "the backup ended before it was whole; the server's log says why".to_owned();
     let copy = made.await.map_err(|_| broken())?.map_err(|error| error.to_string())?;
-    let (bytes, head) = (copy.bytes, copy.head.to_string());
+    let bytes = copy.bytes;
+    let head = copy.head.to_string();
     Ok(FinishedBackup { file: Arc::new(copy.into_path()), bytes, head, erasures })
 }
 
 async fn copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
     let unwritable = |error| BackupError::File { path: folder.to_owned(), error };
     std::fs::create_dir_all(folder).map_err(unwritable)?;
-    let needed = access_log.reader().bytes().await?;
-    // Comments and answers of a session need the reserve. If the free space is unknown, writing reports a full disk.
-    if room(folder).is_ok_and(|room| room.spare() < needed) {
-        return Err(BackupError::NoRoom { path: folder.to_owned(), needed });
-    }
     verified_copy(access_log, folder).await
 }
