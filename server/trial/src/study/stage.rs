@@ -19,15 +19,4 @@ pub enum Stage {
     Unblinded,
 }
 
-impl Stage {
-    /// The stage's name, as it is shown.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Planned => "planned",
-            Self::Open => "open",
-            Self::Closed => "closed",
-            Self::Locked => "locked",
-            Self::Unblinded => "unblinded",
-        }
-    }
-}
+names!(Stage { Planned: "planned", Open: "open", Closed: "closed", Locked: "locked", Unblinded: "unblinded" });
