@@ -4,8 +4,24 @@ use std::io::BufRead;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use clap::builder::RangedI64ValueParser;
+use clap::value_parser;
+
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
+use parfocal_devices::camera::LEAST_FPS;
+
+/// Reads `--fps` of a command in which the control loop follows the camera.
+pub fn frame_rate() -> RangedI64ValueParser<u32> {
+    value_parser!(u32).range(i64::from(LEAST_FPS)..=1000)
+}
+
+/// What the help says of [`frame_rate`].
+pub fn frame_rate_help() -> String {
+    format!(
+        "Frame rate to request from the camera, per second; at least {LEAST_FPS}, as a later frame counts as missing"
+    )
+}
 
 /// Reads a whole number, which must be in `range`.
 pub fn whole_number(range: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {

@@ -118,6 +118,19 @@ fn a_folder_that_exists_and_a_camera_without_mosaics_are_refused() {
     assert!(told.contains("guess") && !out.exists(), "{told}");
 }
 
+#[test]
+fn a_frame_rate_too_low_for_the_control_loop_is_refused_by_all_that_run_it() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("out");
+    for arguments in [["recording", "record", "--out"], ["serve", "--bind=127.0.0.1:0", "--data-dir"]] {
+        let output = parfocal(&[&arguments[..], &[text(&out), "--fps", "4"]].concat());
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains("4 is not in 5..=1000"), "{told}");
+    }
+    assert!(!out.exists());
+}
+
 /// A small disk in memory, unmounted when dropped.
 struct SmallDisk(TempDir);
 

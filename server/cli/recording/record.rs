@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
+use crate::cli::input::{frame_rate, frame_rate_help};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, print};
 use parfocal_autofocus::Registry;
@@ -40,8 +41,7 @@ pub struct Arguments {
     /// Policy that focuses meanwhile; without one the lens stays where it is.
     #[arg(long, value_name = "NAME")]
     policy: Option<String>,
-    /// Frame rate to request from the camera, per second.
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = frame_rate(), help = frame_rate_help())]
     fps: u32,
     /// Seed of simulated devices.
     #[arg(long, value_name = "N", default_value_t = 0)]

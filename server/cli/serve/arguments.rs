@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::navigation::Navigation;
 use crate::cli::encryption::Encryption;
+use crate::cli::input::{frame_rate, frame_rate_help};
 use parfocal_base::BlurRate;
 
 /// Arguments of `parfocal serve`.
@@ -27,8 +28,7 @@ pub struct Arguments {
     /// Lens: simulated, emulated (an emulated Optotune driver), optotune:auto or optotune:DEVICE.
     #[arg(long, value_name = "SPEC", default_value = "simulated")]
     pub(super) lens: String,
-    /// Frame rate to request from the camera, per second; at least 5, as a later frame counts as missing.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(5..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = frame_rate(), help = frame_rate_help())]
     pub(super) fps: u32,
     /// Seed that repeats simulated devices and practice sessions; random by default. Real sessions always use the
     /// system's random source.

@@ -6,6 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::LEAST_FPS;
+
 /// A setting of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -120,8 +122,12 @@ impl Controls {
         Ok(())
     }
 
-    /// For the camera: sets what it offers now.
-    pub fn offer(&self, available: Vec<Adjustable>) {
+    /// For the camera: sets what it offers now. Of its frame rates, those below [`LEAST_FPS`] are left out, because the
+    /// control loop would take such a camera for one that fails.
+    pub fn offer(&self, mut available: Vec<Adjustable>) {
+        for rate in available.iter_mut().filter(|one| one.setting == Setting::FrameRate) {
+            rate.min = rate.min.max(LEAST_FPS.into()).min(rate.max);
+        }
         self.inner().offer.settings = available;
     }
 
@@ -159,5 +165,19 @@ mod tests {
         assert_eq!(controls.offered().trouble.unwrap(), "Gain was not changed: the camera says: busy");
         controls.ask(Setting::Gain, 2.0).unwrap();
         assert_eq!(controls.offered().trouble, None, "trouble is reported for the last change alone");
+    }
+
+    #[test]
+    fn a_frame_rate_too_low_for_the_control_loop_cannot_be_asked() {
+        let controls = Controls::default();
+        for (min, max, offered) in [(1.0, 120.0, (5.0, 120.0)), (10.0, 60.0, (10.0, 60.0)), (0.5, 3.0, (3.0, 3.0))] {
+            controls.offer(vec![Adjustable { setting: Setting::FrameRate, value: max, min, max }]);
+            let [rate] = controls.offered().settings[..] else { panic!("the frame rate is offered") };
+            assert_eq!((rate.min, rate.max), offered);
+        }
+
+        controls.offer(vec![Adjustable { setting: Setting::FrameRate, value: 50.0, min: 1.0, max: 120.0 }]);
+        assert!(controls.ask(Setting::FrameRate, 4.0).is_err());
+        assert_eq!(controls.ask(Setting::FrameRate, 5.0), Ok(()));
     }
 }

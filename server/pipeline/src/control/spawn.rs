@@ -22,14 +22,14 @@ use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
-use parfocal_devices::camera::{Camera, Controls, Frame};
+use parfocal_devices::camera::{Camera, Controls, Frame, LEAST_FPS};
 use parfocal_devices::lens::{Lens, LensDynamics};
 use parfocal_imaging::Reconstructor;
 
 /// Longest wait for a frame before the loop looks for commands.
 const TICK: Duration = Duration::from_millis(20);
-/// Time without a frame after which the camera counts as failed.
-const NO_FRAME: Duration = Duration::from_millis(300);
+/// Time without a frame after which the camera counts as failed: that of one and a half frames at the least rate.
+const NO_FRAME: Duration = Duration::from_millis(1500 / LEAST_FPS as u64);
 /// Status is published this often, and at every change.
 const STATUS_INTERVAL: Duration = Duration::from_millis(200);
 /// Longest wait, at the end, for a camera that does not answer.
