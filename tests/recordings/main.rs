@@ -242,6 +242,35 @@ fn the_phantom_is_recorded_small_enough_and_played_back() {
 }
 
 #[test]
+fn a_recording_whose_times_fall_is_played_too() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("recording");
+    let calibration = Calibration::default();
+    let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
+    let recorder = Recorder::start(writer, Moment::default()).unwrap();
+    for (number, exposed_at) in [(1, 90_000_000), (2, 20_000_000)] {
+        recorder.intake().offer(CapturedFrame {
+            number,
+            exposed_at: Moment::from_nanos(exposed_at),
+            exposure: Duration::ZERO,
+            asked: FocalPower::MIDDLE,
+            measured: None,
+            optimal: None,
+            patch: PatchRow::default(),
+            mosaic: Arc::new(mosaic(number as usize)),
+        });
+    }
+    assert_eq!(recorder.stop().frames, 2);
+    assert_eq!(info(&path)["seconds"], 0.0);
+
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
+    let settings = CameraSettings { fps: 25.0, seed: 0, optics, clock };
+    let mut camera = camera::open(&format!("recording:{}", path.display()), settings).unwrap();
+    assert!(camera.next_frame(Duration::from_secs(5)).is_ok());
+}
+
+#[test]
 fn a_span_becomes_a_video_or_pictures() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 60);

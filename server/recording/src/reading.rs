@@ -98,16 +98,16 @@ impl Recording {
         numbered.saturating_sub(self.rows.len() as u64)
     }
 
-    /// Frames per second from the first to the last; `None` for fewer than two frames.
+    /// Frames per second from the first to the last; `None` if they take no time.
     pub fn rate(&self) -> Option<f64> {
         let seconds = self.seconds();
         (seconds > 0.0).then(|| (self.rows.len() - 1) as f64 / seconds)
     }
 
-    /// Seconds from the first frame to the last.
+    /// Seconds from the first frame to the last; 0 if a recording from elsewhere has the last one before the first.
     pub fn seconds(&self) -> f64 {
         match (self.rows.first(), self.rows.last()) {
-            (Some(first), Some(last)) => last.time.saturating_sub(first.time) as f64 / 1e9,
+            (Some(first), Some(last)) => last.time.saturating_sub(first.time).max(0) as f64 / 1e9,
             _ => 0.0,
         }
     }
