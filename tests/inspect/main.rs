@@ -118,6 +118,23 @@ fn a_calibration_sets_the_scale_of_a_mosaic() {
 }
 
 #[test]
+fn a_calibration_is_named_only_if_a_mosaic_was_developed_with_it() {
+    let folder = TempDir::new().unwrap();
+    let mosaic = folder.path().join("mosaic.png");
+    image::ImageBuffer::from_pixel(2048, 1088, image::Luma([256_u16])).save(&mosaic).unwrap();
+    let colour = folder.path().join("colour.png");
+    image::RgbImage::from_pixel(64, 64, image::Rgb([90, 60, 30])).save(&colour).unwrap();
+    let calibration = write(&folder, "unit.toml", b"name = 'theatre 2'\n");
+
+    for (paths, named) in [(vec![&*colour], false), (vec![&*colour, &*mosaic], true)] {
+        let output = inspect(&["--calibration", calibration.to_str().unwrap()], &paths);
+        assert!(output.status.success(), "{}", complaint(&output));
+        let told = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(told.contains("mosaics developed with the calibration theatre 2"), named, "{told}");
+    }
+}
+
+#[test]
 fn overlays_are_pictures_of_the_same_size_and_none_overwrites_another() {
     let folder = TempDir::new().unwrap();
     let one = folder.path().join("disc.png");

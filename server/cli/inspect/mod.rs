@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     print(&report::table(&reports))?;
-    if let Some(title) = inspector.titled.filter(|_| !arguments.json) {
+    if let Some(title) = reports.iter().find_map(|report| report.calibration.as_ref()) {
         print(&format!("mosaics developed with the calibration {title}\n"))?;
     }
 
