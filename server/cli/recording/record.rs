@@ -16,7 +16,9 @@ use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
 use parfocal_imaging::{Calibration, Reconstructor};
 use parfocal_pipeline::control::{self, Command, ControlHandle, ControlLoop, Drive, LoopSettings, Rig};
-use parfocal_recording::{CALIBRATION, Ended, FORMAT, Header, Recorder, RecordingProgress, VERSION, Writer};
+use parfocal_recording::{
+    CALIBRATION, Ended, FORMAT, Header, Recorder, RecordingError, RecordingProgress, VERSION, Writer,
+};
 
 /// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(20);
@@ -57,7 +59,7 @@ pub struct Arguments {
 /// If the folder exists, a device fails, or the disk is full; what was recorded before is kept.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.out.exists() {
-        return Err(format!("{} exists; choose a new folder for the recording", arguments.out.display()).into());
+        return Err(RecordingError::Exists(arguments.out.clone()).into());
     }
 
     let interrupt = Interrupt::listen("storing the last frames".to_owned())?;

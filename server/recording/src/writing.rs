@@ -173,7 +173,7 @@ impl Writer {
     }
 }
 
-/// Makes a folder that must be new, for a recording or anything else.
+/// Makes the folder of a recording, which must be new.
 ///
 /// # Errors
 /// If it exists or cannot be made.
@@ -181,9 +181,7 @@ pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
     let failed = |error: io::Error| RecordingError::unwritable(folder, 0, &error);
     make_parent(folder).map_err(failed)?;
     fs::create_dir(folder).map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => {
-            RecordingError::Failed(format!("{} exists; choose a new folder for the recording", folder.display()))
-        }
+        io::ErrorKind::AlreadyExists => RecordingError::Exists(folder.to_owned()),
         _ => failed(error),
     })
 }

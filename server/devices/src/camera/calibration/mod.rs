@@ -4,13 +4,11 @@ pub mod maker;
 pub mod tables;
 
 use std::fs;
-use std::io::{Cursor, ErrorKind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use image::{ImageBuffer, ImageFormat, Luma};
-
 use parfocal_base::files::replace;
-use parfocal_imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
+use parfocal_imaging::{Calibration, MosaicFrame, Picture, Reference, decode, encode_tiff};
 
 /// Why a calibration, or a maker's table, cannot be used or saved. The message names the file, and says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -186,13 +184,6 @@ fn named(toml: &str, key: &str) -> String {
 
 fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), CalibrationFault> {
     let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
-    let size = |side: usize| u32::try_from(side).map_err(|_| failed(&"it is too large"));
-
-    let picture: Option<ImageBuffer<Luma<u16>, _>> =
-        ImageBuffer::from_raw(size(frame.width())?, size(frame.height())?, frame.samples());
-    let picture = picture.ok_or_else(|| failed(&"its size is wrong"))?;
-
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Tiff).map_err(|error| failed(&error))?;
-    Ok(replace(path, bytes.get_ref()).map_err(|error| failed(&error))?)
+    let bytes = encode_tiff(frame).map_err(|error| failed(&error))?;
+    Ok(replace(path, &bytes).map_err(|error| failed(&error))?)
 }
