@@ -45,10 +45,7 @@ fn blur_rows(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32]) {
         padded[radius..radius + width].copy_from_slice(row);
         padded[radius + width..].fill(row[width - 1]);
 
-        for (out, &value) in out.iter_mut().zip(row) {
-            *out = kernel[0] * value;
-        }
-
+        weigh(out, row, kernel[0]);
         for (tap, &weight) in kernel.iter().enumerate().skip(1) {
             add_pair(out, &padded[radius - tap..], &padded[radius + tap..], weight);
         }
@@ -61,18 +58,24 @@ fn blur_columns(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32])
     let row = |y: usize| &data[y * width..][..width];
 
     for (y, out) in blurred.chunks_exact_mut(width).enumerate() {
-        for (out, &value) in out.iter_mut().zip(row(y)) {
-            *out = kernel[0] * value;
-        }
+        weigh(out, row(y), kernel[0]);
         for (tap, &weight) in kernel.iter().enumerate().skip(1) {
             add_pair(out, row(y.saturating_sub(tap)), row((y + tap).min(height - 1)), weight);
         }
     }
 }
 
+/// Sets `out` to `weight` times a row.
+#[inline(always)]
+pub(crate) fn weigh(out: &mut [f32], values: &[f32], weight: f32) {
+    for (out, &value) in out.iter_mut().zip(values) {
+        *out = weight * value;
+    }
+}
+
 /// Adds `weight` times the sum of two rows to `out`.
 #[inline(always)]
-fn add_pair(out: &mut [f32], one: &[f32], other: &[f32], weight: f32) {
+pub(crate) fn add_pair(out: &mut [f32], one: &[f32], other: &[f32], weight: f32) {
     for ((out, &one), &other) in out.iter_mut().zip(one).zip(other) {
         *out += weight * (one + other);
     }

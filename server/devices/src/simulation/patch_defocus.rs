@@ -102,8 +102,7 @@ impl Defocus {
     ) {
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
-        let kernel = || single(gaussian::kernel(sigma, reach));
-        self.blur(side, reach, Blur { sigma, spot, kernel }, look, out);
+        self.blur(side, &Blur { sigma, reach, spot, kernel: gaussian::kernel }, look, out);
     }
 
     /// Gray levels of a square of `side` pixels of a scene that `look` shows in means of 2x2
@@ -119,55 +118,47 @@ impl Defocus {
         let side = side / COARSE;
         let mut levels = vec![0.0; side * side];
 
-        if sigma < 1.0 {
+        let blur = if sigma < 1.0 {
             // Such a narrow spot shows only its variance, not its shape. Samples of a Gaussian would have less than its
             // variance.
-            let kernel = || single(gaussian::discrete_kernel(sigma, NARROW_REACH));
-            self.blur(side, NARROW_REACH, Blur { sigma, spot: Spot::Gaussian, kernel }, look, &mut levels);
+            Blur { sigma, reach: NARROW_REACH, spot: Spot::Gaussian, kernel: gaussian::discrete_kernel }
         } else {
-            let reach = (4.0 * sigma).ceil() as usize;
-            let kernel = || single(gaussian::kernel(sigma, reach));
-            self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
-        }
+            Blur { sigma, reach: (4.0 * sigma).ceil() as usize, spot, kernel: gaussian::kernel }
+        };
+        self.blur(side, &blur, look, &mut levels);
 
         expanded(&levels, side)
     }
 
-    /// Fills `out` (`width` x `width` values) with what `look` shows, blurred by `blur`, whose kernel reaches `reach`
-    /// pixels.
-    fn blur<K: FnOnce() -> Vec<f32>>(
-        &mut self,
-        width: usize,
-        reach: usize,
-        blur: Blur<K>,
-        look: impl FnOnce(usize, usize, &mut [f32]),
-        out: &mut [f32],
-    ) {
+    /// Fills `out` (`width` x `width` values) with what `look` shows, blurred by `blur`.
+    fn blur(&mut self, width: usize, blur: &Blur, look: impl FnOnce(usize, usize, &mut [f32]), out: &mut [f32]) {
+        let &Blur { sigma, reach, spot, kernel } = blur;
         let side = width + 2 * reach;
         self.source.resize(side * side, 0.0);
         look(reach, side, &mut self.source);
 
-        match blur.spot {
+        match spot {
             _ if reach == 0 => out.copy_from_slice(&self.source),
             Spot::Gaussian => {
-                let kernel = (blur.kernel)();
+                let kernel: Vec<f32> = kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect();
                 self.rows.resize(side * width, 0.0);
                 blur_rows(&self.source, side, &kernel, width, &mut self.rows);
                 blur_columns(&self.rows, &kernel, width, out);
             }
             Spot::Disc => {
                 self.sums.resize(side * (side + 1), 0.0);
-                disc(&self.source, side, reach, 2.0 * blur.sigma as f32, width, &mut self.sums, out);
+                disc(&self.source, side, reach, 2.0 * sigma as f32, width, &mut self.sums, out);
             }
         }
     }
 }
 
-/// A spot, and how to make its kernel if it is a Gaussian.
-struct Blur<K> {
+/// A spot, how many pixels it reaches, and what makes its kernel of both if it is a Gaussian.
+struct Blur {
     sigma: f64,
+    reach: usize,
     spot: Spot,
-    kernel: K,
+    kernel: fn(f64, usize) -> Vec<f64>,
 }
 
 /// Twice as wide and as high: each of the `side` x `side` values becomes 2x2 on the slope between its neighbours, whose
@@ -206,11 +197,6 @@ fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &
             }
         }
     }
-}
-
-/// `kernel` in single precision.
-fn single(kernel: Vec<f64>) -> Vec<f32> {
-    kernel.into_iter().map(|weight| weight as f32).collect()
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]

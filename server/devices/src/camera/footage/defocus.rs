@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use crate::simulation::blur::{add_pair, weigh};
 use crate::simulation::gaussian::half_kernel;
 use parfocal_imaging::RgbImage;
 
@@ -93,20 +94,6 @@ fn blur_down(data: &mut [u8], across: &[f32], row: usize, kernel: &[f32]) {
         for (out, sum) in out.iter_mut().zip(&sum) {
             *out = (sum + 0.5) as u8;
         }
-    }
-}
-
-#[inline(always)]
-fn weigh(out: &mut [f32], values: &[f32], weight: f32) {
-    for (out, value) in out.iter_mut().zip(values) {
-        *out = weight * value;
-    }
-}
-
-#[inline(always)]
-fn add_pair(out: &mut [f32], one: &[f32], other: &[f32], weight: f32) {
-    for ((out, one), other) in out.iter_mut().zip(one).zip(other) {
-        *out += weight * (one + other);
     }
 }
 
