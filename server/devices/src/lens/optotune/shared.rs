@@ -211,12 +211,7 @@ impl Shared {
     /// # Errors
     /// If the device is not connected. The error gives the reason.
     pub fn wait_connected(&self, timeout: Duration) -> Result<Device, LensError> {
-        let (state, _) = self
-            .changed
-            .wait_timeout_while(self.state(), timeout, |state| !state.tried)
-            .unwrap_or_else(PoisonError::into_inner);
-
-        state.device.clone()
+        self.wait_while(timeout, |state| !state.tried).0.device.clone()
     }
 
     /// Requests new readings, waits for them at most `timeout`, and returns them.
@@ -232,23 +227,17 @@ impl Shared {
 
         self.wake();
 
-        let waiting = |state: &mut State| state.device.is_ok() && state.refreshed == before;
-        let (state, late) =
-            self.changed.wait_timeout_while(self.state(), timeout, waiting).unwrap_or_else(PoisonError::into_inner);
+        let (state, late) = self.wait_while(timeout, |state| state.device.is_ok() && state.refreshed == before);
 
         match &state.device {
-            Ok(_) if late.timed_out() => Err(LensError::Gone("it did not answer in time".into())),
+            Ok(_) if late => Err(LensError::Gone("it did not answer in time".into())),
             device => device.clone(),
         }
     }
 
     /// Waits for `time`, or until the thread is asked to end. Returns whether it was asked to end.
     pub fn stop_within(&self, time: Duration) -> bool {
-        let (state, _) = self
-            .changed
-            .wait_timeout_while(self.state(), time, |state| !state.ending())
-            .unwrap_or_else(PoisonError::into_inner);
-        state.ending()
+        self.wait_while(time, |state| !state.ending()).0.ending()
     }
 
     /// Tells the thread to end.
@@ -270,7 +259,14 @@ impl Shared {
 
     /// Waits for the thread's end, at most `timeout`.
     pub fn wait_ended(&self, timeout: Duration) {
-        let _ = self.changed.wait_timeout_while(self.state(), timeout, |state| state.progress != Progress::Ended);
+        drop(self.wait_while(timeout, |state| state.progress != Progress::Ended));
+    }
+
+    /// Waits as long as `waiting` holds, at most `timeout`. Returns the state, and whether it still held at the end.
+    fn wait_while(&self, timeout: Duration, waiting: impl Fn(&State) -> bool) -> (MutexGuard<'_, State>, bool) {
+        let waited = self.changed.wait_timeout_while(self.state(), timeout, |state| waiting(state));
+        let (state, late) = waited.unwrap_or_else(PoisonError::into_inner);
+        (state, late.timed_out())
     }
 
     /// Counts one line error: a reply that was damaged, late or missing, or noise.

@@ -93,6 +93,9 @@ pub struct Limits {
     pub min: i16,
 }
 
+/// The beginning of a reply's payload, and the payload's length in bytes.
+type ReplyForm = (&'static [u8], usize);
+
 impl Request {
     /// The bytes that go over the wire.
     pub fn encode(self) -> Vec<u8> {
@@ -103,45 +106,32 @@ impl Request {
     }
 
     fn payload(self) -> Vec<u8> {
-        let of = |name: &[u8], values: [i16; 2], used: usize| {
-            let values = values.into_iter().flat_map(i16::to_be_bytes).take(used);
-            name.iter().copied().chain(values).collect()
+        let (name, used, _) = self.form();
+        let values = match self {
+            Self::SetCurrent(value) | Self::SetFocalPower(value) => [value, 0],
+            Self::TemperatureLimits { high, low } => [high, low],
+            _ => [0, 0],
         };
-
-        match self {
-            Self::FirmwareType => of(b"H", [0, 0], 0),
-            Self::FirmwareVersion => of(b"V", [0, 0], 1),
-            Self::Serial => of(b"X", [0, 0], 0),
-            Self::MaxCurrent => of(b"CrMA", [0, 0], 2),
-            Self::SetCurrent(counts) => of(b"Aw", [counts, 0], 2),
-            Self::Current => of(b"Ar", [0, 0], 2),
-            Self::CurrentMode => of(b"MwDA", [0, 0], 0),
-            Self::FocalPowerMode => of(b"MwCA", [0, 0], 0),
-            Self::Mode => of(b"MMA", [0, 0], 0),
-            Self::TemperatureLimits { high, low } => of(b"PwTA", [high, low], 4),
-            Self::SetFocalPower(raw) => of(b"PwDA", [raw, 0], 4),
-            Self::FocalPower => of(b"PrDA", [0, 0], 4),
-            Self::Temperature => of(b"TCA", [0, 0], 0),
-            Self::Status => of(b"Sr", [0, 0], 0),
-        }
+        name.iter().copied().chain(values.into_iter().flat_map(i16::to_be_bytes).take(used)).collect()
     }
 
-    /// The beginning of the reply's payload, and the payload's length in bytes; `None` for a request without a reply.
-    const fn reply_form(self) -> Option<(&'static [u8], usize)> {
+    /// The request's name, the number of bytes after it, and the form of the reply; `None` for a request without a reply.
+    const fn form(self) -> (&'static [u8], usize, Option<ReplyForm>) {
         match self {
-            Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
-            Self::FirmwareType => Some((b"H", 2)),
-            Self::FirmwareVersion => Some((b"V", 7)),
-            Self::Serial => Some((b"X", 9)),
-            Self::MaxCurrent => Some((b"CMA", 5)),
-            Self::Current => Some((b"A", 3)),
-            Self::CurrentMode => Some((b"MDA", 3)),
-            Self::FocalPowerMode => Some((b"M", 8)),
-            Self::Mode => Some((b"MMA", 4)),
-            Self::TemperatureLimits { .. } => Some((b"", 7)),
-            Self::FocalPower => Some((b"", 4)),
-            Self::Temperature => Some((b"TCA", 5)),
-            Self::Status => Some((b"S", 5)),
+            Self::FirmwareType => (b"H", 0, Some((b"H", 2))),
+            Self::FirmwareVersion => (b"V", 1, Some((b"V", 7))),
+            Self::Serial => (b"X", 0, Some((b"X", 9))),
+            Self::MaxCurrent => (b"CrMA", 2, Some((b"CMA", 5))),
+            Self::SetCurrent(_) => (b"Aw", 2, None),
+            Self::Current => (b"Ar", 2, Some((b"A", 3))),
+            Self::CurrentMode => (b"MwDA", 0, Some((b"MDA", 3))),
+            Self::FocalPowerMode => (b"MwCA", 0, Some((b"M", 8))),
+            Self::Mode => (b"MMA", 0, Some((b"MMA", 4))),
+            Self::TemperatureLimits { .. } => (b"PwTA", 4, Some((b"", 7))),
+            Self::SetFocalPower(_) => (b"PwDA", 4, None),
+            Self::FocalPower => (b"PrDA", 4, Some((b"", 4))),
+            Self::Temperature => (b"TCA", 0, Some((b"TCA", 5))),
+            Self::Status => (b"Sr", 0, Some((b"S", 5))),
         }
     }
 
@@ -150,7 +140,7 @@ impl Request {
     /// # Errors
     /// If the driver reports an error, or the bytes are not such a reply.
     pub fn reply(self, bytes: &[u8]) -> Result<Option<Reply>, WireError> {
-        let Some((name, length)) = self.reply_form() else { return Err(WireError::Garbage) };
+        let (_, _, Some((name, length))) = self.form() else { return Err(WireError::Garbage) };
 
         let whole = bytes.get(..length + TRAILER);
         let values = whole.and_then(checked).and_then(|payload| payload.strip_prefix(name));
