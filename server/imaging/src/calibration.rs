@@ -89,10 +89,7 @@ impl Default for Calibration {
 impl Calibration {
     /// Whether per-pixel references, if any, are `width` x `height` sensor pixels, as a camera's frames must be.
     pub fn fits(&self, width: usize, height: usize) -> bool {
-        [&self.dark, &self.white].into_iter().all(|reference| match reference {
-            Reference::PerBand(_) => true,
-            Reference::PerPixel(frame) => frame.width() == width && frame.height() == height,
-        })
+        self.sizes().all(|size| size == (width, height))
     }
 
     /// Whether a white target was measured. Without, counts say nothing about reflectance.
@@ -109,7 +106,12 @@ impl Calibration {
 
     /// Size of its references per pixel, width and height in samples, if it has any.
     pub fn size(&self) -> Option<(usize, usize)> {
-        [&self.dark, &self.white].into_iter().find_map(|reference| match reference {
+        self.sizes().next()
+    }
+
+    /// Width and height of each reference per pixel, in samples.
+    fn sizes(&self) -> impl Iterator<Item = (usize, usize)> {
+        [&self.dark, &self.white].into_iter().filter_map(|reference| match reference {
             Reference::PerBand(_) => None,
             Reference::PerPixel(frame) => Some((frame.width(), frame.height())),
         })

@@ -14,12 +14,13 @@
 use multiversion::multiversion;
 
 use super::lanes::{LANES, Lanes, between, mixed, upper_half};
-use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
+use super::levels::{BLACK, HIGHEST, SPAN, WHITE};
 use super::luminance::{Luminance, expand};
 use super::ring::Ring;
 use crate::calibration::{BANDS, Calibration};
 use crate::colour::Encoder;
 use crate::frame::CELL;
+use crate::reconstruct::balance::LOW_BITS;
 use crate::reconstruct::{Mixes, picture_row, quarters, weights};
 use crate::ycc::{CHROMA, LUMA};
 

@@ -6,7 +6,7 @@ use super::lanes::{LANES, Lanes, upper_half};
 use super::ring::Ring;
 use crate::calibration::{BANDS, Calibration};
 use crate::frame::{CELL, GrayImage, MosaicFrame};
-use crate::reconstruct::balance::{self, PixelBalance};
+use crate::reconstruct::balance::{self, LOW_BITS, PixelBalance};
 
 /// Level of a sample as dark as the dark reference; above 0, so that noise below dark is kept.
 pub(super) const BLACK: u16 = 512;
@@ -19,10 +19,6 @@ pub(super) const HIGHEST: u16 = WHITE + (WHITE - BLACK) / 16;
 const HIGHEST_OF_GRAY: u16 = 16_383;
 /// Levels from black to white.
 pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
-
-/// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
-/// than a cast.
-pub(super) const LOW_BITS: f32 = 8_388_608.0;
 
 /// From [`PixelBalance`]'s numbers to levels: factor and summand.
 const FROM_BALANCED: (f32, f32) =

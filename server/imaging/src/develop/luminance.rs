@@ -16,8 +16,9 @@
 use multiversion::multiversion;
 
 use super::lanes::{LANES, Lanes, between, halfway, mixed, upper_half, weighted};
-use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
+use super::levels::{BLACK, HIGHEST, SPAN, WHITE};
 use super::ring::{Ring, same_bands};
+use crate::reconstruct::balance::LOW_BITS;
 
 /// A band's deviation is taken to be in proportion to a weighted sum of the band's own mean and the mean of all bands.
 /// These are the two weights. With the first alone a band deviates in proportion to its level; with the second alone

@@ -12,7 +12,7 @@ pub(crate) const WHITE: f32 = DARK + 16_384.0;
 
 /// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
 /// than a cast.
-const LOW_BITS: f32 = 8_388_608.0;
+pub(crate) const LOW_BITS: f32 = 8_388_608.0;
 
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
 #[derive(Debug, Clone)]
