@@ -76,15 +76,6 @@ pub struct SignedRank {
     pub negative: f64,
 }
 
-impl SignedRank {
-    /// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero minus that below zero
-    /// (Kerby 2014, Comprehensive Psychology 3:1). `None` if no pair differs.
-    pub fn rank_biserial(&self) -> Option<f64> {
-        let all = self.positive + self.negative;
-        (all > 0.0).then(|| (self.positive - self.negative) / all)
-    }
-}
-
 /// Tests whether paired values differ. Pairs without a difference are left out; equal differences share their mean
 /// rank. p is exact for at most 50 pairs that differ, with or without ties.
 pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
@@ -106,7 +97,8 @@ pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     }
 }
 
-/// The rank-biserial correlation of [`SignedRank::rank_biserial`] without the test, which takes much longer.
+/// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero minus that below zero
+/// (Kerby 2014, Comprehensive Psychology 3:1). `None` if no difference is other than 0.
 pub fn rank_biserial(differences: &[f64]) -> Option<f64> {
     let (ranks, positive) = signed_ranks(differences.iter().copied());
     let all: usize = ranks.iter().sum();

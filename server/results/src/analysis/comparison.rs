@@ -271,7 +271,7 @@ fn pair([a, b]: [&String; 2], of_a: &[f64], of_b: &[f64], seed: u64) -> Pair {
         p: test.p,
         method: test.method,
         p_holm: test.p,
-        rank_biserial: test.rank_biserial(),
+        rank_biserial: rank_biserial(&differences),
         rank_biserial_interval: interval(differences.len(), seed, biserial_of),
         mean_difference: mean(&differences),
         mean_difference_interval: interval(differences.len(), seed, |places| Some(mean(&drawn(places)))),
