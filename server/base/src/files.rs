@@ -92,17 +92,12 @@ pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> 
     free()?;
 
     let beside = partial(path);
-    let outcome = make(&beside).and_then(|()| {
+    let whole = make(&beside).and_then(|()| {
         // Looked at again: making it may have taken minutes.
-        let moved = free().and_then(|()| File::open(&beside)?.sync_data()).and_then(|()| fs::rename(&beside, path));
-        moved.map_err(E::from)
+        free()?;
+        Ok(File::open(&beside)?.sync_data()?)
     });
-
-    match &outcome {
-        Ok(()) => sync_folder_of(path),
-        Err(_) => drop(fs::remove_file(&beside)),
-    }
-    outcome
+    put_in_place(&beside, path, whole)
 }
 
 /// The path at which a file is written before it is moved to `path`.
@@ -112,8 +107,8 @@ fn partial(path: &Path) -> PathBuf {
 }
 
 /// Moves the file at `beside` to `path`, or removes it if writing (`written`) or moving failed.
-fn put_in_place(beside: &Path, path: &Path, written: io::Result<()>) -> io::Result<()> {
-    let moved = written.and_then(|()| fs::rename(beside, path));
+fn put_in_place<E: From<io::Error>>(beside: &Path, path: &Path, written: Result<(), E>) -> Result<(), E> {
+    let moved = written.and_then(|()| Ok(fs::rename(beside, path)?));
 
     match &moved {
         Ok(()) => sync_folder_of(path),
