@@ -159,10 +159,15 @@ async fn show(
     }
 }
 
-async fn send(to: &mut OwnedWriteHalf, message: Bytes) -> Result<(), End> {
-    match timeout(STUCK, to.write_all(&message)).await {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(_)) => Err(End::Closed),
-        Err(_) => Err(End::Stuck),
+/// Sends a message piece by piece: over a slow link a large picture takes longer than [`STUCK`], and the client takes it
+/// all the same.
+async fn send(to: &mut OwnedWriteHalf, mut message: Bytes) -> Result<(), End> {
+    while !message.is_empty() {
+        match timeout(STUCK, to.write_buf(&mut message)).await {
+            Ok(Ok(1..)) => {}
+            Ok(_) => return Err(End::Closed),
+            Err(_) => return Err(End::Stuck),
+        }
     }
+    Ok(())
 }
