@@ -22,7 +22,8 @@ pytest_plugins = ["pytester"]
 
 def pytest_configure() -> None:
     if "PARFOCAL" not in os.environ:
-        built = [ROOT / "target" / profile / "parfocal" for profile in ("release", "debug")]
+        target = ROOT / (os.environ.get("CARGO_TARGET_DIR") or "target")
+        built = [target / profile / "parfocal" for profile in ("release", "debug")]
         newest = max(
             (path for path in built if path.exists()), key=lambda path: path.stat().st_mtime, default=None
         )
