@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +115,36 @@ def test_a_file_that_does_not_belong_to_it_does_not_verify(folder: Path) -> None
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(parfocal.BadExport, match=r"notes.txt does not belong"):
         parfocal.load(folder, verify="checksums")
+
+
+def test_files_of_operating_systems_do_not_belong_to_it(folder: Path, tmp_path: Path) -> None:
+    (folder / ".DS_Store").write_bytes(b"\0")
+    (folder / "thumbs.db").write_bytes(b"\0")
+    assert list(parfocal.load(folder, verify="checksums")["comments"]["text"]) == SAID
+
+    packed = tmp_path / "packed.zip"
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("__MACOSX/export/._comments.csv", "")
+        for file in folder.iterdir():
+            archive.write(file, f"export/{file.name}")
+    assert list(parfocal.load(packed, verify="checksums")["comments"]["text"]) == SAID
+
+
+def test_a_number_beyond_63_bits_leaves_its_cell_empty_and_the_others_as_they_are(folder: Path) -> None:
+    table = folder / "comments.csv"
+    columns, *rows = csv.reader(table.read_text().splitlines())
+    frame = columns.index("frame")
+    rows[0][frame] = str((1 << 64) - 1)
+    rows[1][frame] = str((1 << 63) - 1)
+    with table.open("w", newline="") as out:
+        csv.writer(out).writerows([columns, *rows])
+    described = json.loads((folder / "datapackage.json").read_text())
+    next(one for one in described["resources"] if one["name"] == "comments")["bytes"] = table.stat().st_size
+    (folder / "datapackage.json").write_text(json.dumps(described))
+
+    frames = parfocal.load(folder)["comments"]["frame"]
+    assert frames.isna()[0]
+    assert frames[1] == (1 << 63) - 1
 
 
 def test_a_download_that_was_cut_off_is_no_export(archive: Path, tmp_path: Path) -> None:

@@ -33,19 +33,23 @@ _GROUPS = frozenset(
 # What a spreadsheet would take for the beginning of a formula; such texts have an apostrophe before them.
 _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t", "\r", "\n")  # noqa: RUF001
 
+# Largest integer of an ``Int64``.
+_MOST = (1 << 63) - 1
+
 # Tables with a row for each frame. In a study's package only the sessions' own exports have them as CSV.
 _LONG = ("telemetry", "policy_steps")
 
 
 class _Files:
-    """The files of an export, in a folder or a ZIP file."""
+    """The files of an export, in a folder or a ZIP file, without those that operating systems add."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._zip: zipfile.ZipFile | None = None
         self._prefix = ""
         if path.is_dir():
-            self.names = {file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file()}
+            below = (file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file())
+            self.names = {name for name in below if not _is_systems_own(name)}
             return
         if not path.exists():
             raise BadExport(f"There is no export at {path}. Check the path.")
@@ -56,7 +60,9 @@ class _Files:
                 f"{path} is neither an export's folder nor its ZIP file ({error}). "
                 "If it was downloaded, the download may be cut off: download it again."
             ) from error
-        names = [name for name in self._zip.namelist() if not name.endswith("/")]
+        names = [
+            name for name in self._zip.namelist() if not name.endswith("/") and not _is_systems_own(name)
+        ]
         # A ZIP file made of a folder has the folder's name in front.
         tops = {name.split("/")[0] for name in names}
         if "datapackage.json" not in names and len(tops) == 1:
@@ -72,7 +78,8 @@ class _Files:
             if self._zip is None:
                 return (self.path / name).read_bytes()
             return self._zip.read(self._prefix + name)
-        except (OSError, zipfile.BadZipFile, zlib.error) as error:
+        except (OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+            # A RuntimeError is a way of packing that Python does not know, or a passphrase.
             raise BadExport(
                 f"{self.path}: {name} cannot be read ({error}). Copy the export again."
             ) from error
@@ -81,6 +88,12 @@ class _Files:
         if self._zip is None:
             return (self.path / name).stat().st_size
         return self._zip.getinfo(self._prefix + name).file_size
+
+
+def _is_systems_own(name: str) -> bool:
+    """Whether a file is not the export's but an operating system's, as the program tells it."""
+    parts = name.lower().split("/")
+    return any(part.startswith(".") or part in ("thumbs.db", "desktop.ini") for part in parts)
 
 
 class Export(Mapping[str, pd.DataFrame]):
@@ -329,11 +342,11 @@ def _typed(texts: pd.Series[str], field: dict[str, Any], missing: list[str]) -> 
     match field.get("type"):
         case "integer":
             # Through objects: float64 would round large times in nanoseconds.
-            return pd.Series(
-                [pd.NA if no else int(text) for text, no in zip(texts, absent, strict=True)],
-                index=texts.index,
-                dtype="Int64",
-            )
+            numbers = [pd.NA if no else int(text) for text, no in zip(texts, absent, strict=True)]
+            # Only a faulty page sends a number beyond 63 bits, such as that of a frame; as in the Parquet files, the
+            # cell is empty.
+            fitting = [pd.NA if number is pd.NA or number > _MOST else number for number in numbers]
+            return pd.Series(fitting, index=texts.index, dtype="Int64")
         case "number":
             return texts.mask(absent, "nan").astype(np.float64)
         case "boolean":
