@@ -166,10 +166,11 @@ def test_what_the_program_refuses_is_its_own_sentence(tmp_path: Path) -> None:
     with pytest.raises(parfocal.NoProgram, match=r"did not start: .*Mono9"):
         FocusEnv(raw="Mono9")
     stranger = tmp_path / "parfocal"
-    stranger.write_text("#!/bin/sh\necho hello\n")
-    stranger.chmod(0o755)
-    with pytest.raises(parfocal.NoProgram, match=r"did not start"):
-        FocusEnv(program=stranger)
+    for then in ("exit", "cat >/dev/null"):
+        stranger.write_text(f"#!/bin/sh\necho hello\n{then}\n")
+        stranger.chmod(0o755)
+        with pytest.raises(parfocal.NoProgram, match=r"did not start"):
+            FocusEnv(program=stranger)
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,8 @@ class _Simulation:
         )
 
     def _said(self) -> str:
+        # It ends by itself when its pipe is closed.
+        self._requests.close()
         self._process.wait()
         self._log.seek(0)
         return self._log.read().decode(errors="replace")
