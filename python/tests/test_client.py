@@ -241,9 +241,10 @@ def test_another_server_is_named(answer: bytes, sentence: str) -> None:
             next(client.frames())
 
 
-def test_an_address_that_is_none_is_refused() -> None:
+@pytest.mark.parametrize("url", ["ftp://bench", "http://", "bench:many", "bench:80800", "http://[::1"])
+def test_an_address_that_is_none_is_refused(url: str) -> None:
     with pytest.raises(parfocal.ParfocalError, match=r"is not a server's address"):
-        Client("ftp://bench")
+        Client(url)
 
 
 def test_a_download_that_fails_leaves_no_file(course: Course, tmp_path: Path) -> None:

@@ -24,8 +24,13 @@ class Address:
     """A server's address, and the key with which it is asked."""
 
     def __init__(self, url: str, key: str | None, ca: str | Path | None) -> None:
-        parts = urlsplit(url if "//" in url else f"http://{url}")
-        if parts.scheme not in ("http", "https") or not parts.netloc:
+        try:
+            parts = urlsplit(url if "//" in url else f"http://{url}")
+            is_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+        except ValueError:
+            # A port that is no number, or brackets without an address.
+            is_address = False
+        if not is_address:
             raise ParfocalError(f"'{url}' is not a server's address; one looks like http://127.0.0.1:8080.")
         # The link that the server prints for a role has the key in it.
         in_link = parse_qs(parts.query).get("key", [None])[0]
