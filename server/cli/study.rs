@@ -16,7 +16,7 @@ use super::library::protocols;
 use super::output::{Failure, print, print_result, wait_for};
 use super::study_analysis;
 use parfocal_autofocus::Registry;
-use parfocal_base::clock::SystemClock;
+use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_records::store::{Reader, StoreError, StoredStudy};
 use parfocal_results::package::{self, PackageSource};
 use parfocal_session::conductor::Studies;
@@ -195,7 +195,7 @@ async fn show(show: &Show) -> Result<(), Failure> {
     for name in names {
         let study: Option<StoredStudy> = reader.study(&name).await?;
         let study = study.ok_or_else(|| format!("there is no study '{name}'; `parfocal study show` lists all"))?;
-        details.push(StudyDetail::of(&study));
+        details.push(StudyDetail::of(&study, &reader, SystemClock.wall()).await?);
     }
 
     match (&show.study, details.as_slice()) {
@@ -235,6 +235,13 @@ fn in_short(detail: &StudyDetail) -> String {
     }
     for concern in &detail.concerns {
         let _ = writeln!(text, "warning: {concern}");
+    }
+    if detail.outstanding > 0 {
+        let sessions = detail.outstanding;
+        let _ = writeln!(
+            text,
+            "warning: for {sessions} of its sessions, a surgeon's device may still hold comments or answers"
+        );
     }
     text
 }

@@ -33,7 +33,9 @@ async fn a_file_from_windows_keeps_its_bytes_and_has_the_same_hash_everywhere() 
     let on_page = plan(&trial, text.clone()).await;
     assert_eq!(on_page.unwrap(), STUDY);
     let expected = hex::encode(Sha256::digest(text.as_bytes()));
-    assert_eq!(detail(&trial).await.definition_sha256, expected);
+    let on_page = detail(&trial).await;
+    assert_eq!(on_page.definition_sha256, expected);
+    assert!(!on_page.concerns.is_empty());
     trial.store.close().await;
     drop(trial);
 
@@ -53,6 +55,7 @@ async fn a_file_from_windows_keeps_its_bytes_and_has_the_same_hash_everywhere() 
     run(&[&["study", "new", file.to_str().unwrap()][..], &signed].concat());
     let shown: serde_json::Value = serde_json::from_str(&run(&["study", "show", STUDY, "--json"])).unwrap();
     assert_eq!(shown["definition_sha256"], expected);
+    assert_eq!(shown["concerns"], serde_json::json!(on_page.concerns));
 }
 
 #[test]

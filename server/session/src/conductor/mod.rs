@@ -36,6 +36,7 @@ pub(crate) use erasures::words_left;
 pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use studies::Studies;
+pub(crate) use studies::{outstanding_sessions, plan_concerns};
 
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;

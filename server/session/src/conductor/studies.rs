@@ -11,9 +11,7 @@ use super::{ConductError, Library};
 use parfocal_base::boxed;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{
-    Enrolment, NewStudy, Reader, RunClocks, Store, StoreError, StoredStudy, StudyBook, StudyChange,
-};
+use parfocal_records::store::{Enrolment, NewStudy, Reader, Store, StoreError, StoredStudy, StudyBook, StudyChange};
 use parfocal_trial::allocation::Seed;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::protocol::Protocol;
@@ -110,11 +108,11 @@ impl Studies {
         let study = self.stored(name).await?;
         let state = study.state();
         let outstanding = match change {
-            Change::Lock { .. } => self.outstanding(&study).await?,
+            Change::Lock { .. } => outstanding_sessions(self.reader(), &study, self.now().await?).await?,
             _ => 0,
         };
         let concerns = match change {
-            Change::Open { .. } => self.concerns(&study).await?,
+            Change::Open { .. } => plan_concerns(self.reader(), &study).await?,
             _ => Vec::new(),
         };
         let circumstances = StudyCircumstances {
@@ -209,38 +207,12 @@ impl Studies {
         self.book.run().map(|_| self.clock.now())
     }
 
-    /// What in the plan of `study` cannot work as it is meant.
-    ///
-    /// # Errors
-    /// If the database failed.
-    pub async fn concerns(&self, study: &StoredStudy) -> Result<Vec<String>, ConductError> {
-        let mut enabled = self.reader().accounts().await?;
-        enabled.retain(|account| !account.disabled);
-        Ok(concerns(&study.definition, &enabled, &study.sites))
-    }
-
-    /// Number of sessions of `study` for which a surgeon's device may still hold something that counts.
-    pub(crate) async fn outstanding(&self, study: &StoredStudy) -> Result<usize, ConductError> {
-        let reader = self.reader();
-        let clocks = reader.run_clocks().await?;
-        let now = self.now(&clocks);
-
-        let mut outstanding = 0;
-        for enrolled in &study.sessions {
-            let Some(stored) = reader.session(enrolled.session).await? else { continue };
-            let grace = stored.grace(&clocks);
-            let left = super::outstanding(reader, &clocks, enrolled.session, grace, now).await?;
-            outstanding += usize::from(left.is_some());
-        }
-        Ok(outstanding)
-    }
-
     /// The present time, on the clock that continues over the server's restarts.
-    fn now(&self, clocks: &RunClocks) -> Timestamp {
-        match self.book.run() {
-            Some(run) => clocks.wall(run, self.clock.now()),
+    pub(crate) async fn now(&self) -> Result<Timestamp, StoreError> {
+        Ok(match self.book.run() {
+            Some(run) => self.reader().run_clocks().await?.wall(run, self.clock.now()),
             None => self.clock.wall(),
-        }
+        })
     }
 
     /// The unblinding of each session of `study` that is still blinded.
@@ -279,4 +251,27 @@ fn sites_here(definition: &Definition, wanted: &[String]) -> Result<Vec<String>,
         return Err(ConductError::Invalid(format!("the study has no site '{unknown}'; it has: {}", known.join(", "))));
     }
     Ok(if wanted.is_empty() { known } else { known.into_iter().filter(|site| wanted.contains(site)).collect() })
+}
+
+/// What in the plan of `study` cannot work as it is meant.
+pub(crate) async fn plan_concerns(reader: &Reader, study: &StoredStudy) -> Result<Vec<String>, StoreError> {
+    let mut enabled = reader.accounts().await?;
+    enabled.retain(|account| !account.disabled);
+    Ok(concerns(&study.definition, &enabled, &study.sites))
+}
+
+/// Number of sessions of `study` for which a surgeon's device may still hold something that counts at `now`.
+pub(crate) async fn outstanding_sessions(
+    reader: &Reader,
+    study: &StoredStudy,
+    now: Timestamp,
+) -> Result<usize, StoreError> {
+    let clocks = reader.run_clocks().await?;
+    let mut outstanding = 0;
+    for enrolled in &study.sessions {
+        let Some(stored) = reader.session(enrolled.session).await? else { continue };
+        let left = super::outstanding(reader, &clocks, enrolled.session, stored.grace(&clocks), now).await?;
+        outstanding += usize::from(left.is_some());
+    }
+    Ok(outstanding)
 }

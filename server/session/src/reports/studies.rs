@@ -4,10 +4,10 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::conductor::{ConductError, ProtocolSummary, Studies};
+use crate::conductor::{ConductError, ProtocolSummary, Studies, outstanding_sessions, plan_concerns};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::StoredStudy;
+use parfocal_records::store::{Reader, StoreError, StoredStudy};
 use parfocal_trial::allocation::Order;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::{PlaceRules, Site};
@@ -168,22 +168,28 @@ impl StudyDetail {
     #[boxed]
     pub async fn read(studies: &Studies, name: &str) -> Result<Self, ConductError> {
         let study = studies.stored(name).await?;
-        let mut detail = Self::of(&study);
-        if detail.line.stage == Stage::Planned {
-            detail.concerns = studies.concerns(&study).await?;
-        }
-        if detail.line.stage == Stage::Closed {
-            detail.outstanding = studies.outstanding(&study).await?;
-        }
-        Ok(detail)
+        Ok(Self::of(&study, studies.reader(), studies.now().await?).await?)
     }
 
-    /// The details of `study`; `outstanding` is 0, and `concerns` is empty.
-    pub fn of(study: &StoredStudy) -> Self {
+    /// The details of `study` at `now`.
+    ///
+    /// # Errors
+    /// If the database failed.
+    #[boxed]
+    pub async fn of(study: &StoredStudy, reader: &Reader, now: Timestamp) -> Result<Self, StoreError> {
         let definition = &study.definition;
         let line = line(study);
         let definition_sha256 = definition.sha256();
         let commitment = study.state().commitment;
+
+        let concerns = match line.stage {
+            Stage::Planned => plan_concerns(reader, study).await?,
+            _ => Vec::new(),
+        };
+        let outstanding = match line.stage {
+            Stage::Closed => outstanding_sessions(reader, study, now).await?,
+            _ => 0,
+        };
 
         let protocol =
             |protocol: &Protocol| StudyProtocol { name: protocol.name.clone(), sha256: hex::encode(protocol.sha256()) };
@@ -193,7 +199,7 @@ impl StudyDetail {
             site: site.clone(),
         };
 
-        Self {
+        Ok(Self {
             commitment_line: commitment.map(|orders| commitment_line(&line.study, &definition_sha256, &orders)),
             definition: definition.source.to_string(),
             definition_sha256,
@@ -204,12 +210,12 @@ impl StudyDetail {
             when_used_up: definition.when_used_up.clone(),
             may_unblind: definition.may_unblind.clone(),
             analysis: definition.analysis.clone(),
-            concerns: Vec::new(),
-            outstanding: 0,
+            concerns,
+            outstanding,
             study_sessions: study.sessions.clone(),
             log: log(study),
             line,
-        }
+        })
     }
 }
 
