@@ -56,6 +56,26 @@ async fn a_receiver_whose_disk_is_full_is_told_to_remove_what_arrived() {
 }
 
 #[tokio::test]
+async fn a_restore_for_which_there_is_no_room_names_the_data_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let (trial, _) = with_session(&folder.path().join("data")).await;
+    trial.store.close().await;
+    let backup = folder.path().join("backup.db");
+    let made = parfocal(&["backup", "--out", backup.to_str().unwrap()], Some(&folder.path().join("data")));
+    assert!(made.status.success(), "{}", told(&made));
+
+    // The shell's limit on the size of a file stands for a disk that is full.
+    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" restore \"$1\" --data-dir \"$2\"";
+    let elsewhere = folder.path().join("elsewhere");
+    let mut command = Command::new("sh");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_parfocal")]).arg(&backup).arg(&elsewhere);
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains(&format!("cannot use {}: ", elsewhere.display())), "{}", told(&output));
+    assert!(!elsewhere.join("parfocal.db").exists());
+}
+
+#[tokio::test]
 async fn verify_says_what_a_zip_file_and_a_database_without_its_log_are() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");

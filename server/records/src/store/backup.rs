@@ -243,7 +243,11 @@ pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Resul
     let database = folder.join(DATABASE);
 
     let copy = temporary_beside(&database)?;
-    std::fs::copy(file, copy.path()).map_err(BackupError::file(file))?;
+    std::fs::copy(file, copy.path()).map_err(|error| {
+        // Only the copy can be too large for its disk.
+        let too_large = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded, ErrorKind::FileTooLarge];
+        BackupError::file(if too_large.contains(&error.kind()) { folder } else { file })(error)
+    })?;
     make_private(copy.path()).map_err(BackupError::file(copy.path()))?;
     let head = verified(copy.path(), &file.display().to_string()).await?;
 
