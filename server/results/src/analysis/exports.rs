@@ -171,17 +171,19 @@ pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
     let definition_sha256 = sessions.first().map(|session| session.study().definition_sha256.clone());
 
     let mut notes: Vec<String> = databases.note().into_iter().collect();
-    let without: Vec<&str> = definition
-        .protocols
-        .iter()
-        .map(|one| one.name.as_str())
-        .filter(|name| !protocols.contains_key(*name))
-        .collect();
-    if !without.is_empty() {
-        notes.push(format!("No session of these protocols of the definition is here: {}.", without.join(", ")));
+    let left_out = left_out(folder)?;
+    let named = definition.protocols.iter().map(|one| one.name.as_str());
+    let without = named.filter(|name| !protocols.contains_key(*name));
+    let (withdrawn, none): (Vec<&str>, Vec<&str>) =
+        without.partition(|name| left_out.iter().any(|session| session.protocol == *name));
+    if !none.is_empty() {
+        notes.push(format!("No session of these protocols of the definition is here: {}.", none.join(", ")));
+    }
+    if !withdrawn.is_empty() {
+        // The package has nothing else of such a protocol, so nothing can be said about its questions.
+        notes.push(format!("Every session of these protocols was withdrawn: {}.", withdrawn.join(", ")));
     }
 
-    let left_out = left_out(folder)?;
     let gone = withdrawn_sessions(&sessions, &left_out);
     let mut by_protocol = Vec::new();
     for name in definition.protocols.iter().map(|one| &one.name) {
