@@ -97,8 +97,12 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     let cut = cut.map_or_else(String::new, |cut| format!("; {cut}"));
     if complaint.is_some() || !cut.is_empty() {
         let why = complaint.map_or_else(|| "cut off".to_owned(), |complaint| format!("damaged (ffmpeg: {complaint})"));
-        let count = frames.len();
-        tell(format_args!("note: {} is {why}; {count} frames of it could be read{cut}", path.display()));
+        // How many frames a longer video has is not known.
+        let count = match frames.len() {
+            count @ ..=FRAMES => format!("; {count} frames of it could be read"),
+            _ => String::new(),
+        };
+        tell(format_args!("note: {} is {why}{count}{cut}", path.display()));
     }
 
     if frames.len() > FRAMES {

@@ -127,7 +127,11 @@ impl Devices {
         loop {
             let waited = self.clock.now().since(waits_from);
             let left = TIMEOUT.checked_sub(waited).ok_or(CameraError::Timeout(TIMEOUT))?;
-            let frame = self.camera.next_frame(left)?;
+            let frame = self.camera.next_frame(left).map_err(|error| match error {
+                // The camera names the rest of the time that it was given.
+                CameraError::Timeout(_) => CameraError::Timeout(TIMEOUT),
+                error => error,
+            })?;
             if frame.exposed_at >= moment + frame.exposure {
                 return Ok(frame.image);
             }
