@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
 
+import made_up
 import numpy as np
 import pandas as pd
 import pytest
 
 import parfocal
+from parfocal import Server
 
 from .conftest import SAID, Course
 
@@ -154,6 +157,26 @@ def test_a_download_that_was_cut_off_is_no_export(archive: Path, tmp_path: Path)
         parfocal.load(part)
     with pytest.raises(parfocal.BadExport, match=r"There is no export at"):
         parfocal.load(tmp_path / "nowhere")
+
+
+def test_what_a_package_lacks_of_a_session_is_noticed(tmp_path: Path) -> None:
+    with Server(fps=10, seed=1, protocols=made_up.protocols(tmp_path / "protocols")) as server:
+        packed = made_up.study(server, tmp_path / "package.zip", surgeons=2)
+    with zipfile.ZipFile(packed) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    (package,) = (tmp_path / "unpacked").iterdir()
+    export = parfocal.load(package, verify="checksums")
+    first, second = export.sessions
+    assert set(export["telemetry"]["session"]) == {first, second}
+
+    telemetry = package / "sessions" / first / "telemetry.csv"
+    telemetry.write_bytes(b"".join(telemetry.read_bytes().splitlines(keepends=True)[:-1]))
+    with pytest.raises(parfocal.BadExport, match=rf"sessions/{first}/telemetry.csv has .* bytes instead of"):
+        parfocal.load(package)
+    shutil.rmtree(package / "sessions" / second)
+    shutil.rmtree(package / "sessions" / first)
+    with pytest.raises(parfocal.BadExport, match=r"lacks the export of session .* not complete"):
+        parfocal.load(package)
 
 
 def test_a_table_that_is_not_there_is_named_with_those_that_are(folder: Path) -> None:

@@ -104,6 +104,10 @@ def test_what_cannot_be_opened_is_refused_with_a_sentence(made: Path, tmp_path: 
     with pytest.raises(parfocal.BadRecording, match=r"not a recording that parfocal made"):
         parfocal.open_recording(copy)
     change(copy, format="parfocal-recording")
+    for damaged in (b"\xff\xfe", b"dark = [1, 2]", b"bit_depth = 'ten'", b"spectral_correction = [[1]]"):
+        (copy / "calibration" / "calibration.toml").write_bytes(damaged)
+        with pytest.raises(parfocal.BadRecording, match=r"calibration.toml cannot be read"):
+            parfocal.open_recording(copy)
     shutil.rmtree(copy / "calibration")
     with pytest.raises(parfocal.BadRecording, match=r"lacks its calibration"):
         parfocal.open_recording(copy)

@@ -291,6 +291,15 @@ def load(
     package = _package(files, "")
     export = Export(files, package)
     _check_complete(export, files)
+    if export.is_package:
+        exports = export.sessions
+        for session in export["sessions"]["session"]:
+            if session not in exports:
+                raise BadExport(
+                    f"{path} lacks the export of session {session}. The copy is not complete: copy or download the "
+                    "package again."
+                )
+            _check_complete(exports[session], files)
     if verify == "checksums":
         export.verify_checksums()
     elif verify:
@@ -323,7 +332,7 @@ def _package(files: _Files, parent: str) -> dict[str, Any]:
 def _check_complete(export: Export, files: _Files) -> None:
     """Every file that the description names is there with all its bytes."""
     for resource in export.description.get("resources", []):
-        path = resource["path"]
+        path = export._parent + resource["path"]
         if path not in files.names:
             raise BadExport(
                 f"{files.path} lacks the file {path}. The copy is not complete: copy or download the export again."

@@ -158,11 +158,15 @@ def _references(folder: Path, dataset: xr.Dataset) -> dict[str, xr.Variable]:
     file = folder / "calibration" / "calibration.toml"
     try:
         calibration = tomllib.loads(file.read_text(encoding="utf-8"))
+        return _calibrated(file, calibration, dataset)
     except FileNotFoundError:
         raise BadRecording(f"{folder} lacks its calibration ({file}). Copy the recording again.") from None
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise BadRecording(f"{file} cannot be read: {error}.") from error
+    except (OSError, ValueError, TypeError, IndexError) as error:
+        raise BadRecording(f"{file} cannot be read: {error}. Copy the recording again.") from error
 
+
+def _calibrated(file: Path, calibration: dict[str, Any], dataset: xr.Dataset) -> dict[str, xr.Variable]:
+    """Return the arrays of the calibration that was read from ``file``."""
     # The file counts bands as they are in the cell; the recording has them by wavelength.
     order = _CELL * dataset["cell_row"].to_numpy() + dataset["cell_column"].to_numpy()
     full = float((1 << int(calibration.get("bit_depth", 10))) - 1)
