@@ -8,7 +8,6 @@ import subprocess
 import threading
 from pathlib import Path
 from queue import Empty, Queue
-from types import TracebackType
 from typing import Literal
 
 from .errors import NoProgram, ParfocalError, ProgramEnded
@@ -122,9 +121,7 @@ class EmulatedLens:
     def __enter__(self) -> EmulatedLens:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _listen(self) -> None:
