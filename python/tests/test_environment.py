@@ -142,6 +142,12 @@ def test_actions_that_are_none_are_refused(actions: Any) -> None:
     envs.close()
 
 
+def test_a_kind_of_actions_that_there_is_not_is_refused() -> None:
+    options: dict[str, Any] = {"actions": "discrete"}
+    with pytest.raises(ValueError, match=r"'steps' or 'continuous', not 'discrete'"):
+        FocusEnv(**options)
+
+
 def test_a_target_that_is_not_a_number_is_refused() -> None:
     envs = FocusVectorEnv(1, actions="continuous", **FEW)
     envs.reset(seed=1)

@@ -202,6 +202,8 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
             raise ValueError("history must be 1 or more: an observation holds at least the frame itself")
         if num_envs < 1:
             raise ValueError("num_envs must be 1 or more")
+        if actions not in ("steps", "continuous"):
+            raise ValueError(f"actions must be 'steps' or 'continuous', not {actions!r}")
         chosen = [scans] if isinstance(scans, (str, os.PathLike)) else list(scans)
         options = ["--observation", observation, "--frames", str(frames), "--variety", str(variety)]
         options += ["--split", split, "--scenes", str(scenes)]
