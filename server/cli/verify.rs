@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::output::{Failure, print_result, wait_for};
 use parfocal_records::store::export::verify::{Check, Verdict, is_export, verify};
-use parfocal_records::store::{Head, verify_database};
+use parfocal_records::store::{Head, StoreError, verify_database};
 use parfocal_results::package::{check, is_package};
 
 /// Arguments of `parfocal verify`.
@@ -49,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else if is_export(path) {
         ("export", verify(path, arguments.head.as_ref()))
     } else {
-        ("database", wait_for(verify_database(path, arguments.head.clone()))??)
+        let verified = wait_for(verify_database(path, arguments.head.clone()))?;
+        ("database", verified.map_err(|error| unopened(path, error))?)
     };
 
     print_result(arguments.json, &checks, || checks.iter().map(line).collect())?;
@@ -59,6 +60,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     Err(format!("{failed} of {} checks failed: do not rely on this {what}", checks.len()).into())
+}
+
+/// Why the database at `path` was not verified.
+fn unopened(path: &Path, error: StoreError) -> Failure {
+    match error {
+        StoreError::Missing(_) => {
+            let path = path.display();
+            format!("{path} is neither an export nor a data folder; if it was one, copy it again, whole").into()
+        }
+        error => error.into(),
+    }
 }
 
 /// Whether `path` is a ZIP file, by its first bytes.

@@ -76,7 +76,7 @@ async fn a_restore_for_which_there_is_no_room_names_the_data_folder() {
 }
 
 #[tokio::test]
-async fn verify_says_what_a_zip_file_and_a_database_without_its_log_are() {
+async fn what_is_no_whole_database_is_named_and_not_taken_for_the_data_folders() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
     let (trial, _) = with_session(&data).await;
@@ -96,4 +96,15 @@ async fn verify_says_what_a_zip_file_and_a_database_without_its_log_are() {
     let output = parfocal(&["verify", zip.to_str().unwrap()], None);
     assert_eq!(output.status.code(), Some(1));
     assert!(told(&output).contains("export.zip is a ZIP file: unpack it"), "{}", told(&output));
+
+    let nothing = folder.path().join("nothing");
+    std::fs::create_dir(&nothing).unwrap();
+    let output = parfocal(&["verify", nothing.to_str().unwrap()], None);
+    assert!(told(&output).contains("nothing is neither an export nor a data folder"), "{}", told(&output));
+
+    // Nothing is said of a data folder, which may be well.
+    let output = parfocal(&["restore", zip.to_str().unwrap()], Some(&folder.path().join("elsewhere")));
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains("export.zip does not verify: "), "{}", told(&output));
+    assert!(!told(&output).contains("data folder"), "{}", told(&output));
 }

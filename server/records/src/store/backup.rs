@@ -360,7 +360,11 @@ fn sibling(path: &Path, suffix: &str) -> PathBuf {
 
 /// Verifies the copy at `path` and returns its head. Errors call it `what`.
 async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
-    let snapshot = Reader::open_snapshot(path).await?;
+    let snapshot = Reader::open_snapshot(path).await.map_err(|error| match error {
+        // It would speak of the data folder, which may be well.
+        StoreError::Damaged(problem) => BackupError::Unsound { what: what.to_owned(), problem },
+        error => error.into(),
+    })?;
     let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {
         Check { verdict: Verdict::Failed(problem), .. } => Some(problem),
         _ => None,
