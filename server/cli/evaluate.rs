@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
+use serde::Serialize;
 
 use super::input::without_systems_own;
 use super::library;
@@ -122,13 +123,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
 
     let (report, outcomes) = merge(shards)?;
+    give(arguments, &report, || report.markdown(), |folder| report.write(&outcomes, folder))
+}
 
-    // Do both even if one fails, so that the other still has the results.
-    let written = arguments
-        .out
-        .as_ref()
-        .map_or(Ok(()), |folder| report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error)));
-    print_result(arguments.json, &report, || report.markdown())?;
+/// Writes and prints the results. Does both even if one fails, so that the other still has them.
+fn give(
+    arguments: &Arguments,
+    report: &impl Serialize,
+    markdown: impl FnOnce() -> String,
+    write: impl FnOnce(&Path) -> std::io::Result<()>,
+) -> Result<(), Failure> {
+    let written = match &arguments.out {
+        Some(folder) => write(folder).map_err(|error| unwritable(folder, &error)),
+        None => Ok(()),
+    };
+    print_result(arguments.json, report, markdown)?;
     Ok(written?)
 }
 
@@ -264,11 +273,7 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     })?;
     bar.finish_and_clear();
 
-    if let Some(folder) = &arguments.out {
-        report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error))?;
-    }
-
-    print_result(arguments.json, &report, || report.markdown())
+    give(arguments, &report, || report.markdown(), |folder| report.write(&outcomes, folder))
 }
 
 /// The requested policies, each once.

@@ -45,6 +45,11 @@ pub fn save(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     replace(path, bytes).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }
 
+/// Writes a plot to the SVG file `path`, whole or not at all.
+pub fn save_plot(path: &Path, svg: &str) -> Result<(), Failure> {
+    replace(path, svg.as_bytes()).map_err(|error| format!("cannot save the plot to {}: {error}", path.display()).into())
+}
+
 /// A table of `rows` as CSV.
 pub fn csv<R: Serialize>(rows: impl IntoIterator<Item = Result<R, Failure>>) -> Result<Vec<u8>, Failure> {
     let mut table = csv::Writer::from_writer(Vec::new());

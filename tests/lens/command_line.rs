@@ -52,6 +52,16 @@ fn the_command_line_fails_with_one_sentence() {
     assert_eq!(errors, "parfocal: the lens does not answer: /dev/null: this is not a serial port\n");
 }
 
+#[test]
+fn a_plot_that_cannot_be_saved_costs_no_measurement() {
+    let plot = ["--plot", "/dev/null/sweep.svg"];
+    let sweep = ["sweep", "--steps", "2", "--lens", "simulated", "--json"];
+    let (success, output, errors) = command_line(&[&sweep[..], &plot].concat());
+    let stops: serde_json::Value = serde_json::from_str(&output).unwrap();
+    assert_eq!(stops.as_array().unwrap().len(), 4);
+    assert!(!success && errors.contains("cannot save the plot to /dev/null/sweep.svg"), "{errors}");
+}
+
 /// A running `parfocal lens emulate`, into which the test types commands.
 struct Emulated {
     process: Child,
@@ -119,6 +129,11 @@ fn an_emulated_driver_can_be_started_from_the_command_line() {
     assert!(emulated.port.ends_with("usb-Optotune_LD_Optotune_LD_EMUL0042-if00"));
     let info = lens::open(&emulated.spec(), Arc::new(SystemClock)).unwrap().info().unwrap();
     assert_eq!((info.serial.as_str(), info.firmware.as_str()), ("EMUL0042", "type C, version 1.8.3.1"));
+
+    // A letter that is not UTF-8 is no command, and what is typed after it is one.
+    emulated.process.stdin.as_ref().unwrap().write_all(b"\xe4\n").unwrap();
+    assert!(emulated.answers.any(|line| line.unwrap().starts_with("Ctrl-C")), "says again what can be typed");
+    assert_eq!(emulated.types("plug-in"), "done");
 
     let process = rustix::process::Pid::from_child(&emulated.process);
     rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();

@@ -81,11 +81,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     progress.finish_and_clear();
 
     let report = Report::new(&measured, info, clock.as_ref());
-    if let Some(folder) = &arguments.out {
-        save(folder, &report, &measured)?;
-    }
-
-    print_result(arguments.which.json, &report, || report.text())
+    // A folder that cannot be written costs nobody the measurement.
+    let saved = arguments.out.as_ref().map_or(Ok(()), |folder| save(folder, &report, &measured));
+    print_result(arguments.which.json, &report, || report.text())?;
+    saved
 }
 
 impl Report {

@@ -1,15 +1,14 @@
 //! `parfocal lens sweep`: requested positions against those read back, over the range, as a table and a plot.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::which::{LensChoice, dioptre, go};
-use crate::cli::output::{Failure, print_result};
+use crate::cli::output::{Failure, print_result, save_plot};
 use parfocal_base::FocalPower;
-use parfocal_base::files::replace;
 use parfocal_base::plot::{Axis, Plot};
 
 /// Arguments of `parfocal lens sweep`.
@@ -37,10 +36,10 @@ struct Stop {
 /// Sweeps up and down.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stops = measure(arguments)?;
-    if let Some(path) = &arguments.plot {
-        save(path, &plot(&stops))?;
-    }
-    print_result(arguments.which.json, &stops, || table(&stops))
+    // A plot that cannot be saved costs nobody the measurement.
+    let saved = arguments.plot.as_ref().map_or(Ok(()), |path| save_plot(path, &plot(&stops)));
+    print_result(arguments.which.json, &stops, || table(&stops))?;
+    saved
 }
 
 fn measure(arguments: &Arguments) -> Result<Vec<Stop>, Failure> {
@@ -97,9 +96,4 @@ fn plot(stops: &[Stop]) -> String {
     let name = format!("read back; largest difference {:.3} dpt", worst(stops));
     panel.dots(&name, "#0a58ca", stops.iter().map(|stop| (stop.asked_dioptre, stop.read_back_dioptre)));
     plot.svg()
-}
-
-fn save(path: &Path, text: &str) -> Result<(), Failure> {
-    replace(path, text.as_bytes())
-        .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()).into())
 }

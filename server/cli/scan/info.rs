@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::cli::output::{Failure, bar_of_poses, print_result};
-use parfocal_base::files::replace;
+use crate::cli::output::{Failure, bar_of_poses, print_result, save_plot};
 use parfocal_base::plot::{Axis, Plot};
 use parfocal_devices::camera::recorded::{Damage, Image, ScanFolder, poses};
 use parfocal_learning::scans::stack::optics::StackOptics;
@@ -87,12 +86,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let damages: Vec<Damage> = checked.into_iter().flat_map(|(_, damages)| damages).collect();
     let info = info(&scan, bytes, &damages);
 
-    if let Some(path) = &arguments.out {
-        replace(path, picture(&scan).as_bytes())
-            .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()))?;
-    }
-
+    // A plot that cannot be saved costs nobody what was found.
+    let saved = arguments.out.as_ref().map_or(Ok(()), |path| save_plot(path, &picture(&scan)));
     print_result(arguments.json, &info, || text(&info))?;
+    saved?;
 
     if let Some(damage) = damages.first() {
         let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
