@@ -43,8 +43,9 @@ pub fn number(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String
 /// the process: reading a terminal cannot be interrupted.
 pub fn hear_lines(take: impl Fn(String) -> bool + Send + 'static) {
     std::thread::spawn(move || {
-        let lines = std::io::stdin().lock().lines();
-        lines.map_while(Result::ok).all(take)
+        // Letters that are not UTF-8 are typed, too, and do not close the terminal.
+        let lines = std::io::stdin().lock().split(b'\n').map_while(Result::ok);
+        lines.map(|line| String::from_utf8_lossy(&line).into_owned()).all(take)
     });
 }
 
