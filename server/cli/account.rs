@@ -8,6 +8,7 @@ use std::sync::Arc;
 use clap::{Args, Subcommand};
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 
+use super::interrupt::undo_before_the_end;
 use super::output::{Failure, print, print_json, wait_for};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
@@ -210,6 +211,12 @@ struct HiddenInput {
 impl HiddenInput {
     fn begin() -> Result<Self, Failure> {
         let before = tcgetattr(std::io::stdin())?;
+        // Ctrl-C must not leave a terminal on which nothing is shown any more.
+        let shown = before.clone();
+        undo_before_the_end(move || {
+            let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &shown);
+        })?;
+
         let mut silent = before.clone();
         silent.local_modes.remove(LocalModes::ECHO);
         tcsetattr(std::io::stdin(), OptionalActions::Now, &silent)?;

@@ -24,7 +24,15 @@ fn end_by(signal: i32) {
 /// # Errors
 /// If the system cannot provide a thread or a signal handler.
 pub fn let_lenses_go_first() -> io::Result<()> {
-    listen(&[SIGINT, SIGTERM, SIGHUP, SIGQUIT])
+    undo_before_the_end(|| {})
+}
+
+/// The same, and calls `undo` before that.
+///
+/// # Errors
+/// If the system cannot provide a thread or a signal handler.
+pub fn undo_before_the_end(undo: impl Fn() + Clone + Send + 'static) -> io::Result<()> {
+    listen(&[SIGINT, SIGTERM, SIGHUP, SIGQUIT], undo)
 }
 
 /// The same without SIGINT, for commands that handle Ctrl-C with an [`Interrupt`].
@@ -32,17 +40,19 @@ pub fn let_lenses_go_first() -> io::Result<()> {
 /// # Errors
 /// If the system cannot provide a thread or a signal handler.
 pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
-    listen(&[SIGTERM, SIGHUP, SIGQUIT])
+    listen(&[SIGTERM, SIGHUP, SIGQUIT], || {})
 }
 
-fn listen(ending: &[i32]) -> io::Result<()> {
+fn listen(ending: &[i32], undo: impl Fn() + Clone + Send + 'static) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let within = runtime.enter();
 
     for &ending in ending {
         let mut heard = signal(SignalKind::from_raw(ending))?;
+        let undo = undo.clone();
         runtime.spawn(async move {
             heard.recv().await;
+            undo();
             end_by(ending);
         });
     }

@@ -1,6 +1,11 @@
 //! Personal accounts: making and changing them, signing in, and the account names beside records.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::net::{IpAddr, Ipv4Addr};
+use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use parfocal_records::accounts::{AccountError, Cost, Passphrase, Token};
@@ -10,6 +15,9 @@ use parfocal_records::store::{Access, AccessLog, verify_database};
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole, Actor};
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
+use rustix::process::{Pid, Signal, kill_process};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{LocalModes, tcgetattr};
 
 use crate::chain::{after, said};
 use crate::exports::{failed, rows};
@@ -224,4 +232,30 @@ async fn whatever_is_changed_of_accounts_in_a_database_is_found() {
         let found = said(&checks, "chain").expect_err(sql);
         assert!(found.contains(expected), "{sql}: {found}");
     }
+}
+
+#[tokio::test]
+async fn a_passphrase_that_is_not_typed_to_its_end_leaves_a_terminal_that_shows_what_is_typed() {
+    let folder = tempfile::tempdir().unwrap();
+    Trial::start(folder.path()).await.store.close().await;
+
+    let controller = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&controller).unwrap();
+    unlockpt(&controller).unwrap();
+    let path = ptsname(&controller, Vec::new()).unwrap().into_string().unwrap();
+    let terminal = File::options().read(true).write(true).custom_flags(libc::O_NOCTTY).open(path).unwrap();
+    let shows = || tcgetattr(&terminal).unwrap().local_modes.contains(LocalModes::ECHO);
+    assert!(shows());
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.args(["account", "add", "a.turing", "--role", "lead", "--data-dir"]).arg(folder.path());
+    command.stdin(terminal.try_clone().unwrap()).stderr(Stdio::piped());
+    let mut process = command.spawn().unwrap();
+    let mut asked = String::new();
+    BufReader::new(process.stderr.take().unwrap()).read_line(&mut asked).unwrap();
+    assert!(asked.contains("passphrase") && !shows(), "{asked}");
+
+    kill_process(Pid::from_child(&process), Signal::INT).unwrap();
+    assert_eq!(process.wait().unwrap().signal(), Some(Signal::INT.as_raw()));
+    assert!(shows());
 }
