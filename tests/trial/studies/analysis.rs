@@ -262,6 +262,36 @@ async fn a_package_is_analysed_like_its_database_and_a_joined_one_has_all_surgeo
 }
 
 #[tokio::test]
+async fn a_package_names_a_protocol_of_which_every_session_was_withdrawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    std::fs::create_dir_all(&data).unwrap();
+    let second = PROTOCOL.replace("name = \"pair\"", "name = \"second\"");
+    std::fs::write(data.join("second.toml"), &second).unwrap();
+    let hash = hex::encode(Protocol::parse(&second, "second.toml", &crate::fixture::known()).unwrap().sha256());
+
+    let mut trial = a_trial(&data).await;
+    let listed = format!("[[protocols]]\nname = \"second\"\nsha256 = \"{hash}\"\n\n[[sites]]\nname = \"leeds\"");
+    plan(&trial, definition().replace("[[sites]]\nname = \"leeds\"", &listed)).await.unwrap();
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
+    whole(&mut trial, "S-02", "leeds").await;
+
+    let place = StudyPlace { study: STUDY.to_owned(), site: "leeds".to_owned() };
+    let session = trial.conductor.create(Role::Operator, "S-03", "second", Some(place)).await.unwrap();
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "tired".to_owned() }).await.unwrap();
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    change(&trial, Change::Withdraw { session }).await.unwrap();
+    to_the_end(&trial).await;
+    trial.store.close().await;
+
+    let package = folder.path().join("package");
+    exported(&data, &package);
+    let notes = of_package(&package)["notes"].to_string();
+    assert!(notes.contains("Every session of these protocols was withdrawn: second."), "{notes}");
+    assert!(!notes.contains("No session of these protocols"), "{notes}");
+}
+
+#[tokio::test]
 async fn the_report_and_the_folder_of_a_package_have_each_site_and_need_no_database() {
     let folder = tempfile::tempdir().unwrap();
     let [_, _, joined] = two_sites(folder.path()).await;
