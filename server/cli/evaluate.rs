@@ -21,7 +21,7 @@ use parfocal_devices::simulation::phantom::Trajectory;
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::evaluation::evaluate;
 use parfocal_learning::evaluation::report::EvaluatedScans;
-use parfocal_learning::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
+use parfocal_learning::evaluation::shard::{Part, PartOf, Shard, merge, no_shard};
 use parfocal_learning::evaluation::stacks::{Blur, FIRST_SEED, SEEDS, evaluate_stacks};
 use parfocal_learning::scans::ScanSet;
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
@@ -240,7 +240,7 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
 fn read_shard(file: &Path) -> Result<(String, Shard), Failure> {
     let name = file.display().to_string();
     let text = std::fs::read(file).map_err(|error| format!("cannot read the shard {name}: {error}"))?;
-    let shard = serde_json::from_slice(&text).map_err(|_| MergeError::no_shard(&name))?;
+    let shard = serde_json::from_slice(&text).map_err(|_| no_shard(&name))?;
     Ok((name, shard))
 }
 

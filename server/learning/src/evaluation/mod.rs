@@ -10,12 +10,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::delay::{delay_of, late_error};
+use crate::LearningError;
 use crate::scans::ScanSet;
+use parfocal_autofocus::Registry;
 use parfocal_autofocus::networks::compute_on_this_thread;
-use parfocal_autofocus::{PolicyError, Registry};
 use parfocal_base::PolicyName;
 use parfocal_base::statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, wilcoxon};
-use rollout::{NoTarget, Path, PathFigures, Sureness, roll_out, roll_out_oracle, sharpest};
+use rollout::{Path, PathFigures, Sureness, roll_out, roll_out_oracle, sharpest};
 
 /// Name of the policy that knows the next optimum.
 pub const ORACLE: &str = "oracle";
@@ -105,24 +106,6 @@ pub struct Comparison {
     pub p_holm: f64,
 }
 
-/// Why an evaluation ended without figures.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluateError {
-    /// A policy is unknown or cannot run.
-    #[error(transparent)]
-    Policy(#[from] PolicyError),
-    /// A policy gave up.
-    #[error("policy '{policy}' failed on scan {scan}: {error}; repair it, or evaluate without it")]
-    NoTarget {
-        /// The policy.
-        policy: PolicyName,
-        /// The scan, from 1.
-        scan: usize,
-        /// When, and what it answered.
-        error: NoTarget,
-    },
-}
-
 /// Runs the oracle and then the named policies over `scans`, several scans at once if there are cores for it.
 /// `progress` is called after each policy's scan.
 ///
@@ -133,7 +116,7 @@ pub fn evaluate(
     policies: &[PolicyName],
     scans: &dyn ScanSet,
     progress: &(dyn Fn(&str) + Sync),
-) -> Result<Vec<Outcome>, EvaluateError> {
+) -> Result<Vec<Outcome>, LearningError> {
     let count = scans.count();
     let parts = scans.parts();
 
@@ -154,12 +137,17 @@ pub fn evaluate(
             let mut scan = scans.scan(index).0;
             let path = roll_out(registry.build(name)?.as_mut(), scan.as_mut(), &sharpest[index]);
             progress(name.as_str());
-            path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
+            path.map_err(|error| {
+                let scan = index + 1;
+                LearningError::new(format!(
+                    "policy '{name}' failed on scan {scan}: {error}; repair it, or evaluate without it"
+                ))
+            })
         };
 
         // All results are collected first. So if several scans fail, the first of them is reported, in whatever order
         // the cores ran them.
-        let paths: Vec<Result<_, EvaluateError>> = (0..count).into_par_iter().map(run).collect();
+        let paths: Vec<Result<_, LearningError>> = (0..count).into_par_iter().map(run).collect();
         let paths = paths.into_iter().collect::<Result<_, _>>()?;
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });
     }

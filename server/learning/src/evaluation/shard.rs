@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::report::{EvaluatedScans, EvaluationReport};
 use super::rollout::Path;
 use super::{Outcome, ScanSet, compare};
+use crate::LearningError;
 use crate::scans::FocalTimeScan;
-use crate::scans::detail::{NothingToFocusOn, warning};
+use crate::scans::detail::warning;
 
 const FORMAT: &str = "parfocal-evaluation-shard";
 /// Most stretches into which a path is cut.
@@ -104,28 +105,6 @@ pub struct Shard {
     pub outcomes: Vec<Outcome>,
 }
 
-/// Why shards cannot be merged.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct MergeError(String);
-
-impl MergeError {
-    /// The file called `name` is not a shard.
-    pub fn no_shard(name: &str) -> Self {
-        Self(format!("{name} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote"))
-    }
-
-    fn missing(shards: &str) -> Self {
-        Self(format!("shards are missing: {shards}; run `parfocal evaluate --shard` for them, with the same arguments"))
-    }
-}
-
-impl From<NothingToFocusOn> for MergeError {
-    fn from(error: NothingToFocusOn) -> Self {
-        Self(error.to_string())
-    }
-}
-
 impl Shard {
     /// The results on `part` of the scans of `subject`.
     pub fn new(part: Part, subject: EvaluatedScans, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
@@ -166,13 +145,26 @@ impl Shard {
     }
 }
 
+/// The error that the file called `name` is not a shard.
+pub fn no_shard(name: &str) -> LearningError {
+    LearningError::new(format!(
+        "{name} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote"
+    ))
+}
+
+fn incomplete(missing: &str) -> LearningError {
+    LearningError::new(format!(
+        "shards are missing: {missing}; run `parfocal evaluate --shard` for them, with the same arguments"
+    ))
+}
+
 /// Merges `shards`, each with the name of its file, into one report and each policy's paths.
 ///
 /// # Errors
 /// If they belong to several evaluations, some are missing, or there was nothing to focus on.
-pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<Outcome>), MergeError> {
+pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<Outcome>), LearningError> {
     if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
-        return Err(MergeError::no_shard(name));
+        return Err(no_shard(name));
     }
 
     shards.sort_by_key(|(_, shard)| shard.part.index);
@@ -181,24 +173,27 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
         if let Some(what) = a.difference(b) {
-            return Err(MergeError(format!(
+            return Err(LearningError::new(format!(
                 "{first} and {second} are shards of different evaluations: they differ in {what}"
             )));
         }
         if a.part == b.part {
-            return Err(MergeError(format!("{first} and {second} are both shard {}; give each shard once", a.part)));
+            return Err(LearningError::new(format!(
+                "{first} and {second} are both shard {}; give each shard once",
+                a.part
+            )));
         }
     }
 
     let Some(Part { of, .. }) = shards.first().map(|(_, shard)| shard.part) else {
-        return Err(MergeError::missing("all"));
+        return Err(incomplete("all"));
     };
 
     let present = |part: &Part| shards.iter().any(|(_, shard)| shard.part == *part);
     let missing = (1..=of).map(|index| Part { index, of }).filter(|part| !present(part));
     let missing: Vec<String> = missing.take(100).map(|part| part.to_string()).collect();
     if !missing.is_empty() {
-        return Err(MergeError::missing(&missing.join(", ")));
+        return Err(incomplete(&missing.join(", ")));
     }
 
     let shards: Vec<Shard> = shards.into_iter().map(|(_, shard)| shard).collect();

@@ -11,9 +11,10 @@ use serde::Serialize;
 
 use super::delay::delay_of;
 use super::report::{figure, frames_late};
-use super::{EvaluateError, ORACLE, Outcome, Reliance, Row, evaluate};
+use super::{ORACLE, Outcome, Reliance, Row, evaluate};
+use crate::LearningError;
 use crate::scans::stack::drift::{StackCourse, StackScans};
-use crate::scans::stack::source::{ScaledStack, StackSource, UnfitStack};
+use crate::scans::stack::source::{ScaledStack, StackSource};
 use parfocal_autofocus::Registry;
 use parfocal_base::files::replace;
 use parfocal_base::notices::tell;
@@ -84,12 +85,11 @@ fn folders(source: &StackSource) -> Vec<String> {
 }
 
 /// Makes [`SEEDS`] courses over `source`, which is called `name`, at each scale.
-fn items(name: &str, source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Vec<Item>, UnfitStack> {
+fn items(name: &str, source: &StackSource, first_seed: u64, blur: Option<Blur>) -> Result<Vec<Item>, LearningError> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
-        let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
-        let scans = StackScans(courses.ok_or_else(too_small)?);
+        let scans = StackScans(courses.ok_or_else(|| source.too_small(scaled.planes))?);
         let blur = match blur {
             None => None,
             Some(Blur::Rate(rate)) => Some(rate),
@@ -171,7 +171,7 @@ pub fn evaluate_stacks(
     seed: u64,
     blur: Option<Blur>,
     progress: &(dyn Fn(&str) + Sync),
-) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
+) -> Result<(StackReport, Vec<Vec<Outcome>>), LearningError> {
     let mut policies = policies.to_vec();
     for baseline in [STRONG_BASELINE, BASELINE].map(PolicyName::new) {
         if !policies.contains(&baseline) {
@@ -197,17 +197,6 @@ pub fn evaluate_stacks(
 
     let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks, &all)).collect();
     Ok((StackReport { seed, stacks, standings }, all))
-}
-
-/// Why the benchmark ended without figures.
-#[derive(Debug, thiserror::Error)]
-pub enum StackReportError {
-    /// A stack cannot be used.
-    #[error(transparent)]
-    Stack(#[from] UnfitStack),
-    /// A policy cannot run.
-    #[error(transparent)]
-    Evaluate(#[from] EvaluateError),
 }
 
 /// The standing of `policy` over `stacks`, with each stack's `outcomes`; `None` if a row is missing.

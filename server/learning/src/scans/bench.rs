@@ -10,9 +10,10 @@ use super::planes::PlaneStack;
 use super::recorded::{Kept, RecordedScan};
 use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
-use super::stack::source::{StackSource, UnfitStack};
+use super::stack::source::StackSource;
+use crate::LearningError;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::recorded::{HEADER, ScanError, ScanFolder};
+use parfocal_devices::camera::recorded::{HEADER, ScanFolder};
 use parfocal_imaging::PixelFormat;
 
 /// One folder in this many is kept for validation.
@@ -36,23 +37,6 @@ pub struct BenchScenes {
     pub sha256: String,
 }
 
-/// Why a bench's recordings cannot be trained on.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// There is no such folder.
-    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or focal stacks (pictures, or a TIFF)")]
-    NoFolder(String),
-    /// A recorded scan cannot be read.
-    #[error(transparent)]
-    Scan(#[from] ScanError),
-    /// A recorded scan has only one pose.
-    #[error("the scan {0} has only one pose; to use its pictures as a focal stack, name the folder that holds them")]
-    OnePose(String),
-    /// A focal stack cannot be used.
-    #[error(transparent)]
-    Stack(#[from] UnfitStack),
-}
-
 impl BenchScenes {
     /// Reads the recordings in `folders`. Each is a recorded scan or a focal stack. For a stack, `DIR:PLANES` says how
     /// many planes make the range 0..=1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of
@@ -60,7 +44,7 @@ impl BenchScenes {
     ///
     /// # Errors
     /// If a folder is missing, or what is in it cannot be used.
-    pub fn read(folders: &[String], raw: Option<PixelFormat>) -> Result<Self, BenchError> {
+    pub fn read(folders: &[String], raw: Option<PixelFormat>) -> Result<Self, LearningError> {
         let read: Vec<(Vec<Scene>, Vec<String>)> =
             folders.par_iter().map(|folder| recording(folder, raw)).collect::<Result<_, _>>()?;
         let (recordings, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
@@ -93,18 +77,24 @@ impl BenchScenes {
 }
 
 /// The scenes of one folder, and what is doubtful about its pictures.
-fn recording(folder: &str, raw: Option<PixelFormat>) -> Result<(Vec<Scene>, Vec<String>), BenchError> {
+fn recording(folder: &str, raw: Option<PixelFormat>) -> Result<(Vec<Scene>, Vec<String>), LearningError> {
     if Path::new(folder).join(HEADER).exists() {
         let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Surroundings, &|| ())?;
         if scan.poses().len() < 2 {
-            return Err(BenchError::OnePose(folder.to_owned()));
+            return Err(LearningError::new(format!(
+                "the scan {folder} has only one pose; to use its pictures as a focal stack, name the folder that holds \
+                 them"
+            )));
         }
         return Ok((vec![Scene::Recorded(Arc::new(scan))], Vec::new()));
     }
 
     let source = StackSource::parse(folder, raw);
     if !source.folder.exists() {
-        return Err(BenchError::NoFolder(folder.to_owned()));
+        return Err(LearningError::new(format!(
+            "there is no folder {folder}; name folders of recorded scans (scan.json) or focal stacks (pictures, or a \
+             TIFF)"
+        )));
     }
 
     let (scaled, doubts) = source.at_scales()?;
@@ -117,7 +107,7 @@ fn recording(folder: &str, raw: Option<PixelFormat>) -> Result<(Vec<Scene>, Vec<
 
         let (planes, (first, last)) = (stack.planes, stack.pictures.range());
         if planes < 3 || planes as f64 > last - first + 1.0 {
-            return Err(UnfitStack::TooSmall { folder: source.folder, planes }.into());
+            return Err(source.too_small(planes));
         }
 
         let smaller = stack.smaller(SMALLER);

@@ -3,12 +3,11 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::clip::ClipError;
 use super::pictures::{Split, reference};
-use super::planes::PlanesError;
 use super::simulated::{Scan, ScanSettings, Scene};
 use super::variety::Variety;
 use super::{FocalTimeScan, ScanSet, relief};
+use crate::LearningError;
 
 /// Frames of a scan: the paper's 10 s at 25 a second.
 pub const FRAMES: usize = 250;
@@ -51,7 +50,7 @@ impl Benchmark {
     ///
     /// # Errors
     /// None in practice: its pictures are large enough.
-    pub fn reference(count: usize) -> Result<Self, ClipError> {
+    pub fn reference(count: usize) -> Result<Self, LearningError> {
         let scenes = reference(Split::Test, count.min(COUNT) as u64)?.into_iter().map(Scene::Flat).collect();
         let conditions = Conditions::Fitting;
         Ok(Self { scenes, conditions, seed: SEED, count, frames: FRAMES })
@@ -62,7 +61,7 @@ impl Benchmark {
     ///
     /// # Errors
     /// None in practice: its scenes are large enough.
-    pub fn relief(count: usize) -> Result<Self, PlanesError> {
+    pub fn relief(count: usize) -> Result<Self, LearningError> {
         let scenes =
             relief::deep_scenes(Split::Test, count.min(RELIEFS) as u64)?.into_iter().map(Scene::Stack).collect();
         Ok(Self { scenes, conditions: Conditions::Fitting, seed: SEED, count, frames: FRAMES })

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use sha2::{Digest, Sha256};
 
+use crate::LearningError;
 use parfocal_imaging::{GrayImage, reduced};
 
 /// Sharp pictures in order of time, one for a still, and where patches may lie on them.
@@ -28,42 +29,17 @@ pub struct Area {
     pub bottom: usize,
 }
 
-/// Why pictures cannot be made into a scan.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ClipError {
-    /// There is no picture at all.
-    #[error("there are no pictures to scan")]
-    Empty,
-    /// A patch and its surroundings do not fit.
-    #[error(
-        "pictures must show at least 64x64 pixels to scan, in the square within their content area \
-         where they have one; these show {width}x{height}"
-    )]
-    TooSmall {
-        /// Usable width in pixels.
-        width: usize,
-        /// Usable height in pixels.
-        height: usize,
-    },
-    /// The pictures differ in size.
-    #[error("picture {index} differs in size from the first one")]
-    SizesDiffer {
-        /// Index of the picture, from 0.
-        index: usize,
-    },
-}
-
 impl Clip {
     /// A clip of `frames`. Patches stay within `area`; if it is `None`, they may lie anywhere.
     ///
     /// # Errors
     /// If there is no frame, sizes differ, or less than 64x64 pixels can be used.
-    pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, ClipError> {
-        let first = frames.first().ok_or(ClipError::Empty)?;
+    pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, LearningError> {
+        let first = frames.first().ok_or_else(|| LearningError::new("there are no pictures to scan"))?;
         let size = (first.width, first.height);
 
         if let Some(index) = frames.iter().position(|frame| (frame.width, frame.height) != size) {
-            return Err(ClipError::SizesDiffer { index });
+            return Err(LearningError::new(format!("picture {index} differs in size from the first one")));
         }
 
         let area = area.unwrap_or(Area { left: 0, top: 0, right: size.0, bottom: size.1 });
@@ -71,7 +47,10 @@ impl Clip {
         let width = area.right.saturating_sub(area.left);
         let height = area.bottom.saturating_sub(area.top);
         if width < 64 || height < 64 {
-            return Err(ClipError::TooSmall { width, height });
+            return Err(LearningError::new(format!(
+                "pictures must show at least 64x64 pixels to scan, in the square within their content area where they \
+                 have one; these show {width}x{height}"
+            )));
         }
 
         let coarse = vec![OnceLock::new(); frames.len()];
@@ -82,7 +61,7 @@ impl Clip {
     ///
     /// # Errors
     /// If it is smaller than 64x64 pixels.
-    pub fn still(picture: GrayImage) -> Result<Self, ClipError> {
+    pub fn still(picture: GrayImage) -> Result<Self, LearningError> {
         Self::new(vec![Arc::new(picture)], None)
     }
 
@@ -144,9 +123,11 @@ mod tests {
 
     #[test]
     fn unusable_pictures_are_refused() {
-        assert_eq!(Clip::new(Vec::new(), None).unwrap_err(), ClipError::Empty);
+        let error = Clip::new(Vec::new(), None).unwrap_err().to_string();
+        assert!(error.contains("no pictures"), "{error}");
         let small = GrayImage::new(70, 20, vec![0.0; 1400]).unwrap();
-        assert_eq!(Clip::still(small).unwrap_err(), ClipError::TooSmall { width: 70, height: 20 });
+        let error = Clip::still(small).unwrap_err().to_string();
+        assert!(error.ends_with("these show 70x20"), "{error}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::LearningError;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
 use parfocal_autofocus::mgm;
@@ -13,14 +14,6 @@ const MOST_NOISE: f32 = 16.0;
 /// Least ratio of the mean gradient magnitude in focus to that far out of focus. Shading, from a lamp or at the rim of
 /// a lens, looks the same in both.
 const LEAST_PEAK: f64 = 1.2;
-
-/// No scan shows anything to focus on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is nothing to focus on: even the sharpest patch shows no detail in any of {0} scans; \
-     use pictures of something with texture, taken in focus"
-)]
-pub struct NothingToFocusOn(pub usize);
 
 /// Number of scans in `set` without detail: in no frame does even the sharpest patch show any.
 pub fn without_detail(set: &dyn ScanSet) -> usize {
@@ -35,9 +28,12 @@ pub fn without_detail(set: &dyn ScanSet) -> usize {
 ///
 /// # Errors
 /// If all scans are without detail.
-pub fn warning(blank: usize, count: usize) -> Result<Option<String>, NothingToFocusOn> {
+pub fn warning(blank: usize, count: usize) -> Result<Option<String>, LearningError> {
     if blank == count {
-        return Err(NothingToFocusOn(count));
+        return Err(LearningError::new(format!(
+            "there is nothing to focus on: even the sharpest patch shows no detail in any of {count} scans; use \
+             pictures of something with texture, taken in focus"
+        )));
     }
     let percent = 100.0 * blank as f64 / count as f64;
     let words =

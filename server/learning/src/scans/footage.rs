@@ -1,10 +1,11 @@
 //! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures of at most 480
 //! lines.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-use super::clip::{Area, Clip, ClipError};
+use super::clip::{Area, Clip};
+use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{self, SQUARE_PIXELS, cut_off, ffmpeg, is_picture, read_picture};
 use parfocal_imaging::{ContentArea, GrayImage, Reconstructor, content_area, reduced};
@@ -14,49 +15,25 @@ const LINES: usize = 480;
 /// Most frames taken of one video: a minute at 25 a second.
 const FRAMES: usize = 1500;
 
-/// Why footage cannot be scanned.
-#[derive(Debug, thiserror::Error)]
-pub enum FootageError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Source(#[from] footage::FootageError),
-    /// Its pictures cannot be made into a clip.
-    #[error("cannot scan {}: {source}", path.display())]
-    Unusable {
-        /// The file or folder.
-        path: PathBuf,
-        /// What is wrong with them.
-        source: ClipError,
-    },
-}
-
 /// The clips in `path`: one for a video or an image, or one for each image in a folder. If a video is damaged or longer
 /// than 1500 frames, a note on standard error says what is left out.
 ///
 /// # Errors
 /// If it cannot be read, holds no picture, or its pictures are too small.
-pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, FootageError> {
-    let unusable = |path: &Path| {
-        let path = path.to_owned();
-        move |source| FootageError::Unusable { path, source }
-    };
-
+pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
     if path.is_dir() {
-        return footage::pictures_in(path)?
-            .iter()
-            .map(|file| clip(vec![Arc::new(image(file)?)]).map(Arc::new).map_err(unusable(file)))
-            .collect();
+        return footage::pictures_in(path)?.iter().map(|file| clip(file, vec![Arc::new(image(file)?)])).collect();
     }
 
     let frames = if is_picture(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
-    Ok(vec![Arc::new(clip(frames).map_err(unusable(path))?)])
+    Ok(vec![clip(path, frames)?])
 }
 
-fn unreadable(path: &Path, reason: &str) -> FootageError {
+fn unreadable(path: &Path, reason: &str) -> LearningError {
     footage::FootageError::unreadable(path, reason).into()
 }
 
-fn image(path: &Path) -> Result<GrayImage, FootageError> {
+fn image(path: &Path) -> Result<GrayImage, LearningError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = read_picture(path, &bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
     let gray = picture.into_gray(&mut Reconstructor::default());
@@ -69,7 +46,7 @@ fn image(path: &Path) -> Result<GrayImage, FootageError> {
     Ok(reduced(&gray, width, LINES))
 }
 
-fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
+fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, LearningError> {
     if !path.is_file() {
         return Err(unreadable(path, "there is no such file"));
     }
@@ -126,10 +103,11 @@ fn pictures(mut stream: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
     })
 }
 
-/// A clip of `frames`, limited to the content area of the first frame if it has one.
-fn clip(frames: Vec<Arc<GrayImage>>) -> Result<Clip, ClipError> {
+/// A clip of `frames`, which `path` holds, limited to the content area of the first frame if it has one.
+fn clip(path: &Path, frames: Vec<Arc<GrayImage>>) -> Result<Arc<Clip>, LearningError> {
     let area = frames.first().and_then(|frame| content_area::detect(frame)).map(|circle| within(&circle));
-    Clip::new(frames, area)
+    let unusable = |error| LearningError::new(format!("cannot scan {}: {error}", path.display()));
+    Clip::new(frames, area).map(Arc::new).map_err(unusable)
 }
 
 /// A square that fits into the circle with a little to spare. The clip cuts off any part outside the picture.

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::clip::{Clip, ClipError};
+use super::clip::Clip;
+use crate::LearningError;
 use parfocal_devices::simulation::blur::gaussian_blur;
 use parfocal_devices::simulation::phantom::Scene;
 use parfocal_devices::simulation::texture::{texture, vary_contrast};
@@ -40,7 +41,7 @@ const UNEVEN: f32 = 1.0;
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
-pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
+pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, LearningError> {
     (0..count)
         .map(|index| {
             let mut picture = sharp_phantom(split, index);
@@ -65,7 +66,7 @@ pub fn sharp_phantom_of(split: Split, index: u64, side: usize) -> GrayImage {
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
-pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
+pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, LearningError> {
     (0..count)
         .map(|index| {
             let seed = split.first_seed() + index;

@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 use sha2::{Digest, Sha256};
 
+use crate::LearningError;
 use parfocal_imaging::{GrayImage, PATCH_SIDE, Patch, Square, View};
 
 /// Pixels between two neighbouring places at which the sharpest position is known.
@@ -25,20 +26,6 @@ pub struct PlaneStack {
     sharpest: Vec<f32>,
 }
 
-/// Why pictures cannot be a focal stack.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PlanesError {
-    /// Fewer than three pictures, or positions that do not rise.
-    #[error("a focal stack needs at least 3 pictures at rising positions, but has {0}")]
-    TooFew(usize),
-    /// Sizes differ.
-    #[error("picture {0} of the focal stack differs in size from the first")]
-    SizesDiffer(usize),
-    /// Too small for a patch to move within them.
-    #[error("the pictures of the focal stack need at least 64x64 pixels, but have {0}x{1}")]
-    TooSmall(usize, usize),
-}
-
 impl PlaneStack {
     /// A stack of `pictures`, each with the position of its focal plane. Positions must rise. Gray levels beyond
     /// 0..=255 are clipped.
@@ -46,21 +33,27 @@ impl PlaneStack {
     /// # Errors
     /// If there are fewer than three pictures, positions do not rise, sizes differ, or pictures are smaller than 64x64
     /// pixels.
-    pub fn new(pictures: &[(f32, GrayImage)]) -> Result<Self, PlanesError> {
-        let (Some((_, first)), 3..) = (pictures.first(), pictures.len()) else {
-            return Err(PlanesError::TooFew(pictures.len()));
+    pub fn new(pictures: &[(f32, GrayImage)]) -> Result<Self, LearningError> {
+        let too_few = || {
+            let count = pictures.len();
+            LearningError::new(format!("a focal stack needs at least 3 pictures at rising positions, but has {count}"))
         };
+        let (Some((_, first)), 3..) = (pictures.first(), pictures.len()) else { return Err(too_few()) };
         let width = first.width;
         let height = first.height;
         if width < 64 || height < 64 {
-            return Err(PlanesError::TooSmall(width, height));
+            let least = "the pictures of the focal stack need at least 64x64 pixels";
+            return Err(LearningError::new(format!("{least}, but have {width}x{height}")));
         }
         if let Some(index) = pictures.iter().position(|(_, picture)| (picture.width, picture.height) != (width, height))
         {
-            return Err(PlanesError::SizesDiffer(index + 1));
+            let number = index + 1;
+            return Err(LearningError::new(format!(
+                "picture {number} of the focal stack differs in size from the first"
+            )));
         }
         if !pictures.is_sorted_by(|a, b| a.0 < b.0) {
-            return Err(PlanesError::TooFew(pictures.len()));
+            return Err(too_few());
         }
 
         let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
@@ -320,9 +313,10 @@ mod tests {
         let picture = GrayImage { width: 64, height: 64, data: vec![0.0; 64 * 64] };
         let small = GrayImage { width: 64, height: 63, data: vec![0.0; 64 * 63] };
         let at = |position: f32, picture: &GrayImage| (position, picture.clone());
-        let refused = |pictures: &[(f32, GrayImage)]| PlaneStack::new(pictures).unwrap_err();
-        assert_eq!(refused(&[at(0.0, &picture), at(1.0, &picture)]), PlanesError::TooFew(2));
-        assert_eq!(refused(&[at(0.0, &picture), at(1.0, &small), at(2.0, &picture)]), PlanesError::SizesDiffer(2));
-        assert_eq!(refused(&[at(0.0, &small), at(1.0, &small), at(2.0, &small)]), PlanesError::TooSmall(64, 63));
+        let refused = |pictures: &[(f32, GrayImage)]| PlaneStack::new(pictures).unwrap_err().to_string();
+        assert!(refused(&[at(0.0, &picture), at(1.0, &picture)]).contains("at least 3 pictures"));
+        assert!(refused(&[at(0.0, &picture), at(1.0, &picture)]).ends_with("has 2"));
+        assert!(refused(&[at(0.0, &picture), at(1.0, &small), at(2.0, &picture)]).contains("picture 2 of"));
+        assert!(refused(&[at(0.0, &small), at(1.0, &small), at(2.0, &small)]).ends_with("have 64x63"));
     }
 }

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 
 use super::photography::{Photography, PhotographyLimits};
 use super::pictures::{Split, sharp_phantom_of};
-use super::planes::{PlaneStack, PlanesError};
+use super::planes::PlaneStack;
+use crate::LearningError;
 use parfocal_devices::simulation::blur::gaussian_blur;
 use parfocal_devices::simulation::spots::{LensSpot, blurred};
 use parfocal_devices::simulation::texture::{Canvas, texture, vary_contrast};
@@ -110,7 +111,7 @@ pub enum Distance {
 ///
 /// # Errors
 /// None in practice: the scenes are large enough.
-pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
+pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, LearningError> {
     let style = |index: u64| if index.is_multiple_of(2) { Style::VARIED } else { Style::DEEP_TO_TRAIN };
     (0..count).into_par_iter().map(|index| scene(split, index, style(index)).map(Arc::new)).collect()
 }
@@ -119,12 +120,12 @@ pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesEr
 ///
 /// # Errors
 /// None in practice: the scenes are large enough.
-pub fn deep_scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
+pub fn deep_scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, LearningError> {
     (0..count).into_par_iter().map(|index| scene(split, index, Style::DEEP).map(Arc::new)).collect()
 }
 
 /// Scene `index` of `split`, drawn by `style`.
-fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesError> {
+fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, LearningError> {
     let seed = split.first_seed() + index;
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7265_6c69_6566);
     let softness = if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { rng.random_range(0.0..MOST_SOFTNESS) };

@@ -11,8 +11,9 @@ use tch::{Device, Kind, Tensor, nn};
 use super::environment::{Environment, lead_astray};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::recipe::belief::BeliefRecipe;
-use super::run::checkpoint::{Checkpoint, CheckpointError};
+use super::run::checkpoint::Checkpoint;
 use super::trainer::{Trainer, drawn_with};
+use crate::LearningError;
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use parfocal_autofocus::belief::{Trace, spread_over_bins};
@@ -218,7 +219,7 @@ impl Trainer for BeliefTrainer {
         checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
     }
 
-    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), LearningError> {
         checkpoint.fill_store("network", &self.store)?;
         self.optimiser.restore(checkpoint)?;
         self.updates = checkpoint.number("updates")?;

@@ -3,7 +3,6 @@
 pub mod belief;
 pub mod dqn;
 pub mod environment;
-pub mod error;
 pub mod optimiser;
 pub mod recipe;
 pub mod run;

@@ -2,7 +2,8 @@
 
 use tch::{Tensor, nn};
 
-use super::run::checkpoint::{Checkpoint, CheckpointError};
+use super::run::checkpoint::Checkpoint;
+use crate::LearningError;
 
 /// The rule that turns gradients into steps, with its settings.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -149,7 +150,7 @@ impl Optimiser {
     ///
     /// # Errors
     /// If the checkpoint is damaged or belongs to another network.
-    pub fn restore(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), CheckpointError> {
+    pub fn restore(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), LearningError> {
         for (name, mut tensor) in self.named_state() {
             checkpoint.fill(&name, &mut tensor)?;
         }

@@ -4,7 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use tch::nn;
 
-use super::run::checkpoint::{Checkpoint, CheckpointError};
+use super::run::checkpoint::Checkpoint;
+use crate::LearningError;
 use parfocal_autofocus::weights::{self, WeightsError};
 
 /// Draws random weights by `draw`, the same for the same `seed`. libtorch draws all of a process's weights from one
@@ -50,5 +51,5 @@ pub trait Trainer: Send {
     ///
     /// # Errors
     /// If the checkpoint is damaged or belongs to another training.
-    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError>;
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), LearningError>;
 }

@@ -7,11 +7,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{PosePictures, header, shot};
+use crate::LearningError;
 use crate::scans::recorded::{evenly_spread, patch_at};
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use crate::scans::stack::{FocalStack, cropped};
 use parfocal_autofocus::mgm;
-use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanError, ScanRecording};
+use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanRecording};
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::Walk;
 use parfocal_imaging::{PATCH_SIDE, PatchArea};
@@ -31,17 +32,6 @@ pub struct Cut {
     pub seed: u64,
 }
 
-/// Why no scan can be cut.
-#[derive(Debug, thiserror::Error)]
-pub enum CutError {
-    /// The windows do not fit into the stack.
-    #[error("{0}")]
-    Unfit(String),
-    /// The scan cannot be written.
-    #[error(transparent)]
-    Scan(#[from] ScanError),
-}
-
 /// What one pose sees: the upper left corner of its window, and its first plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
@@ -57,12 +47,12 @@ pub struct Window {
 ///
 /// # Errors
 /// If stack or pictures are too small.
-pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
+pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, LearningError> {
     let Cut { planes, size, poses, .. } = *cut;
     let (width, height) = stack.size();
     let of = stack.planes().len();
     if planes >= of {
-        return Err(CutError::Unfit(format!(
+        return Err(LearningError::new(format!(
             "a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; give --planes at \
              most {}",
             of - 1
@@ -70,7 +60,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     }
     if size < LEAST_SIDE || size > width || size > height {
         let window = format!("a window of {size}x{size} pixels does not fit into pictures of {width}x{height}");
-        return Err(CutError::Unfit(format!("{window}; give a smaller --size or --scale")));
+        return Err(LearningError::new(format!("{window}; give a smaller --size or --scale")));
     }
 
     let mut rng = ChaCha8Rng::seed_from_u64(cut.seed);
@@ -103,7 +93,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
 ///
 /// # Errors
 /// If the stack is too small, or `out` holds another scan or cannot be written.
-pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()) -> Result<(), CutError> {
+pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()) -> Result<(), LearningError> {
     let windows = windows(stack, cut)?;
     let powers = evenly_spread(cut.planes);
 

@@ -1,11 +1,11 @@
 //! Imports a scan: a folder of pictures named by pose and focal power, recorded by any program.
 
 use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::{PosePictures, header, shot};
+use crate::LearningError;
 use crate::scans::mosaics::RawMosaics;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
@@ -17,29 +17,6 @@ use parfocal_devices::camera::recorded::{
 use parfocal_imaging::{
     DecodeError, GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
 };
-
-/// Why a folder cannot be imported. The message names the file or folder, and says what is wrong.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct ImportError(String);
-
-impl ImportError {
-    /// `path` is wrong: the file's name makes no sense, or its content is not a picture.
-    fn of(path: &Path, reason: impl Display) -> Self {
-        Self(format!("{}: {reason}", path.display()))
-    }
-
-    /// `path` holds no pictures of a scan.
-    fn empty(path: &Path) -> Self {
-        Self(format!("there is no picture named like pose0001_f0.350.png in {}", path.display()))
-    }
-}
-
-impl From<ScanError> for ImportError {
-    fn from(error: ScanError) -> Self {
-        Self(error.to_string())
-    }
-}
 
 /// The scan in a folder: for each pose number, a file for each focal power, in rising order.
 #[derive(Debug)]
@@ -59,13 +36,13 @@ impl Imported {
     ///
     /// # Errors
     /// If names make no sense, or poses or focal powers are missing.
-    pub fn look(folder: &Path, bits: Option<u8>, raw: Option<PixelFormat>) -> Result<Self, ImportError> {
+    pub fn look(folder: &Path, bits: Option<u8>, raw: Option<PixelFormat>) -> Result<Self, LearningError> {
         let mut poses: BTreeMap<usize, Vec<(FocalPower, PathBuf)>> = BTreeMap::new();
         for path in files(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match parse(&name) {
                 None => {}
-                Some(Err(reason)) => return Err(ImportError::of(&path, reason)),
+                Some(Err(reason)) => return Err(LearningError::of(&path, reason)),
                 Some(Ok((pose, power))) => poses.entry(pose).or_default().push((power, path)),
             }
         }
@@ -74,23 +51,23 @@ impl Imported {
             stack.sort_by(|a, b| a.0.get().total_cmp(&b.0.get()));
             if let Some(pair) = stack.windows(2).find(|pair| pair[0].0 == pair[1].0) {
                 let reason = format!("{} is of the same pose and focal power", pair[0].1.display());
-                return Err(ImportError::of(&pair[1].1, reason));
+                return Err(LearningError::of(&pair[1].1, reason));
             }
         }
 
         let (Some(&first), Some(&last)) = (poses.keys().next(), poses.keys().next_back()) else {
-            return Err(ImportError::empty(folder));
+            return Err(empty(folder));
         };
 
         let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
         if !missing.is_empty() {
             let are = format!("{} in {}", numbered(&missing), folder.display());
-            return Err(ImportError(format!("there is no picture of {are}; pose numbers must have no gaps")));
+            return Err(LearningError::new(format!("there is no picture of {are}; pose numbers must have no gaps")));
         }
 
         if poses.len() > MOST_POSES {
             let holds = format!("{} holds {} poses", folder.display(), poses.len());
-            return Err(ImportError(format!("{holds}; a scan has at most {MOST_POSES}: import it in parts")));
+            return Err(LearningError::new(format!("{holds}; a scan has at most {MOST_POSES}: import it in parts")));
         }
 
         let imported = Self { poses, bits, raw };
@@ -98,17 +75,19 @@ impl Imported {
         Ok(imported)
     }
 
-    fn check_powers(&self) -> Result<(), ImportError> {
+    fn check_powers(&self) -> Result<(), LearningError> {
         let powers = self.powers();
         if let [one] = powers[..] {
             let one = one.get();
-            return Err(ImportError(format!("a scan needs at least two focal powers; every picture is at {one:.3}")));
+            return Err(LearningError::new(format!(
+                "a scan needs at least two focal powers; every picture is at {one:.3}"
+            )));
         }
         for (&pose, stack) in &self.poses {
             let lacks = |power: &&FocalPower| !stack.iter().any(|(have, _)| have == *power);
             if let Some(power) = powers.iter().find(lacks) {
                 let power = power.get();
-                return Err(ImportError(format!(
+                return Err(LearningError::new(format!(
                     "pose {pose} has no picture at focal power {power:.3}, which other poses have"
                 )));
             }
@@ -135,7 +114,7 @@ impl Imported {
 ///
 /// # Errors
 /// If a picture cannot be used, `out` holds another scan, or it cannot be written.
-pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
+pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), LearningError> {
     let header = header(camera.to_owned(), 0, imported.count(), imported.powers());
 
     let mosaics = RawMosaics::new(imported.raw);
@@ -156,7 +135,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
                 return Err(ScanError::other(out, &difference).into());
             }
         } else {
-            let patch = patch(&pictures).ok_or_else(|| ImportError::empty(out))?;
+            let patch = patch(&pictures).ok_or_else(|| empty(out))?;
             recording.store(&shot(pose, &powers, PosePictures { pictures, patch, truth: None }))?;
         }
         progress();
@@ -202,7 +181,7 @@ struct Reader {
 impl Reader {
     /// Compares a picture's size with the first one's. Reads only the beginning of the file, except of one with 16-bit
     /// samples, whose largest counts, and of a raw mosaic.
-    fn measure(&mut self, path: &Path) -> Result<(), ImportError> {
+    fn measure(&mut self, path: &Path) -> Result<(), LearningError> {
         if is_raw(path) {
             self.read(path)?;
             return self.check(path, SENSOR_SIZE);
@@ -225,13 +204,15 @@ impl Reader {
     }
 
     /// Sets what is white in 16-bit pictures, one for the whole scan.
-    fn set_scale(&mut self, given: Option<u8>) -> Result<(), ImportError> {
+    fn set_scale(&mut self, given: Option<u8>) -> Result<(), LearningError> {
         let Some((largest, path)) = self.largest.clone() else { return Ok(()) };
         let needed = (16 - largest.leading_zeros() as u8).max(8);
         let bits = given.unwrap_or(needed);
         if bits < needed {
             let holds = format!("{} holds a sample of {largest}", path.display());
-            return Err(ImportError(format!("{holds}, which is more than {bits} bit; give --bits {needed} or more")));
+            return Err(LearningError::new(format!(
+                "{holds}, which is more than {bits} bit; give --bits {needed} or more"
+            )));
         }
 
         let white = u16::MAX >> (16 - bits.min(16));
@@ -245,24 +226,26 @@ impl Reader {
         Ok(())
     }
 
-    fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), ImportError> {
+    fn check(&mut self, path: &Path, size: (usize, usize)) -> Result<(), LearningError> {
         let (width, height) = size;
         let is = format!("{} is {width}x{height} pixels", path.display());
         if width < LEAST_SIDE || height < LEAST_SIDE {
-            return Err(ImportError(format!("{is}; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}")));
+            return Err(LearningError::new(format!(
+                "{is}; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}"
+            )));
         }
 
         let (first, (first_width, first_height)) = self.first.get_or_insert_with(|| (path.to_owned(), size));
         if (*first_width, *first_height) != size {
             let first = first.display();
-            return Err(ImportError(format!(
+            return Err(LearningError::new(format!(
                 "{is}, but {first} is {first_width}x{first_height}; all pictures of a scan must have one size"
             )));
         }
         Ok(())
     }
 
-    fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
+    fn read(&mut self, path: &Path) -> Result<GrayImage, LearningError> {
         let bytes = std::fs::read(path).map_err(unreadable(path))?;
         if is_raw(path) {
             let frame = self.mosaics.read(path, &bytes).map_err(unusable(path))?;
@@ -283,17 +266,22 @@ impl Reader {
     }
 }
 
-fn unreadable(path: &Path) -> impl Fn(io::Error) -> ImportError {
-    |error| ImportError(format!("cannot read {}: {error}", path.display()))
+/// The error that `path` holds no pictures of a scan.
+fn empty(path: &Path) -> LearningError {
+    LearningError::new(format!("there is no picture named like pose0001_f0.350.png in {}", path.display()))
 }
 
-fn unusable(path: &Path) -> impl Fn(DecodeError) -> ImportError {
-    |error| ImportError::of(path, error)
+fn unreadable(path: &Path) -> impl Fn(io::Error) -> LearningError {
+    |error| LearningError::unreadable(path, &error)
+}
+
+fn unusable(path: &Path) -> impl Fn(DecodeError) -> LearningError {
+    |error| LearningError::of(path, error)
 }
 
 /// The files in `folder` and in the folders directly in it, sorted.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
-    let entries = |folder: &Path| -> Result<Vec<PathBuf>, ImportError> {
+fn files(folder: &Path) -> Result<Vec<PathBuf>, LearningError> {
+    let entries = |folder: &Path| -> Result<Vec<PathBuf>, LearningError> {
         let entries = std::fs::read_dir(folder).map_err(unreadable(folder))?;
         entries.map(|entry| entry.map(|entry| entry.path()).map_err(unreadable(folder))).collect()
     };

@@ -6,8 +6,8 @@ mod import;
 mod phantom;
 
 pub use devices::{Devices, Stepper, StepperError};
-pub use from_stack::{Cut, CutError, Window, from_stack, windows};
-pub use import::{ImportError, Imported, import};
+pub use from_stack::{Cut, Window, from_stack, windows};
+pub use import::{Imported, import};
 pub use phantom::PhantomPoses;
 
 use super::recorded::{capture_order, patch_at, sharpest};

@@ -1,6 +1,7 @@
 //! Checks from the pictures alone whether they are a focal stack of one still scene.
 
-use super::{FocalStack, Plane, StackError};
+use super::{FocalStack, Plane};
+use crate::LearningError;
 use parfocal_base::statistics::mean;
 use parfocal_imaging::{GrayImage, reduced};
 
@@ -27,7 +28,7 @@ const BREAK: f64 = 3.0;
 ///
 /// # Errors
 /// If the pictures are not a focal stack: no peak, another scene, the wrong order, or overexposed.
-pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
+pub fn check(stack: &FocalStack) -> Result<Vec<String>, LearningError> {
     let mut notes = Vec::new();
     overexposure(stack, &mut notes)?;
     let blocks = blocks(stack);
@@ -42,7 +43,7 @@ pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
     Ok(notes)
 }
 
-fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError> {
+fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), LearningError> {
     let saturated = |plane: &Plane| {
         let bright = plane.picture.data.iter().filter(|&&level| level >= 254.0).count();
         bright as f64 / plane.picture.data.len().max(1) as f64
@@ -53,7 +54,7 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
 
     let note = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
-        return Err(StackError(format!(
+        return Err(LearningError::new(format!(
             "{note}, where focus cannot be judged; shorten the exposure and take it again"
         )));
     }
@@ -84,7 +85,7 @@ fn changes(pair: &[GrayImage]) -> Vec<f64> {
     steps.into_iter().map(|step| (step - usual).abs()).collect()
 }
 
-fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
+fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), LearningError> {
     for (pair, planes) in blocks.windows(2).zip(stack.planes().windows(2)) {
         // The tenth that changes most is left out: something may pass by.
         let changes = changes(pair);
@@ -95,7 +96,7 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
         let levels = |picture: &GrayImage| steady.iter().map(|&index| picture.data[index]).collect::<Vec<_>>();
 
         if correlation(&levels(&pair[0]), &levels(&pair[1])).is_some_and(|alike| alike < LEAST_ALIKE) {
-            return Err(StackError(format!(
+            return Err(LearningError::new(format!(
                 "{} and {} show different scenes; a focal stack is of one still scene",
                 planes[0].name, planes[1].name
             )));
@@ -125,11 +126,11 @@ fn motion(stack: &FocalStack, blocks: &[GrayImage], broken: &[bool], notes: &mut
     }
 }
 
-fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) -> Result<(), StackError> {
+fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) -> Result<(), LearningError> {
     let ratio = |curve: &&Vec<f64>| least_and_most(curve).1 / least_and_most(curve).0.max(0.1);
     let peaked: Vec<&Vec<f64>> = curves.iter().filter(|curve| ratio(curve) >= LEAST_PEAK).collect();
     if peaked.len() * 10 < curves.len().max(1) {
-        return Err(StackError(format!(
+        return Err(LearningError::new(format!(
             "the focus curve has no peak: sharpness changes by a fifth or more in only {} of {} places; \
              take a scene with texture over a wider range of focus",
             peaked.len(),
@@ -140,7 +141,7 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let count = stack.planes().len();
     let peaks = mean(&peaked.iter().map(|curve| peaks(curve) as f64).collect::<Vec<_>>());
     if peaks >= if count < 10 { 2.0 } else { 3.0 } {
-        return Err(StackError(format!(
+        return Err(LearningError::new(format!(
             "sharpness rises and falls {peaks:.1} times from the first picture to the last: they are not \
              in order of focus, or not of one scene; name them so that a number gives the order, or give a --list"
         )));
@@ -149,7 +150,7 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let at_end = |curve: &&&Vec<f64>| [0, count - 1].contains(&best(curve));
     let share = peaked.iter().filter(at_end).count() as f64 / peaked.len() as f64;
     if share > 0.7 {
-        return Err(StackError(format!(
+        return Err(LearningError::new(format!(
             "the focus curve has no peak inside the stack: {:.0} % of the places are sharpest in its first \
              or last picture; take pictures beyond that",
             100.0 * share

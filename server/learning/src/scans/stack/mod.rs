@@ -11,11 +11,12 @@ pub mod source;
 use std::path::{Path, PathBuf};
 
 use super::mosaics::{RawMosaics, mosaics_in};
+use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_raw, pictures_in};
 use parfocal_imaging::{GrayImage, Picture, PixelFormat, Reconstructor, decode, in_blocks};
 
-pub use plane::{LEAST_PLANES, Plane, StackError};
+pub use plane::{LEAST_PLANES, Plane};
 use positions::{file_name, listed, named};
 
 /// Greatest number of positions, including gaps.
@@ -39,11 +40,11 @@ impl FocalStack {
     ///
     /// # Errors
     /// If there are fewer than [`LEAST_PLANES`], two share a position, or sizes differ.
-    pub fn new(mut planes: Vec<Plane>) -> Result<Self, StackError> {
+    pub fn new(mut planes: Vec<Plane>) -> Result<Self, LearningError> {
         planes.sort_by(|a, b| a.position.total_cmp(&b.position));
         if planes.len() < LEAST_PLANES {
             let count = planes.len();
-            return Err(StackError(format!(
+            return Err(LearningError::new(format!(
                 "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {count}; take \
                  more between them"
             )));
@@ -54,7 +55,7 @@ impl FocalStack {
             let [(width, height), other] =
                 [&pair[0], &pair[1]].map(|plane| (plane.picture.width, plane.picture.height));
             if (width, height) != other {
-                return Err(StackError(format!(
+                return Err(LearningError::new(format!(
                     "{second} is {}x{} pixels, but {first} is {width}x{height}; all pictures of a stack must have one \
                      size",
                     other.0, other.1
@@ -63,7 +64,7 @@ impl FocalStack {
             let position = pair[1].position;
             if pair[0].position >= position {
                 let both = format!("{first} and {second} are both at position {position}");
-                return Err(StackError(format!("{both}; leave one out")));
+                return Err(LearningError::new(format!("{both}; leave one out")));
             }
         }
         Ok(Self { planes })
@@ -81,10 +82,10 @@ impl FocalStack {
         list: Option<&Path>,
         scale: usize,
         raw: Option<PixelFormat>,
-    ) -> Result<Self, StackError> {
+    ) -> Result<Self, LearningError> {
         if folder.is_file() && is_raw(folder) {
             let folder = folder.display();
-            return Err(StackError(format!(
+            return Err(LearningError::new(format!(
                 "{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}"
             )));
         }
@@ -101,14 +102,14 @@ impl FocalStack {
         let mut reconstructor = Reconstructor::default();
         let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
-            let bytes = std::fs::read(&path).map_err(|error| StackError::unreadable(&path, &error))?;
+            let bytes = std::fs::read(&path).map_err(|error| LearningError::unreadable(&path, &error))?;
             let picture =
                 if is_raw(&path) { mosaics.read(&path, &bytes).map(Picture::Mosaic) } else { decode(&bytes, false) };
-            let gray = picture.map_err(|error| StackError::of(&path, error))?.into_gray(&mut reconstructor);
+            let gray = picture.map_err(|error| LearningError::of(&path, error))?.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
 
-        Self::new(placed.into_iter().map(read).collect::<Result<_, StackError>>()?)
+        Self::new(placed.into_iter().map(read).collect::<Result<_, LearningError>>()?)
     }
 
     /// The pictures, in rising position.
@@ -127,18 +128,18 @@ impl FocalStack {
     ///
     /// # Errors
     /// If pictures are too far apart to say how sharp it is between them.
-    pub fn even(&self) -> Result<(Self, Option<String>), StackError> {
+    pub fn even(&self) -> Result<(Self, Option<String>), LearningError> {
         self.on_grid().or_else(|uneven| self.interpolated().ok_or(uneven))
     }
 
-    fn on_grid(&self) -> Result<(Self, Option<String>), StackError> {
+    fn on_grid(&self) -> Result<(Self, Option<String>), LearningError> {
         let position = |index: usize| self.planes[index].position;
         let last = self.planes.len() - 1;
         let distances = self.planes.windows(2).map(|pair| pair[1].position - pair[0].position);
         let step = distances.fold(f64::INFINITY, f64::min);
         let steps = (position(last) - position(0)) / step;
         let uneven = |of: usize| {
-            StackError(format!(
+            LearningError::new(format!(
                 "the positions are too uneven: with steps of {step}, the least between two pictures, {} of {of} places \
                  would have a picture; take pictures at even distances",
                 last + 1
@@ -228,7 +229,7 @@ pub(super) fn cropped(picture: &GrayImage, (left, top): (usize, usize), size: (u
 }
 
 /// The pictures in a folder, or if it has none, or `raw` are wanted, its raw mosaics.
-fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, StackError> {
+fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, LearningError> {
     let mosaics = mosaics_in(folder);
     let pictures = match pictures_in(folder) {
         Err(error) if mosaics.is_empty() => return Err(error.into()),

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{PictureFile, Reconstructor, in_blocks};
 
-use super::plane::{Plane, StackError};
+use super::plane::Plane;
 use super::positions::{file_name, listed};
 
 /// The order of pages in focus, and the position of each.
@@ -24,14 +25,14 @@ struct Depth {
 ///
 /// # Errors
 /// If a page or the list cannot be read, or the pages vary in more than focus.
-pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, StackError> {
-    let bytes = std::fs::read(path).map_err(|error| StackError::unreadable(path, &error))?;
-    let file = PictureFile::open(&bytes).map_err(|error| StackError::of(path, error))?;
+pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, LearningError> {
+    let bytes = std::fs::read(path).map_err(|error| LearningError::unreadable(path, &error))?;
+    let file = PictureFile::open(&bytes).map_err(|error| LearningError::of(path, error))?;
 
     let depth = match list {
         Some(list) => of_list(list, file.pages())?,
         None => depth(&file.description().unwrap_or_default(), file.pages())
-            .map_err(|reason| StackError::of(path, reason))?,
+            .map_err(|reason| LearningError::of(path, reason))?,
     };
     tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
 
@@ -40,7 +41,7 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
     let placed = depth.pages.iter().zip(&depth.positions);
     placed
         .map(|(&page, &position)| {
-            let picture = file.read(page, false).map_err(|error| StackError::of(path, error))?;
+            let picture = file.read(page, false).map_err(|error| LearningError::of(path, error))?;
             let gray = picture.into_gray(&mut reconstructor);
             let name = format!("page {} of {name}", page + 1);
             Ok(Plane { name, position, picture: in_blocks(&gray, scale) })
@@ -48,12 +49,12 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
         .collect()
 }
 
-fn of_list(list: &Path, count: usize) -> Result<Depth, StackError> {
+fn of_list(list: &Path, count: usize) -> Result<Depth, LearningError> {
     let mut pages = Vec::new();
     let mut positions = Vec::new();
     for (name, position) in listed(list)? {
         let page = name.parse::<usize>().ok().filter(|page| (1..=count).contains(page));
-        let wrong = || StackError::of(list, format!("'{name}' must be the number of a page, from 1 to {count}"));
+        let wrong = || LearningError::of(list, format!("'{name}' must be the number of a page, from 1 to {count}"));
         pages.push(page.ok_or_else(wrong)? - 1);
         positions.push(position);
     }

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use super::plane::StackError;
+use crate::LearningError;
 
 /// The file's name, for people.
 pub(super) fn file_name(path: &Path) -> String {
@@ -11,8 +11,8 @@ pub(super) fn file_name(path: &Path) -> String {
 }
 
 /// Names and positions from a list of `name,position`; a first line without a number is a heading.
-pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
-    let unreadable = |error| StackError::of(list, format!("cannot read the list: {error}"));
+pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, LearningError> {
+    let unreadable = |error| LearningError::of(list, format!("cannot read the list: {error}"));
     let text = std::fs::read_to_string(list).map_err(unreadable)?;
     let mut placed = Vec::new();
 
@@ -23,7 +23,7 @@ pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, StackError> {
             Some((_, Err(_))) if number == 1 => {}
             _ => {
                 let wrong = format!("line {number} must be a file's name, a comma and a position");
-                return Err(StackError::of(list, wrong));
+                return Err(LearningError::of(list, wrong));
             }
         }
     }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::check::check;
 use super::optics::StackOptics;
-use super::{FocalStack, Plane, StackError};
-use crate::scans::planes::{PlaneStack, PlanesError};
+use super::{FocalStack, Plane};
+use crate::LearningError;
+use crate::scans::planes::PlaneStack;
 use parfocal_base::BlurRate;
 use parfocal_imaging::{GrayImage, PixelFormat, in_blocks, reduced};
 
@@ -17,31 +18,6 @@ const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
 const LEAST_PLANES: usize = 6;
 /// Least side in pixels of pictures made smaller: room for a patch and what surrounds it.
 const LEAST_SIDE: usize = 200;
-
-/// Why a focal stack cannot be scanned.
-#[derive(Debug, thiserror::Error)]
-pub enum UnfitStack {
-    /// It cannot be read, or its pictures are not a stack.
-    #[error(transparent)]
-    Stack(#[from] StackError),
-    /// Its pictures are too few or too small, or differ in size.
-    #[error("{} is not a focal stack: {source}", folder.display())]
-    Planes {
-        /// The stack's folder.
-        folder: PathBuf,
-        /// What is wrong with its pictures.
-        source: PlanesError,
-    },
-    /// It has fewer planes than the range needs, or is too small.
-    #[error("{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
-             pixels", folder.display())]
-    TooSmall {
-        /// The stack's folder.
-        folder: PathBuf,
-        /// Planes of the range.
-        planes: usize,
-    },
-}
 
 /// A focal stack's folder or file, and how many of its pictures make the range 0..=1 of a scan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -98,12 +74,21 @@ impl StackSource {
         }
     }
 
+    /// The error that it has fewer planes than a range of `planes` needs, or its pictures are too small.
+    pub(crate) fn too_small(&self, planes: usize) -> LearningError {
+        LearningError::new(format!(
+            "{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
+             pixels",
+            self.folder.display()
+        ))
+    }
+
     /// Reads the stack and reduces it to each of the scales. Also returns warnings about its pictures, as text for
     /// people. A scan is possible despite them.
     ///
     /// # Errors
     /// If the stack cannot be read, or its pictures are not a stack.
-    pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
+    pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), LearningError> {
         let stack = FocalStack::load(&self.folder, None, 1, self.raw)?;
         let mut doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
         let stack = match stack.even() {
@@ -125,14 +110,14 @@ impl StackSource {
             let side = ((width as f64 / wide as f64).round() as usize).max(1);
             let numbered = numbered(stack.planes().iter().map(|plane| in_blocks(&plane.picture, side)));
 
-            let unfit = |source| UnfitStack::Planes { folder: self.folder.clone(), source };
+            let unfit = |error| LearningError::new(format!("{} is not a focal stack: {error}", self.folder.display()));
             let pictures = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
 
             let plane = |(at, picture): (f32, GrayImage)| Plane { name: at.to_string(), position: at.into(), picture };
             let stack = FocalStack::new(numbered.into_iter().map(plane).collect())?;
             Ok(ScaledStack { scale, planes, pictures, stack })
         };
-        let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, UnfitStack>>()?;
+        let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, LearningError>>()?;
         let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
         Ok((scaled, doubts.into_iter().map(named).collect()))
     }

@@ -17,8 +17,9 @@ use tch::{Device, Tensor, nn};
 use super::environment::{Environment, lead_astray};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::recipe::dqn::{DqnRecipe, Target};
-use super::run::checkpoint::{Checkpoint, CheckpointError};
+use super::run::checkpoint::Checkpoint;
 use super::trainer::{Trainer, drawn_with};
+use crate::LearningError;
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 use batch::{Batch, Targets, bellman, lookahead, smooth_l1};
@@ -252,7 +253,7 @@ impl Trainer for DqnTrainer {
         checkpoint.notes.insert("frames".to_owned(), self.frames.to_string());
     }
 
-    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), LearningError> {
         checkpoint.fill_store("network", &self.online.store)?;
         checkpoint.fill_store("target", &self.target.store)?;
         self.optimiser.restore(checkpoint)?;

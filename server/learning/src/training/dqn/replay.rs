@@ -3,7 +3,8 @@
 
 use rand::{Rng, RngExt};
 
-use crate::training::run::checkpoint::{Checkpoint, CheckpointError};
+use crate::LearningError;
+use crate::training::run::checkpoint::Checkpoint;
 use parfocal_autofocus::networks::ACTIONS;
 use parfocal_imaging::{PATCH_SIDE, Patch};
 
@@ -156,7 +157,7 @@ impl Replay {
     ///
     /// # Errors
     /// If the checkpoint is damaged or belongs to another training.
-    pub fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
+    pub fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), LearningError> {
         let capacity = self.capacity;
         for (index, ring) in self.actors.iter_mut().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");

@@ -6,7 +6,7 @@ pub mod dqn;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::TrainError;
+use crate::LearningError;
 use crate::scans::benchmark::COUNT;
 use belief::BeliefRecipe;
 pub use check::MAX_UPDATES;
@@ -122,9 +122,9 @@ impl Recipe {
     ///
     /// # Errors
     /// If it is not a learned policy, or the recipe has the section of another kind of policy.
-    pub fn design(&self) -> Result<Design, TrainError> {
+    pub fn design(&self) -> Result<Design, LearningError> {
         let unknown = || {
-            TrainError::Recipe(format!(
+            LearningError::new(format!(
                 "'{}' is not a learned policy; those are mgm-learned, mlr-learned, cnn-learned and parfocal",
                 self.policy
             ))
@@ -141,9 +141,9 @@ impl Recipe {
     }
 
     /// The error that the recipe lacks the section that its policy is trained by.
-    pub(super) fn has_the_wrong_section(&self) -> TrainError {
+    pub(super) fn has_the_wrong_section(&self) -> LearningError {
         let policy = &self.policy;
-        TrainError::Recipe(format!(
+        LearningError::new(format!(
             "the recipe has the wrong section for '{policy}': [dqn] trains networks of values, [belief] the tracker"
         ))
     }

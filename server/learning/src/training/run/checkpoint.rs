@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 use tch::{Kind, Tensor, nn};
 
+use crate::LearningError;
 use parfocal_autofocus::weights::floats;
 use parfocal_base::files;
 
@@ -18,27 +20,6 @@ pub const CHECKPOINT: &str = "checkpoint.safetensors";
 
 /// Longest header that is read, in bytes: about a thousand times the usual length.
 const MAX_HEADER: u64 = 1 << 28;
-
-/// Why a checkpoint could not be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    /// The file cannot be read.
-    #[error("cannot read the checkpoint {}: {source}", path.display())]
-    File {
-        /// The checkpoint's file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    /// The content is damaged, or was written by another program.
-    #[error("the checkpoint {} is damaged: {reason}; start again in another folder", path.display())]
-    Damaged {
-        /// The checkpoint's file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
 
 /// Named arrays and notes. Arrays to be written may be borrowed, because a replay memory is large.
 #[derive(Debug, Default)]
@@ -78,7 +59,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If there is none.
-    pub fn floats(&self, name: &str) -> Result<Vec<f32>, CheckpointError> {
+    pub fn floats(&self, name: &str) -> Result<Vec<f32>, LearningError> {
         let bytes = self.bytes(name)?;
         Ok(bytes.as_chunks::<4>().0.iter().map(|four| f32::from_le_bytes(*four)).collect())
     }
@@ -87,7 +68,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If there is none.
-    pub fn bytes(&self, name: &str) -> Result<&[u8], CheckpointError> {
+    pub fn bytes(&self, name: &str) -> Result<&[u8], LearningError> {
         self.arrays.get(name).map(|array| &*array.1).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
@@ -95,7 +76,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If there is none.
-    pub fn take_bytes(&mut self, name: &str) -> Result<Vec<u8>, CheckpointError> {
+    pub fn take_bytes(&mut self, name: &str) -> Result<Vec<u8>, LearningError> {
         let array = self.arrays.remove(name);
         array.map(|array| array.1.into_owned()).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
@@ -104,7 +85,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If there is none, or its length is not the tensor's.
-    pub fn fill(&self, name: &str, tensor: &mut Tensor) -> Result<(), CheckpointError> {
+    pub fn fill(&self, name: &str, tensor: &mut Tensor) -> Result<(), LearningError> {
         let values = self.floats(name)?;
         if values.len() != tensor.numel() {
             return Err(self.damaged(format!("'{name}' has {} values", values.len())));
@@ -118,7 +99,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If one is missing or does not fit.
-    pub fn fill_store(&self, prefix: &str, store: &nn::VarStore) -> Result<(), CheckpointError> {
+    pub fn fill_store(&self, prefix: &str, store: &nn::VarStore) -> Result<(), LearningError> {
         store
             .variables()
             .into_iter()
@@ -129,14 +110,14 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// If it is missing or not a number.
-    pub fn number<N: std::str::FromStr>(&self, name: &str) -> Result<N, CheckpointError> {
+    pub fn number<N: std::str::FromStr>(&self, name: &str) -> Result<N, LearningError> {
         let text = self.notes.get(name).and_then(|text| text.parse().ok());
         text.ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
     /// The error that this checkpoint is damaged, for `reason`.
-    pub fn damaged(&self, reason: impl Into<String>) -> CheckpointError {
-        CheckpointError::Damaged { path: self.path.clone(), reason: reason.into() }
+    pub fn damaged(&self, reason: impl Display) -> LearningError {
+        damaged(&self.path, reason)
     }
 
     /// Writes a temporary file beside `path` and moves it into place, so that a reader always finds a complete one. The
@@ -178,7 +159,7 @@ impl Checkpoint<'static> {
     ///
     /// # Errors
     /// If the file cannot be read or is damaged.
-    pub fn read(path: &Path) -> Result<Self, CheckpointError> {
+    pub fn read(path: &Path) -> Result<Self, LearningError> {
         Self::open(path, true)
     }
 
@@ -186,15 +167,15 @@ impl Checkpoint<'static> {
     ///
     /// # Errors
     /// If the file cannot be read or is damaged.
-    pub fn read_notes(path: &Path) -> Result<Self, CheckpointError> {
+    pub fn read_notes(path: &Path) -> Result<Self, LearningError> {
         Self::open(path, false)
     }
 
-    fn open(path: &Path, with_arrays: bool) -> Result<Self, CheckpointError> {
-        let failed = |source: io::Error| CheckpointError::File { path: path.to_owned(), source };
-        let damaged = |reason: String| CheckpointError::Damaged { path: path.to_owned(), reason };
+    fn open(path: &Path, with_arrays: bool) -> Result<Self, LearningError> {
+        let failed =
+            |error: io::Error| LearningError::new(format!("cannot read the checkpoint {}: {error}", path.display()));
         let cut = |error: io::Error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => damaged("it is truncated".to_owned()),
+            io::ErrorKind::UnexpectedEof => damaged(path, "it is truncated"),
             _ => failed(error),
         };
 
@@ -207,16 +188,16 @@ impl Checkpoint<'static> {
         let length = u64::from_le_bytes(length);
         // A damaged length must not make us read more than the longest possible header.
         if length > MAX_HEADER.min(size) {
-            return Err(damaged("it is not a safetensors file".to_owned()));
+            return Err(damaged(path, "it is not a safetensors file"));
         }
 
         let mut header = Vec::new();
         file.by_ref().take(length).read_to_end(&mut header).map_err(failed)?;
-        let header: Metadata = serde_json::from_slice(&header).map_err(|error| damaged(error.to_string()))?;
+        let header: Metadata = serde_json::from_slice(&header).map_err(|error| damaged(path, error))?;
 
         let data = header.data_len() as u64;
         if size.checked_sub(8 + length) != Some(data) {
-            return Err(damaged("it is truncated or has extra bytes at the end".to_owned()));
+            return Err(damaged(path, "it is truncated or has extra bytes at the end"));
         }
 
         let mut arrays = BTreeMap::new();
@@ -230,6 +211,12 @@ impl Checkpoint<'static> {
         let notes = header.metadata().clone().unwrap_or_default().into_iter().collect();
         Ok(Self { arrays, notes, path: path.to_owned() })
     }
+}
+
+/// The error that the checkpoint at `path` is damaged, or was written by another program.
+fn damaged(path: &Path, reason: impl Display) -> LearningError {
+    let path = path.display();
+    LearningError::new(format!("the checkpoint {path} is damaged: {reason}; start again in another folder"))
 }
 
 #[cfg(test)]

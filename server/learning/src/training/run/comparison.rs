@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::checkpoint::CHECKPOINT;
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::checkpoint::{CHECKPOINT, Checkpoint};
 use super::curves;
+use crate::LearningError;
 use crate::evaluation::Row;
 use crate::training::recipe::Recipe;
 
@@ -62,34 +62,18 @@ pub struct TrainedRun {
     pub benchmark: Option<BenchmarkFigures>,
 }
 
-/// Why a run folder cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    /// It holds no training.
-    #[error("{} holds no saved training; give run folders of `parfocal train`", .0.display())]
-    NoRun(PathBuf),
-    /// Its checkpoint cannot be read.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// Its figures on the benchmark cannot be read.
-    #[error("cannot read {}: {reason}; delete it, then `parfocal train --resume` makes it again", path.display())]
-    Benchmark {
-        /// The file [`BENCHMARK`] of the run folder.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
-
 impl TrainedRun {
     /// Reads the training in `folder`, which may still be running.
     ///
     /// # Errors
     /// If it holds no training, or the training cannot be read.
-    pub fn read(folder: &Path) -> Result<Self, CompareError> {
+    pub fn read(folder: &Path) -> Result<Self, LearningError> {
         let file = folder.join(CHECKPOINT);
         if !file.is_file() {
-            return Err(CompareError::NoRun(folder.to_owned()));
+            return Err(LearningError::new(format!(
+                "{} holds no saved training; give run folders of `parfocal train`",
+                folder.display()
+            )));
         }
 
         let checkpoint = Checkpoint::read_notes(&file)?;
@@ -113,8 +97,13 @@ impl TrainedRun {
     }
 }
 
-fn benchmark(path: &Path) -> Result<Option<BenchmarkFigures>, CompareError> {
-    let unreadable = |reason: String| CompareError::Benchmark { path: path.to_owned(), reason };
+fn benchmark(path: &Path) -> Result<Option<BenchmarkFigures>, LearningError> {
+    let unreadable = |reason: String| {
+        let path = path.display();
+        LearningError::new(format!(
+            "cannot read {path}: {reason}; delete it, then `parfocal train --resume` makes it again"
+        ))
+    };
     match fs::read(path) {
         Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|error| unreadable(error.to_string())),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),

@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::{CHECKPOINT, Checkpoint};
-use crate::training::error::TrainError;
+use crate::LearningError;
 use parfocal_base::files::{self, LockedFile};
 
 const LOCK: &str = ".lock";
@@ -24,9 +24,9 @@ impl RunFolder {
     ///
     /// # Errors
     /// If it holds anything, another process is training there, or it cannot be written.
-    pub fn begin(path: &Path) -> Result<Self, TrainError> {
-        let unwritable = |source| TrainError::writing(path, source);
-        fs::create_dir_all(path).map_err(unwritable)?;
+    pub fn begin(path: &Path) -> Result<Self, LearningError> {
+        let failed = |error| unwritable(path, &error);
+        fs::create_dir_all(path).map_err(failed)?;
         let was_locked_before = path.join(LOCK).exists();
         let lock = lock(path)?;
 
@@ -35,15 +35,18 @@ impl RunFolder {
             name != LOCK && !files::is_systems_own(&name)
         };
 
-        if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {
+        if fs::read_dir(path).map_err(failed)?.filter_map(Result::ok).any(foreign) {
             if !was_locked_before {
                 // Leave no file of ours in a folder with other files.
                 let _ = fs::remove_file(path.join(LOCK));
             }
 
-            let path = path.to_owned();
-            let ours = path.join(CHECKPOINT).exists();
-            return Err(if ours { TrainError::Begun(path) } else { TrainError::Occupied(path) });
+            let problem = if path.join(CHECKPOINT).exists() {
+                "already holds a training; continue it with --resume, or choose another folder"
+            } else {
+                "holds other files, or a training that ended before its first checkpoint; choose a new or empty folder"
+            };
+            return Err(LearningError::new(format!("{} {problem}", path.display())));
         }
 
         Ok(Self { path: path.to_owned(), _lock: lock })
@@ -54,17 +57,20 @@ impl RunFolder {
     ///
     /// # Errors
     /// If there is no checkpoint, it cannot be used, or another process is training there.
-    pub fn go_on(path: &Path) -> Result<(Self, Checkpoint<'static>), TrainError> {
+    pub fn go_on(path: &Path) -> Result<(Self, Checkpoint<'static>), LearningError> {
         if !path.join(CHECKPOINT).exists() {
-            return Err(TrainError::NothingToResume(path.to_owned()));
+            return Err(LearningError::new(format!(
+                "{} has no checkpoint to continue from; check the folder, or start again without --resume",
+                path.display()
+            )));
         }
 
         let lock = lock(path)?;
-        let unwritable = |source| TrainError::writing(path, source);
+        let failed = |error| unwritable(path, &error);
 
-        for entry in fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok) {
+        for entry in fs::read_dir(path).map_err(failed)?.filter_map(Result::ok) {
             if files::is_partial(&entry.file_name().to_string_lossy()) {
-                fs::remove_file(entry.path()).map_err(unwritable)?;
+                fs::remove_file(entry.path()).map_err(failed)?;
             }
         }
 
@@ -78,31 +84,58 @@ impl RunFolder {
     }
 
     /// Writes or replaces file `name`.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), LearningError> {
         let path = self.path.join(name);
-        files::replace(&path, bytes).map_err(|source| TrainError::writing(&path, source))
+        files::replace(&path, bytes).map_err(|error| unwritable(&path, &error))
     }
 
     /// Writes or replaces the checkpoint.
-    pub fn save(&self, checkpoint: &Checkpoint<'_>) -> Result<(), TrainError> {
+    pub fn save(&self, checkpoint: &Checkpoint<'_>) -> Result<(), LearningError> {
         let path = self.path.join(CHECKPOINT);
-        checkpoint.write(&path).map_err(|source| TrainError::writing(&path, source))
+        checkpoint.write(&path).map_err(|error| unwritable(&path, &error))
     }
 
     /// Reads file `name`.
-    pub fn read(&self, name: &str) -> Result<Vec<u8>, TrainError> {
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, LearningError> {
         let path = self.path.join(name);
-        fs::read(&path).map_err(|source| TrainError::Unreadable { path, source })
+        fs::read(&path).map_err(|error| {
+            let path = path.display();
+            LearningError::new(format!(
+                "cannot read {path}: {error}; it belongs to the training and must stay where it is"
+            ))
+        })
     }
 }
 
-fn lock(folder: &Path) -> Result<LockedFile, TrainError> {
+/// The error that `path`, the run folder or a file in it, could not be written.
+pub(super) fn unwritable(path: &Path, error: &io::Error) -> LearningError {
+    let file = path.display();
+    LearningError::new(match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            let has_checkpoint = path.join(CHECKPOINT).exists() || path.with_file_name(CHECKPOINT).exists();
+            let then = if has_checkpoint {
+                "continue from the last checkpoint with --resume"
+            } else {
+                "start again in a new folder"
+            };
+            format!("the disk is too full to write {file}; make room, then {then}")
+        }
+        _ => {
+            format!("cannot write to {file}: {error}; choose a folder that you can write to, or make this one writable")
+        }
+    })
+}
+
+fn lock(folder: &Path) -> Result<LockedFile, LearningError> {
     let path = folder.join(LOCK);
-    let failed = |source: io::Error| TrainError::writing(&path, source);
+    let failed = |error: io::Error| unwritable(&path, &error);
     let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
 
     LockedFile::of(file).map_err(|error| match error {
-        TryLockError::WouldBlock => TrainError::Busy(folder.to_owned()),
+        TryLockError::WouldBlock => LearningError::new(format!(
+            "another training is running in {}; choose another folder, or wait until it ends",
+            folder.display()
+        )),
         TryLockError::Error(error) => failed(error),
     })
 }
@@ -143,7 +176,7 @@ mod tests {
     #[test]
     fn a_full_disk_is_reported_with_advice() {
         let folder = tempfile::tempdir().unwrap();
-        let told = |path: &Path| TrainError::writing(path, io::ErrorKind::StorageFull.into()).to_string();
+        let told = |path: &Path| unwritable(path, &io::ErrorKind::StorageFull.into()).to_string();
         let file = folder.path().join("curves.csv");
         let error = told(&file);
         assert!(error.contains("curves.csv") && error.contains("make room, then start again"), "{error}");

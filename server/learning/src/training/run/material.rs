@@ -8,9 +8,10 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::checkpoint::Checkpoint;
+use crate::LearningError;
 use crate::scans::bench::BenchScenes;
 use crate::scans::benchmark::{Benchmark, Conditions, FRAMES};
-use crate::scans::clip::{Clip, ClipError};
+use crate::scans::clip::Clip;
 use crate::scans::detail::{warning, without_detail};
 use crate::scans::footage;
 use crate::scans::pictures::{Split, varied};
@@ -18,7 +19,6 @@ use crate::scans::relief;
 use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scene;
 use crate::scans::stack::source::StackSource;
-use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 use parfocal_base::notices::tell;
 use parfocal_imaging::PixelFormat;
@@ -73,14 +73,14 @@ const RAW: &str = "raw";
 
 impl Material {
     /// Opens the footage and recordings of `sources`, and draws the pictures that `recipe` needs beside them.
-    pub fn open(sources: &Sources, recipe: &Recipe) -> Result<Self, TrainError> {
+    pub fn open(sources: &Sources, recipe: &Recipe) -> Result<Self, LearningError> {
         let footage = footage(&sources.footage)?;
         let bench = bench(&sources.scans, sources.raw)?;
         Ok(Self { drawn: drawn(recipe, footage.is_some())?, footage, bench, raw: sources.raw })
     }
 
     /// Opens what the training of `checkpoint` was begun on. `asked` holds its new paths, if any were given.
-    pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, recipe: &Recipe) -> Result<Self, TrainError> {
+    pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, recipe: &Recipe) -> Result<Self, LearningError> {
         let paths = |footage: &[PathBuf]| footage.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let known = KnownSources::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
         let scans = KnownSources::of(checkpoint, SCANS, asked.scans.clone())?;
@@ -112,9 +112,8 @@ impl Material {
     }
 
     /// The scenery for the scans of a training by `recipe`.
-    pub fn scenery(&self, recipe: &Recipe) -> Result<Scenery, TrainError> {
-        let relief =
-            relief::scenes(Split::Training, recipe.reliefs).map_err(|error| TrainError::Recipe(error.to_string()))?;
+    pub fn scenery(&self, recipe: &Recipe) -> Result<Scenery, LearningError> {
+        let relief = relief::scenes(Split::Training, recipe.reliefs)?;
         let relief = relief.into_iter().map(Scene::Stack).collect();
         let films = self.footage.as_ref().map_or_else(Vec::new, |(clips, _)| clips.clone());
         let flat = match &self.drawn[..] {
@@ -171,7 +170,7 @@ struct KnownSources {
 }
 
 impl KnownSources {
-    fn of(checkpoint: &Checkpoint<'_>, kind: Kind, asked: Vec<String>) -> Result<Self, TrainError> {
+    fn of(checkpoint: &Checkpoint<'_>, kind: Kind, asked: Vec<String>) -> Result<Self, LearningError> {
         let begun = checkpoint.notes.get(kind.name).map(|paths| Origin {
             paths: paths.lines().map(str::to_owned).collect(),
             sha256: checkpoint.notes.get(&kind.checksum()).cloned().unwrap_or_default(),
@@ -180,7 +179,7 @@ impl KnownSources {
         if begun.is_none() && !asked.is_empty() {
             let Kind { name, option } = kind;
             let instead = if name == FOOTAGE.name { "on drawn pictures" } else { "without recordings" };
-            return Err(TrainError::Differs(format!(
+            return Err(LearningError::new(format!(
                 "this training was begun {instead}; leave out {option} to continue"
             )));
         }
@@ -196,34 +195,34 @@ impl KnownSources {
     }
 
     /// Replaces `error` by one with advice if the cause is that a path of the first run no longer exists.
-    fn unusable(&self, error: TrainError) -> TrainError {
+    fn unusable(&self, error: LearningError) -> LearningError {
         let is_there = |path: &String| Path::new(path).exists() || StackSource::parse(path, None).folder.exists();
         if !self.asked.is_empty() || self.paths().iter().all(is_there) {
             return error;
         }
         let Kind { name, option } = self.kind;
         let (is, its) = if name == FOOTAGE.name { ("is", "its new path") } else { ("are", "their new paths") };
-        TrainError::Differs(format!(
+        LearningError::new(format!(
             "the {name} that this training was begun on {is} gone: {error}; give {its} with {option}"
         ))
     }
 
     /// Rejects pictures that differ from those on which the training was begun.
-    fn check(&self, now: Option<&Origin>) -> Result<(), TrainError> {
+    fn check(&self, now: Option<&Origin>) -> Result<(), LearningError> {
         let Some(begun) = &self.begun else { return Ok(()) };
         let Kind { name, option } = self.kind;
         let names = begun.paths.join(", ");
 
         if now.is_some_and(|now| now.sha256 == begun.sha256) {
             if name == SCANS.name && planes(self.paths()) != planes(&begun.paths) {
-                return Err(TrainError::Differs(format!(
+                return Err(LearningError::new(format!(
                     "this training was begun on {names}; give each folder the same :PLANES, or none where there was none"
                 )));
             }
             return Ok(());
         }
 
-        Err(TrainError::Differs(if self.asked.is_empty() {
+        Err(LearningError::new(if self.asked.is_empty() {
             let has = if name == FOOTAGE.name { "has" } else { "have" };
             format!(
                 "the {name} that this training was begun on ({names}) {has} changed; give the path of the unchanged \
@@ -244,16 +243,15 @@ fn planes(folders: &[String]) -> Vec<Option<usize>> {
 }
 
 /// Draws the pictures of `recipe`, unless footage takes the place of all of them.
-fn drawn(recipe: &Recipe, has_footage: bool) -> Result<Vec<Arc<Clip>>, TrainError> {
+fn drawn(recipe: &Recipe, has_footage: bool) -> Result<Vec<Arc<Clip>>, LearningError> {
     if has_footage && recipe.footage_share >= 1.0 {
         return Ok(Vec::new());
     }
-    let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
-    varied(Split::Training, recipe.pictures).map_err(unfit)
+    varied(Split::Training, recipe.pictures)
 }
 
 /// Reads the footage at `paths`, with its origin; `None` without paths.
-fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, TrainError> {
+fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, LearningError> {
     if paths.is_empty() {
         return Ok(None);
     }
@@ -273,7 +271,7 @@ fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, TrainError> {
 }
 
 /// Reads the recordings in `folders`, with their origin; `None` without folders.
-fn bench(folders: &[String], raw: Option<PixelFormat>) -> Result<Option<(BenchScenes, Origin)>, TrainError> {
+fn bench(folders: &[String], raw: Option<PixelFormat>) -> Result<Option<(BenchScenes, Origin)>, LearningError> {
     if folders.is_empty() {
         return Ok(None);
     }
@@ -297,7 +295,7 @@ fn absolute(path: &str) -> String {
 }
 
 /// Prints a note if scans over `clips` show nothing to focus on.
-fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
+fn check_detail(clips: &[Arc<Clip>]) -> Result<(), LearningError> {
     let count = clips.len().max(LEAST_CHECKED);
     let scenes = clips.iter().cloned().map(Scene::Flat).collect();
     let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };

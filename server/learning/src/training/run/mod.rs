@@ -10,6 +10,7 @@ mod model_card;
 pub mod resume;
 pub mod tensorboard;
 
+use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
@@ -17,9 +18,9 @@ use tch::Device;
 
 use super::belief::BeliefTrainer;
 use super::dqn::DqnTrainer;
-use super::error::TrainError;
 use super::recipe::{LEG, Recipe};
 use super::trainer::Trainer;
+use crate::LearningError;
 use crate::evaluation::{Outcome, Row, evaluate};
 use crate::scans::benchmark::{Benchmark, Conditions, FRAMES};
 use crate::scans::pictures::{Split, varied};
@@ -29,7 +30,7 @@ use crate::scans::simulated::Scene;
 use checkpoint::Checkpoint;
 use comparison::{BENCHMARK, BenchmarkFigures};
 use curves::Point;
-use folder::RunFolder;
+use folder::{RunFolder, unwritable};
 use material::Material;
 pub use material::Sources;
 use model_card::Provenance;
@@ -87,7 +88,7 @@ impl Run {
         folder: &Path,
         from: Option<&Path>,
         device: Device,
-    ) -> Result<Self, TrainError> {
+    ) -> Result<Self, LearningError> {
         // Drawing pictures takes a while, so check everything else first.
         let design = recipe.design()?;
         let weights = from.map(|file| beginning(design, file)).transpose()?;
@@ -110,7 +111,7 @@ impl Run {
     /// # Errors
     /// If there is no checkpoint, it is damaged or does not match, or the footage or recordings are gone or have
     /// changed.
-    pub fn resume(folder: &Path, request: &ResumeRequest, device: Device) -> Result<Self, TrainError> {
+    pub fn resume(folder: &Path, request: &ResumeRequest, device: Device) -> Result<Self, LearningError> {
         let (folder, mut checkpoint) = RunFolder::go_on(folder)?;
         let text = checkpoint.notes.get("recipe").map_or("", String::as_str);
         let recipe = Recipe::parse(text).map_err(|error| checkpoint.damaged(format!("its recipe: {error}")))?;
@@ -139,7 +140,7 @@ impl Run {
         folder: RunFolder,
         material: Material,
         device: Device,
-    ) -> Result<Self, TrainError> {
+    ) -> Result<Self, LearningError> {
         let validation = validation(&recipe, &material)?;
         let trainer = trainer(design, &recipe, material.scenery(&recipe)?, seed, device)?;
 
@@ -189,9 +190,9 @@ impl Run {
         clock: &dyn Clock,
         stop: &dyn Fn() -> bool,
         tell: &mut dyn FnMut(&TrainingProgress),
-    ) -> Result<bool, TrainError> {
+    ) -> Result<bool, LearningError> {
         let folder = self.folder.path().to_owned();
-        let file = |source| TrainError::writing(&folder, source);
+        let file = |error| unwritable(&folder, &error);
         let mut events = EventFile::create(&folder, clock, self.updates()).map_err(file)?;
         let end = self.recipe.updates();
 
@@ -240,15 +241,15 @@ impl Run {
     }
 
     /// The present weights as safetensors, with a note of how they were made.
-    fn weights(&self) -> Result<Vec<u8>, TrainError> {
+    fn weights(&self) -> Result<Vec<u8>, LearningError> {
         let made =
             format!("{}, seed {}, {} updates, parfocal {}", self.recipe.policy, self.seed, self.updates(), VERSION);
-        weights::save(self.trainer.store(), &made).map_err(|error| TrainError::Diverged(error.to_string()))
+        weights::save(self.trainer.store(), &made).map_err(|error| diverged(&error))
     }
 
     /// Evaluates the present weights on the validation scans, and saves them if they are the best so far. Returns their
     /// mean absolute error.
-    fn validate(&mut self) -> Result<f64, TrainError> {
+    fn validate(&mut self) -> Result<f64, LearningError> {
         let bytes = self.weights()?;
         let row = self.figures(bytes.clone(), &self.validation)?;
 
@@ -273,7 +274,7 @@ impl Run {
     ///
     /// # Errors
     /// If the run folder cannot be read or written.
-    pub fn report(&self) -> Result<(), TrainError> {
+    pub fn report(&self) -> Result<(), LearningError> {
         let count = self.recipe.benchmark;
         if count == 0 || !self.best.is_finite() {
             return Ok(());
@@ -286,7 +287,7 @@ impl Run {
         }
 
         let weights = beginning(self.design, &self.folder.path().join(self.weights_file()))?;
-        let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
+        let benchmark = Benchmark::reference(count)?;
         let row = self.figures(weights, &benchmark)?;
 
         let figures = serde_json::to_vec_pretty(&BenchmarkFigures::new(&row, count)).unwrap_or_default();
@@ -299,8 +300,7 @@ impl Run {
     }
 
     /// Evaluates the weights in `bytes` on `scans`.
-    fn figures(&self, bytes: Vec<u8>, scans: &Benchmark) -> Result<Row, TrainError> {
-        let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
+    fn figures(&self, bytes: Vec<u8>, scans: &Benchmark) -> Result<Row, LearningError> {
         let design = self.design;
         let name = PolicyName::new(&self.recipe.policy);
         let build = move |bytes: &[u8]| shipped::build(design, bytes);
@@ -318,7 +318,7 @@ impl Run {
         toml::to_string(&self.recipe).unwrap_or_default()
     }
 
-    fn save(&self) -> Result<(), TrainError> {
+    fn save(&self) -> Result<(), LearningError> {
         let mut checkpoint = Checkpoint::default();
         self.trainer.save(&mut checkpoint);
 
@@ -348,7 +348,7 @@ fn trainer(
     scenery: Scenery,
     seed: u64,
     device: Device,
-) -> Result<Box<dyn Trainer>, TrainError> {
+) -> Result<Box<dyn Trainer>, LearningError> {
     Ok(match (design, &recipe.dqn, &recipe.belief) {
         (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
         (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
@@ -362,11 +362,10 @@ fn trainer(
 /// - as many over the same pictures, as varied as scans in training can be;
 /// - if the recipe trains on relief, up to 60 scans over scenes with relief;
 /// - if it trains on a bench's recordings, as many over those as over the pictures.
-fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, TrainError> {
-    let unfit = |error: &dyn std::fmt::Display| TrainError::Recipe(error.to_string());
-    let flat = varied(Split::Validation, recipe.pictures.min(60)).map_err(|error| unfit(&error))?;
+fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, LearningError> {
+    let flat = varied(Split::Validation, recipe.pictures.min(60))?;
     let flat: Vec<Scene> = flat.into_iter().map(Scene::Flat).collect();
-    let relief = relief::scenes(Split::Validation, recipe.reliefs.min(60)).map_err(|error| unfit(&error))?;
+    let relief = relief::scenes(Split::Validation, recipe.reliefs.min(60))?;
 
     let plain = flat.len();
     let bench = material.bench_validation().iter().cycle().take(flat.len()).cloned();
@@ -378,12 +377,18 @@ fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, TrainEr
 }
 
 /// Reads the weights in `file` and checks that they fit a policy of `design`.
-fn beginning(design: Design, file: &Path) -> Result<Vec<u8>, TrainError> {
+fn beginning(design: Design, file: &Path) -> Result<Vec<u8>, LearningError> {
     let bytes = fs::read(file).map_err(|error| unfit(file, &error))?;
     shipped::build(design, &bytes).map_err(|error| unfit(file, &error))?;
     Ok(bytes)
 }
 
-fn unfit(file: &Path, reason: &dyn std::fmt::Display) -> TrainError {
-    TrainError::Weights { path: file.to_owned(), reason: reason.to_string() }
+/// The error that the weights in `file` cannot be used.
+fn unfit(file: &Path, reason: &dyn Display) -> LearningError {
+    LearningError::new(format!("cannot use the weights {}: {reason}", file.display()))
+}
+
+/// The error that the training went astray, for example to weights that are not finite.
+fn diverged(reason: &dyn Display) -> LearningError {
+    LearningError::new(format!("the training diverged: {reason}; lower the learning rate"))
 }

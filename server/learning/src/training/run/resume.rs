@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::material::Sources;
-use crate::training::error::TrainError;
+use crate::LearningError;
 use crate::training::recipe::{Recipe, shipped};
 
 /// The arguments of a training that is resumed. Those not given stay as when the training was begun.
@@ -23,10 +23,10 @@ pub struct ResumeRequest {
 
 impl ResumeRequest {
     /// Checks that the request matches the training in `folder`, which was begun with `recipe` and `seed`.
-    pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), TrainError> {
+    pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), LearningError> {
         let folder = folder.display();
         let made = &recipe.policy;
-        let differs = |text: String| Err(TrainError::Differs(text));
+        let differs = |text: String| Err(LearningError::new(text));
 
         if self.name != *made {
             let ships = shipped(&self.name).and_then(|text| Recipe::parse(text).ok());

@@ -12,6 +12,7 @@
 //! An answer holds, one after another, for all environments: their patches (u8), focal powers (f32), optimal focal
 //! powers (f32), and whether the scan has ended (u8).
 
+use std::fmt::Display;
 use std::io::{self, Read, Write};
 
 use serde::Serialize;
@@ -37,23 +38,16 @@ pub enum ProtocolError {
     /// A pipe failed.
     #[error("the pipe to the training program failed: {0}")]
     Pipe(#[from] io::Error),
-    /// Something else than a request.
-    #[error(
-        "the training program sent the byte {0} where a request (R, M or T) begins; is something else printing to this pipe?"
-    )]
-    Request(u8),
-    /// A value that a request may not have.
-    #[error("the training program sent {value} as {what} of environment {environment}, which must be {expected}")]
-    Value {
-        /// What it sent.
-        value: String,
-        /// What it stands for.
-        what: &'static str,
-        /// Number of the environment, from 0.
-        environment: usize,
-        /// What would have been right.
-        expected: &'static str,
-    },
+    /// Something came that is no request.
+    #[error("the training program sent {0}")]
+    Request(String),
+}
+
+impl ProtocolError {
+    /// `value` was sent as `what` of `environment` (from 0), which must be `expected`.
+    fn value(value: impl Display, what: &str, environment: usize, expected: &str) -> Self {
+        Self::Request(format!("{value} as {what} of environment {environment}, which must be {expected}"))
+    }
 }
 
 /// Serves `fleet` until the other program closes its pipe.
@@ -79,7 +73,11 @@ pub fn serve(fleet: &mut Fleet, mut requests: impl Read, mut answers: impl Write
             b'R' => fleet.reset(&begins(&mut requests, fleet.count())?),
             b'M' => fleet.step(&moves(&mut requests, fleet.count())?),
             b'T' => fleet.step(&targets(&mut requests, fleet.count())?),
-            other => return Err(ProtocolError::Request(other)),
+            other => {
+                return Err(ProtocolError::Request(format!(
+                    "the byte {other} where a request (R, M or T) begins; is something else printing to this pipe?"
+                )));
+            }
         }
 
         fleet.observe(&mut answer);
@@ -105,12 +103,7 @@ fn begins(requests: &mut impl Read, count: usize) -> Result<Vec<Begin>, Protocol
         0 => Ok(Begin::Not),
         1 => Ok(Begin::Next),
         2 => Ok(Begin::Seeded(u64::from_le_bytes(seed))),
-        _ => Err(ProtocolError::Value {
-            value: kind.to_string(),
-            what: "the beginning",
-            environment,
-            expected: "0, 1 or 2",
-        }),
+        _ => Err(ProtocolError::value(kind, "the beginning", environment, "0, 1 or 2")),
     };
     kinds.into_iter().zip(seeds).enumerate().map(begin).collect()
 }
@@ -121,8 +114,7 @@ fn moves(requests: &mut impl Read, count: usize) -> Result<Vec<Action>, Protocol
         if (-1..=1).contains(&steps) {
             return Ok(Action::Steps(steps));
         }
-        let value = steps.to_string();
-        Err(ProtocolError::Value { value, what: "the steps", environment, expected: "-1, 0 or 1" })
+        Err(ProtocolError::value(steps, "the steps", environment, "-1, 0 or 1"))
     };
     values(requests, count)?.into_iter().enumerate().map(action).collect()
 }
@@ -133,8 +125,7 @@ fn targets(requests: &mut impl Read, count: usize) -> Result<Vec<Action>, Protoc
         if (0.0..=1.0).contains(&target) {
             return Ok(Action::Target(target));
         }
-        let value = target.to_string();
-        Err(ProtocolError::Value { value, what: "the focal power", environment, expected: "from 0 to 1" })
+        Err(ProtocolError::value(target, "the focal power", environment, "from 0 to 1"))
     };
     values(requests, count)?.into_iter().enumerate().map(action).collect()
 }
