@@ -24,10 +24,7 @@ impl From<AnalysisError> for Error {
         let text = error.to_string();
         match error {
             AnalysisError::NoStudy { .. } => Self::NotFound(text),
-            AnalysisError::StillBlinded { .. }
-            | AnalysisError::BlindedPackage(_)
-            | AnalysisError::ExportedBefore { .. }
-            | AnalysisError::Package(_) => Self::Conflict(text),
+            AnalysisError::Refused(_) => Self::Conflict(text),
             AnalysisError::Export(error) => error.into(),
             AnalysisError::Store(_) => Self::Storage(text),
         }

@@ -21,13 +21,9 @@ impl From<StudyExportError> for Error {
         let text = error.to_string();
         match error {
             StudyExportError::NoStudy { .. } => Self::NotFound(text),
-            StudyExportError::NoSession(_) | StudyExportError::StillBlinded(_) => Self::Conflict(text),
+            StudyExportError::Refused(_) => Self::Conflict(text),
             StudyExportError::Session(error) => error.into(),
-            StudyExportError::Package(_)
-            | StudyExportError::Store(_)
-            | StudyExportError::Unwritable { .. }
-            | StudyExportError::NoRoom { .. }
-            | StudyExportError::Broken => Self::Storage(text),
+            StudyExportError::Failed(_) => Self::Storage(text),
         }
     }
 }

@@ -33,7 +33,11 @@ pub async fn check(reader: &Reader, name: &str) -> Result<StoredStudy, AnalysisE
     };
     match study.state().stage {
         Stage::Unblinded => Ok(study),
-        stage => Err(AnalysisError::StillBlinded { study: name.to_owned(), stage }),
+        stage => Err(AnalysisError::Refused(format!(
+            "study '{name}' is {}: it can be analysed once all of it is unblinded, which the people named in its \
+             definition can do after it was locked",
+            stage.name()
+        ))),
     }
 }
 

@@ -148,7 +148,7 @@ struct ExportedSession {
 /// If the package is blinded, an export in it was made before its site unblinded the study, or a file cannot be read.
 pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
     let folders = exports_of(folder)?;
-    let first = folders.first().ok_or_else(|| PackageError::Empty(folder.to_owned()))?;
+    let first = folders.first().ok_or_else(|| PackageError::empty(folder))?;
     let definition: Definition = toml_of(first, "study.toml")?;
 
     let mut sessions = Vec::new();
@@ -208,10 +208,14 @@ pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
 
 impl ExportedSession {
     fn read(folder: &Path) -> Result<Self, AnalysisError> {
-        let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
+        let unreadable = |reason: String| PackageError::unreadable(folder)(reason);
         let export = ExportFiles::of(folder);
         if !export.has("allocation.json") {
-            return Err(AnalysisError::BlindedPackage(folder.to_owned()));
+            return Err(AnalysisError::Refused(format!(
+                "{} does not contain the policies: export the study with --unblinded once all of it is unblinded, and \
+                 join it again",
+                folder.display()
+            )));
         }
 
         let allocation = export.json("allocation.json").map_err(unreadable)?;
@@ -259,12 +263,14 @@ impl ExportedSession {
         let unblinding = latest_first.find(|event| event.kind == "unblinded").map(|event| event.wall);
         match unblinding {
             Some(unblinded) if self.study().stage == "unblinded" => Ok(unblinded),
-            _ => Err(AnalysisError::ExportedBefore {
-                package: package.to_owned(),
-                export: self.folder.clone(),
-                site: self.place().site.clone(),
-                stage: self.study().stage.clone(),
-            }),
+            _ => Err(AnalysisError::Refused(format!(
+                "{} cannot be analysed: {} was exported while the study was {} at site '{}'; unblind the study there, \
+                 export it again and join it again",
+                package.display(),
+                self.folder.display(),
+                self.study().stage,
+                self.place().site
+            ))),
         }
     }
 
@@ -457,8 +463,7 @@ fn text_of(folder: &Path, file: &str) -> Result<String, AnalysisError> {
 }
 
 fn toml_of<T: serde::de::DeserializeOwned>(folder: &Path, file: &str) -> Result<T, AnalysisError> {
-    let unreadable =
-        |error: toml::de::Error| PackageError::Unreadable { path: folder.join(file), reason: error.message().into() };
+    let unreadable = |error: toml::de::Error| PackageError::unreadable(folder.join(file))(error.message());
     Ok(toml::from_str(&text_of(folder, file)?).map_err(unreadable)?)
 }
 

@@ -53,29 +53,30 @@ impl PackageSource {
     /// If it does not verify, another version wrote it, or its session is outside any study.
     pub fn open(folder: &Path) -> Result<Self, PackageError> {
         if !is_export(folder) {
-            return Err(PackageError::NotAnExport(folder.to_owned()));
+            return Err(PackageError::not_an_export(folder));
         }
 
-        let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
+        let unreadable = |reason: String| PackageError::unreadable(folder)(reason);
         let export = ExportFiles::of(folder);
         let format = export.format().map_err(unreadable)?;
         if format != FORMAT {
-            return Err(PackageError::OtherFormat { folder: folder.to_owned(), found: format, expected: FORMAT });
+            let other = format!(
+                "has format {format}, and this version of parfocal writes format {FORMAT}: export it again with this \
+                 version, so that all sites have the same columns"
+            );
+            return Err(PackageError::of(folder, other));
         }
 
         for check in verify_files(&export, None) {
             if let Verdict::Failed(problem) = check.verdict {
-                return Err(PackageError::Unverified {
-                    folder: folder.to_owned(),
-                    check: check.name.to_owned(),
-                    problem,
-                });
+                let changed = format!("is not as it was exported: {}: {problem}; export it again", check.name);
+                return Err(PackageError::of(folder, changed));
             }
         }
 
         let package = export.json("datapackage.json").map_err(unreadable)?;
         let described = &package["parfocal"];
-        let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
+        let outside = || PackageError::of(folder, "is of a session outside any study");
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let cell = |file: &str, column: &str| {
             let cells = export.cells(file, column).map_err(unreadable)?;
@@ -106,8 +107,8 @@ impl PackageSource {
         Self { folder, ..self.clone() }
     }
 
-    fn apart(&self, other: &Self, reason: impl Into<String>) -> PackageError {
-        PackageError::Apart { one: self.folder.clone(), other: other.folder.clone(), reason: reason.into() }
+    fn apart(&self, other: &Self, reason: &str) -> PackageError {
+        PackageError::apart(&self.folder, &other.folder, reason)
     }
 }
 
@@ -118,8 +119,7 @@ impl PackageSource {
 pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
     let sessions = path.join(SESSIONS);
     if !sessions.is_dir() {
-        let path = path.to_owned();
-        return if is_export(&path) { Ok(vec![path]) } else { Err(PackageError::NotAnExport(path)) };
+        return if is_export(path) { Ok(vec![path.to_owned()]) } else { Err(PackageError::not_an_export(path)) };
     }
 
     let mut folders = Vec::new();
@@ -153,7 +153,7 @@ pub fn agree(sources: &[PackageSource]) -> Result<(), PackageError> {
     for source in sources {
         if source.study != first.study {
             let reason = format!("one is of study '{}', the other of '{}'", first.study, source.study);
-            return Err(first.apart(source, reason));
+            return Err(first.apart(source, &reason));
         }
         if source.definition_sha256 != first.definition_sha256 {
             return Err(first.apart(source, "the definition of their study differs"));
@@ -164,7 +164,8 @@ pub fn agree(sources: &[PackageSource]) -> Result<(), PackageError> {
             );
         }
         if let Some(twin) = seen.insert(&source.session, source) {
-            return Err(twin.apart(source, format!("both have session {}; give each site once", source.session)));
+            let reason = format!("both have session {}; give each site once", source.session);
+            return Err(twin.apart(source, &reason));
         }
     }
 
@@ -189,7 +190,7 @@ fn one_chain(sources: &[&PackageSource]) -> Result<(), PackageError> {
         if rows.get(&source.head.0.to_string()) != Some(&source.head.1) {
             let reason =
                 format!("both say that they are of site '{}', but their chains of records differ", source.site);
-            return Err(source.apart(longest, reason));
+            return Err(source.apart(longest, &reason));
         }
     }
     Ok(())

@@ -62,7 +62,7 @@ pub fn write(
     sources.sort_by(|one, other| one.session.cmp(&other.session));
     let sources = sources.as_slice();
 
-    let first = sources.first().ok_or_else(|| PackageError::Empty(out.to_owned()))?;
+    let first = sources.first().ok_or_else(|| PackageError::empty(out))?;
     agree(sources)?;
     check_new(out)?;
 
@@ -91,7 +91,7 @@ pub fn write(
 
 fn check_new(out: &Path) -> Result<(), PackageError> {
     let is_free = is_new_or_empty(out).map_err(PackageError::unwritable(out))?;
-    if is_free { Ok(()) } else { Err(PackageError::Exists(out.to_owned())) }
+    if is_free { Ok(()) } else { Err(PackageError::of(out, "exists and is not empty; choose a new folder")) }
 }
 
 fn fill(

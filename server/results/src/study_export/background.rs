@@ -141,7 +141,7 @@ async fn make(
     unblinded: bool,
 ) -> Result<FinishedExport, StudyExportError> {
     let folder = downloads.folder().to_owned();
-    let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
+    let unwritable = |error| StudyExportError::unwritable(&folder, &error);
     std::fs::create_dir_all(&folder).map_err(unwritable)?;
     let room = tempfile::Builder::new().prefix("export-").tempdir_in(&folder).map_err(unwritable)?;
     let package = room.path().join(&study);

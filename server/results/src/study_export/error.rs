@@ -1,6 +1,7 @@
 //! Why a study could not be exported.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::Path;
 
 use crate::package::PackageError;
 use parfocal_records::store::StoreError;
@@ -17,41 +18,40 @@ pub enum StudyExportError {
         /// Names of the existing studies.
         known: String,
     },
-    /// All sessions of the study are withdrawn, or there are none yet.
-    #[error("study '{0}' has no session to export")]
-    NoSession(String),
-    /// The policies were requested before the study was unblinded.
-    #[error("study '{0}' is not unblinded: export it without its policies, or unblind it first")]
-    StillBlinded(String),
+    /// The study is not in a state to be exported so.
+    #[error("{0}")]
+    Refused(String),
     /// A session could not be exported.
     #[error(transparent)]
     Session(#[from] ExportError),
-    /// The exports could not be joined.
-    #[error(transparent)]
-    Package(#[from] PackageError),
-    /// The database failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// A folder could not be made.
-    #[error("cannot write {}: {error}; see that it can be written and has room, and export again", .path.display())]
-    Unwritable {
-        /// Path of the folder.
-        path: PathBuf,
-        /// Error of the operating system.
-        error: std::io::Error,
-    },
-    /// The disk has too little space in addition to the reserve for trials.
-    #[error(
-        "the disk of {} has no room for the export: {:.1} GB have to stay free for trials; \
-         remove what is no longer needed there, and export again", .path.display(), *.reserve as f64 / 1e9
-    )]
-    NoRoom {
-        /// Folder in which the export was to be written.
-        path: PathBuf,
-        /// Reserve in bytes, which exports never use.
-        reserve: u64,
-    },
-    /// A thread of the export panicked.
-    #[error("the export ended before it was whole; export again, and report it if that happens again")]
-    Broken,
+    /// The disk, the database or the program failed. The message says what to do.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl StudyExportError {
+    /// Makes an error about writing the folder `path`.
+    pub(super) fn unwritable(path: &Path, error: &io::Error) -> Self {
+        let path = path.display();
+        Self::Failed(format!("cannot write {path}: {error}; see that it can be written and has room, and export again"))
+    }
+
+    /// Makes an error about a thread of the export that panicked.
+    pub(super) fn broken() -> Self {
+        Self::Failed(
+            "the export ended before it was whole; export again, and report it if that happens again".to_owned(),
+        )
+    }
+}
+
+impl From<PackageError> for StudyExportError {
+    fn from(error: PackageError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<StoreError> for StudyExportError {
+    fn from(error: StoreError) -> Self {
+        Self::Failed(error.to_string())
+    }
 }

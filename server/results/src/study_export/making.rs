@@ -82,8 +82,8 @@ pub async fn export_study(
         let _ = done.send(making.run(&runtime));
     };
 
-    thread.spawn(work).map_err(|error| StudyExportError::Unwritable { path: out.to_owned(), error })?;
-    let summary = made.await.map_err(|_| StudyExportError::Broken)??;
+    thread.spawn(work).map_err(|error| StudyExportError::unwritable(out, &error))?;
+    let summary = made.await.map_err(|_| StudyExportError::broken())??;
     Ok(ExportedStudy { summary, sessions: exported })
 }
 
@@ -118,10 +118,12 @@ async fn sessions_of(
     let left_out = stored.sessions.iter().filter(|session| session.withdrawn).map(withdrawn).collect();
     let kept: Vec<&Enrolled> = stored.sessions.iter().filter(|session| !session.withdrawn).collect();
     if kept.is_empty() {
-        return Err(StudyExportError::NoSession(study.to_owned()));
+        return Err(StudyExportError::Refused(format!("study '{study}' has no session to export")));
     }
     if unblinded && stored.state().stage != Stage::Unblinded && kept.iter().any(|session| !session.unblinded) {
-        return Err(StudyExportError::StillBlinded(study.to_owned()));
+        return Err(StudyExportError::Refused(format!(
+            "study '{study}' is not unblinded: export it without its policies, or unblind it first"
+        )));
     }
 
     Ok((kept.into_iter().map(|session| session.session).collect(), left_out))
@@ -141,7 +143,7 @@ impl Making {
     /// Makes the package. Must not be called on a thread of `runtime`, because it blocks.
     fn run(&self, runtime: &Handle) -> Result<Summary, StudyExportError> {
         let parent = folder_of(&self.out);
-        let unwritable = |error| StudyExportError::Unwritable { path: parent.to_owned(), error };
+        let unwritable = |error| StudyExportError::unwritable(parent, &error);
         std::fs::create_dir_all(parent).map_err(unwritable)?;
         let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;
 
@@ -172,7 +174,10 @@ impl Making {
         self.tell(0);
         let outcomes: Vec<Result<(), StudyExportError>> = thread::scope(|scope| {
             let workers: Vec<_> = (0..processors.min(AT_A_TIME)).map(|_| scope.spawn(|| work.run())).collect();
-            workers.into_iter().map(|worker| worker.join().unwrap_or(Err(StudyExportError::Broken))).collect()
+            workers
+                .into_iter()
+                .map(|worker| worker.join().unwrap_or_else(|_| Err(StudyExportError::broken())))
+                .collect()
         });
         outcomes.into_iter().collect::<Result<(), _>>()?;
 
@@ -235,7 +240,12 @@ fn check_room(folder: &Path, bytes: u64) -> Result<(), StudyExportError> {
     // If the free space is unknown, writing reports an error when the disk is full.
     let Ok(room) = room(folder) else { return Ok(()) };
     if room.spare() < bytes {
-        return Err(StudyExportError::NoRoom { path: folder.to_owned(), reserve: room.reserve });
+        return Err(StudyExportError::Failed(format!(
+            "the disk of {} has no room for the export: {:.1} GB have to stay free for trials; remove what is no \
+             longer needed there, and export again",
+            folder.display(),
+            room.reserve as f64 / 1e9
+        )));
     }
     Ok(())
 }
