@@ -1,6 +1,7 @@
 //! The policies that ship with the program, and the use of weights that people trained themselves.
 
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 
 use super::belief::BeliefTracker;
 use super::learned::{Input, Learned};
@@ -84,26 +85,10 @@ pub fn with_shipped(registry: Registry) -> Registry {
     })
 }
 
-/// Why weights in a folder cannot be used.
+/// Why weights in a folder cannot be used, with the folder or the file.
 #[derive(Debug, thiserror::Error)]
-pub enum FolderError {
-    /// The folder has no weights of a learned policy.
-    #[error("there are no weights in {}: none of {names}", folder.display())]
-    Empty {
-        /// The folder.
-        folder: PathBuf,
-        /// File names that were looked for, separated by commas.
-        names: String,
-    },
-    /// A file of weights cannot be used.
-    #[error("cannot use the weights {}: {reason}", file.display())]
-    Unfit {
-        /// The file of the weights.
-        file: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
+#[error("{0}")]
+pub struct FolderError(String);
 
 /// Replaces the weights that ship by those in `folder`, called `NAME.safetensors`. A policy without a file there keeps
 /// its weights.
@@ -115,14 +100,15 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
     let there: Vec<_> = SHIPPED.iter().filter(|shipped| file_of(shipped.name).exists()).collect();
     if there.is_empty() {
         let names: Vec<_> = SHIPPED.iter().map(|shipped| format!("{}.safetensors", shipped.name)).collect();
-        return Err(FolderError::Empty { folder: folder.to_owned(), names: names.join(", ") });
+        let names = names.join(", ");
+        return Err(FolderError(format!("there are no weights in {}: none of {names}", folder.display())));
     }
 
     there.into_iter().try_fold(registry, |registry, &Shipped { name, summary, design, .. }| {
         let file = file_of(name);
-        let unfit = |reason: String| FolderError::Unfit { file: file.clone(), reason };
-        let bytes = std::fs::read(&file).map_err(|error| unfit(error.to_string()))?;
-        build(design, &bytes).map_err(|error| unfit(error.to_string()))?;
+        let unfit = |reason: &dyn Display| FolderError(format!("cannot use the weights {}: {reason}", file.display()));
+        let bytes = std::fs::read(&file).map_err(|error| unfit(&error))?;
+        build(design, &bytes).map_err(|error| unfit(&error))?;
         Ok(registry.made_of_weights(name, summary, bytes.into(), move |bytes| build(design, bytes)))
     })
 }

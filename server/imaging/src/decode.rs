@@ -57,7 +57,10 @@ pub fn raw_format(length: usize, format: Option<PixelFormat>) -> Result<PixelFor
     known.iter().copied().find(|format| format.bytes(count) == length).ok_or_else(|| {
         let sized = |format: &PixelFormat| format!("{format} {} bytes", format.bytes(count));
         let expected = known.iter().map(sized).collect::<Vec<_>>().join(", ");
-        DecodeError::RawLength { expected, found: length }
+        let (width, height) = SENSOR_SIZE;
+        DecodeError::Raw(format!(
+            "a raw mosaic is {width}x{height} samples, in {expected}, but this file has {length} bytes"
+        ))
     })
 }
 
@@ -73,7 +76,9 @@ fn check_counts(bytes: &[u8], format: PixelFormat) -> Result<(), DecodeError> {
         return Ok(());
     }
     let fit = wide.iter().filter(|other| largest <= other.white()).map(|other| other.name());
-    Err(DecodeError::RawCounts { largest, format, fit: fit.collect::<Vec<_>>().join(" or ") })
+    let fit = fit.collect::<Vec<_>>().join(" or ");
+    let white = format.white();
+    Err(DecodeError::Raw(format!("holds a count of {largest}, but {format} ends at {white}; give --raw {fit}")))
 }
 
 fn words(bytes: &[u8]) -> impl Iterator<Item = u16> {

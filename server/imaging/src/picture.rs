@@ -78,28 +78,9 @@ pub enum DecodeError {
     /// A mosaic whose sides are not multiples of 4.
     #[error(transparent)]
     MosaicSize(#[from] FrameError),
-    /// A raw mosaic of another length than the sensor's.
-    #[error(
-        "a raw mosaic is {}x{} samples, in {expected}, but this file has {found} bytes",
-        SENSOR_SIZE.0,
-        SENSOR_SIZE.1
-    )]
-    RawLength {
-        /// Formats and their bytes, for people.
-        expected: String,
-        /// Bytes given.
-        found: usize,
-    },
-    /// A raw mosaic with counts that its format cannot have.
-    #[error("holds a count of {largest}, but {format} ends at {}; give --raw {fit}", format.white())]
-    RawCounts {
-        /// The largest count.
-        largest: u16,
-        /// The format in which it was to be read.
-        format: PixelFormat,
-        /// Formats that can have it, for people.
-        fit: String,
-    },
+    /// A raw mosaic of another length than the sensor's, or with counts that its format cannot have.
+    #[error("{0}")]
+    Raw(String),
 }
 
 /// Width and height that may be decoded.

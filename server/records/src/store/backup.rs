@@ -30,28 +30,6 @@ pub enum BackupError {
     /// The file to write exists already.
     #[error("{} exists; choose a new name", .0.display())]
     Exists(PathBuf),
-    /// A file could not be read or written.
-    #[error("cannot use {}: {error}", .path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// The error of the file system.
-        error: std::io::Error,
-    },
-    /// The disk has no room for a copy beside the database.
-    #[error(
-        "the disk of {} has no room for a copy of the database ({needed} bytes) beside the reserve that is kept for a \
-         session; make room, or run `parfocal backup` with --out on another disk", .path.display()
-    )]
-    NoRoom {
-        /// Folder of the copy.
-        path: PathBuf,
-        /// Size of the database in bytes.
-        needed: u64,
-    },
-    /// The receiver of a backup stopped reading, or its disk is full.
-    #[error("the backup was not sent whole: {0}; remove what arrived of it, and try again")]
-    Sending(io::Error),
     /// The copy does not verify.
     #[error("{what} does not verify: {problem}; nothing was changed")]
     Unsound {
@@ -63,14 +41,15 @@ pub enum BackupError {
     /// The database failed.
     #[error("{0}")]
     Store(#[from] StoreError),
-    /// Another program reads the database that is to be replaced.
-    #[error("another program has the database {} open; close it and try again; nothing was changed", .0.display())]
-    Open(PathBuf),
+    /// A disk failed or is full, or another program is in the way. The message says which, and what to do.
+    #[error("{0}")]
+    Failed(String),
 }
 
 impl BackupError {
-    fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
-        |error| Self::File { path: path.to_owned(), error }
+    /// The error that the file or folder at `path` could not be read or written.
+    pub(super) fn file(path: &Path) -> impl Fn(io::Error) -> Self {
+        |error| Self::Failed(format!("cannot use {}: {error}", path.display()))
     }
 }
 
@@ -156,7 +135,9 @@ pub async fn backup_to(folder: &Path, receiver: &mut impl Write, clock: Arc<dyn 
 
     let VerifiedCopy { file, bytes, head } = copied?;
     let mut content = file.reopen().map_err(BackupError::file(file.path()))?;
-    io::copy(&mut content, receiver).and_then(|_| receiver.flush()).map_err(BackupError::Sending)?;
+    io::copy(&mut content, receiver).and_then(|_| receiver.flush()).map_err(|error| {
+        BackupError::Failed(format!("the backup was not sent whole: {error}; remove what arrived of it, and try again"))
+    })?;
     Ok(Backup { file: PathBuf::from("-"), bytes, head: head.to_string() })
 }
 
@@ -186,7 +167,11 @@ pub async fn verified_copy(access_log: &AccessLog, folder: &Path) -> Result<Veri
     let needed = access_log.reader().bytes().await?;
     // Comments and answers of a session need the reserve. If the free space is unknown, writing reports a full disk.
     if room(folder).is_ok_and(|room| room.spare() < needed) {
-        return Err(BackupError::NoRoom { path: folder.to_owned(), needed });
+        return Err(BackupError::Failed(format!(
+            "the disk of {} has no room for a copy of the database ({needed} bytes) beside the reserve that is kept \
+             for a session; make room, or run `parfocal backup` with --out on another disk",
+            folder.display()
+        )));
     }
     copy_into(access_log, temporary_in(folder)?, "the backup").await
 }
@@ -214,7 +199,7 @@ fn put_in_place(
 ) -> Result<(), BackupError> {
     let failed = |error: io::Error| match error.kind() {
         ErrorKind::AlreadyExists => BackupError::Exists(out.to_owned()),
-        _ => BackupError::File { path: out.to_owned(), error },
+        _ => BackupError::file(out)(error),
     };
     let file = match rename(file, out) {
         Ok(_) => return Ok(()),
@@ -270,7 +255,7 @@ pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Resul
     let aside = set_aside(&database, there, clock.wall()).await?;
     if let Err(error) = copy.persist(&database) {
         put_back(&database, &aside);
-        return Err(BackupError::File { path: database, error: error.error });
+        return Err(BackupError::file(&database)(error.error));
     }
     sync_folder_of(&database);
     let replaced = replaced.map(|head| head.to_string());
@@ -310,7 +295,10 @@ async fn set_aside(database: &Path, there: bool, now: Timestamp) -> Result<PathB
         let folded = Reader::fold_log(database).await;
         let log = sibling(database, "-wal");
         if folded.is_ok() && log.metadata().is_ok_and(|log| log.len() > 0) {
-            return Err(BackupError::Open(database.to_owned()));
+            return Err(BackupError::Failed(format!(
+                "another program has the database {} open; close it and try again; nothing was changed",
+                database.display()
+            )));
         }
     }
 
@@ -333,7 +321,7 @@ async fn set_aside(database: &Path, there: bool, now: Timestamp) -> Result<PathB
         match std::fs::rename(sibling(database, suffix), sibling(&kept, suffix)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 put_back(database, &kept);
-                return Err(BackupError::File { path: kept, error });
+                return Err(BackupError::file(&kept)(error));
             }
             _ => {}
         }

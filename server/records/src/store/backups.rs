@@ -138,7 +138,6 @@ async fn make(access_log: AccessLog, folder: PathBuf) -> Result<FinishedBackup, 
 }
 
 async fn copy(access_log: &AccessLog, folder: &Path) -> Result<VerifiedCopy, BackupError> {
-    let unwritable = |error| BackupError::File { path: folder.to_owned(), error };
-    std::fs::create_dir_all(folder).map_err(unwritable)?;
+    std::fs::create_dir_all(folder).map_err(BackupError::file(folder))?;
     verified_copy(access_log, folder).await
 }
