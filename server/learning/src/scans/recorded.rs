@@ -216,8 +216,8 @@ impl RecordedScan {
         to_and_fro(time, self.poses.len())
     }
 
-    /// Adds the focal powers, the patches and the wider patches to `hash`. The surroundings, cut from the same pictures,
-    /// are left out.
+    /// Adds the focal powers, the patches and the wider patches to `hash`. The surroundings are left out; they are cut
+    /// from the same pictures.
     pub(crate) fn digest(&self, hash: &mut Sha256) {
         hash.update((self.poses.len() as u64).to_le_bytes());
         self.powers.iter().for_each(|power| hash.update(power.get().to_le_bytes()));

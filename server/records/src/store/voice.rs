@@ -12,7 +12,7 @@ use sqlx::sqlite::SqliteRow;
 use super::error::Wrong;
 use super::insert::Insert;
 use super::remarks::is_erased;
-use super::values::{named, parsed, stamp};
+use super::values::{named, parsed};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use parfocal_base::boxed;
 use parfocal_base::ids::{IdempotencyKey, SessionId};
@@ -55,10 +55,6 @@ pub enum PieceKept {
 /// A piece read back, without its sound.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredPiece {
-    /// Order of the record in the database.
-    pub number: i64,
-    /// Number of the run that kept it.
-    pub run: i64,
     /// Its place in the recording, from 1.
     pub piece: u32,
     /// Media type of the sound.
@@ -69,10 +65,6 @@ pub struct StoredPiece {
     pub ended: Option<Ending>,
     /// Its length in bytes.
     pub bytes: i64,
-    /// Its SHA-256, hexadecimal.
-    pub sha256: String,
-    /// When it was kept.
-    pub stamp: Stamp,
 }
 
 /// A recording without its sound: its pieces, in order.
@@ -198,7 +190,7 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn voice(&self, session: SessionId) -> Result<BTreeMap<IdempotencyKey, VoiceRecording>, StoreError> {
-        let sql = "SELECT number, comment, piece, media_type, through_ms, ended, bytes, sha256, run, wall, monotonic_ns
+        let sql = "SELECT comment, piece, media_type, through_ms, ended, bytes
              FROM voice_pieces WHERE session = ? ORDER BY comment, piece";
         let of_comment = |row: &SqliteRow| Ok((parsed(row, "comment")?, stored(row)?));
 
@@ -310,14 +302,10 @@ fn stored(row: &SqliteRow) -> Result<StoredPiece, StoreError> {
     let ended = ended.map(|_| named(row, "ended", "a recording", Ending::named));
 
     Ok(StoredPiece {
-        number: row.try_get("number")?,
-        run: row.try_get("run")?,
         piece: row.try_get("piece")?,
         media_type: named(row, "media_type", "a recording", MediaType::named)?,
         through_ms: row.try_get("through_ms")?,
         ended: ended.transpose()?,
         bytes: row.try_get("bytes")?,
-        sha256: row.try_get("sha256")?,
-        stamp: stamp(row)?,
     })
 }
