@@ -62,7 +62,7 @@ impl Accounts {
     }
 
     /// The reader of the accounts' database.
-    pub const fn reader(&self) -> &Reader {
+    pub fn reader(&self) -> &Reader {
         self.book.reader()
     }
 

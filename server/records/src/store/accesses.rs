@@ -86,7 +86,6 @@ pub struct AccessLog {
     writer: Writer,
     /// The data folder.
     folder: PathBuf,
-    reader: Reader,
     /// The person's role; `None` on the command line.
     role: Option<Role>,
     /// The person's account; `None` if nobody is signed in.
@@ -99,14 +98,7 @@ impl AccessLog {
     pub fn of_server(store: &Store, by: Actor, clock: Arc<dyn Clock>) -> Self {
         let folder = store.inner.folder.clone();
         let Actor { role, account } = by;
-        Self {
-            writer: Writer::Server(store.clone()),
-            folder,
-            reader: store.reader().clone(),
-            role: Some(role),
-            account,
-            clock,
-        }
+        Self { writer: Writer::Server(store.clone()), folder, role: Some(role), account, clock }
     }
 
     /// Records what is done from the command line with the database of data folder `folder`, whether or not a server
@@ -119,10 +111,9 @@ impl AccessLog {
     }
 
     pub(super) async fn open_file(file: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        let reader = Reader::open_checked(file).await?;
         let writer = Writer::of_command(file).await?;
         let folder = file.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(Self { writer, folder, reader, role: None, account: None, clock })
+        Ok(Self { writer, folder, role: None, account: None, clock })
     }
 
     /// The data folder.
@@ -136,8 +127,8 @@ impl AccessLog {
     }
 
     /// The reader of the same database.
-    pub const fn reader(&self) -> &Reader {
-        &self.reader
+    pub fn reader(&self) -> &Reader {
+        self.writer.reader()
     }
 
     /// Records `access` and returns the chain's new head. The record is on disk when this returns.
@@ -151,7 +142,7 @@ impl AccessLog {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        self.writer.close(&self.reader).await;
+        self.writer.close().await;
     }
 
     #[boxed]

@@ -48,7 +48,7 @@ impl Studies {
     }
 
     /// Reads the database.
-    pub const fn reader(&self) -> &Reader {
+    pub fn reader(&self) -> &Reader {
         self.book.reader()
     }
 

@@ -18,14 +18,13 @@ use parfocal_trial::account::{Account, AccountChange, AccountName};
 #[derive(Clone)]
 pub struct AccountBook {
     writer: Writer,
-    reader: Reader,
     clock: Arc<dyn Clock>,
 }
 
 impl AccountBook {
     /// The account book of the server.
     pub fn of_server(store: &Store, clock: Arc<dyn Clock>) -> Self {
-        Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), clock }
+        Self { writer: Writer::Server(store.clone()), clock }
     }
 
     /// Opens data folder `folder` for a command, whether or not a server has it open.
@@ -33,18 +32,17 @@ impl AccountBook {
     /// # Errors
     /// If there is no database, it is of another version, or it cannot be written.
     pub async fn open(folder: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        let reader = Reader::open(folder).await?;
-        Ok(Self { writer: Writer::of_command(&folder.join(DATABASE)).await?, reader, clock })
+        Ok(Self { writer: Writer::of_command(&folder.join(DATABASE)).await?, clock })
     }
 
     /// The reader of the same database.
-    pub const fn reader(&self) -> &Reader {
-        &self.reader
+    pub fn reader(&self) -> &Reader {
+        self.writer.reader()
     }
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        self.writer.close(&self.reader).await;
+        self.writer.close().await;
     }
 
     /// Creates `account`. It is on disk when this returns.

@@ -15,7 +15,6 @@ use parfocal_trial::study::definition::StudyName;
 #[derive(Clone)]
 pub struct StudyBook {
     writer: Writer,
-    reader: Reader,
     /// Keeps servers out while a command writes, so that no server decides on data that is being changed.
     _lock: Option<Arc<FolderLock>>,
 }
@@ -23,7 +22,7 @@ pub struct StudyBook {
 impl StudyBook {
     /// The book of the server.
     pub fn of_server(store: &Store) -> Self {
-        Self { writer: Writer::Server(store.clone()), reader: store.reader().clone(), _lock: None }
+        Self { writer: Writer::Server(store.clone()), _lock: None }
     }
 
     /// Opens the book of data folder `folder` for a command.
@@ -37,8 +36,7 @@ impl StudyBook {
         }
 
         let lock = Arc::new(FolderLock::of(folder)?);
-        let reader = Reader::open(folder).await?;
-        Ok(Self { writer: Writer::of_command(&file).await?, reader, _lock: Some(lock) })
+        Ok(Self { writer: Writer::of_command(&file).await?, _lock: Some(lock) })
     }
 
     /// The run of the server that writes in it; `None` for a command.
@@ -47,8 +45,8 @@ impl StudyBook {
     }
 
     /// The reader of the same database.
-    pub const fn reader(&self) -> &Reader {
-        &self.reader
+    pub fn reader(&self) -> &Reader {
+        self.writer.reader()
     }
 
     /// Writes a new study with its first event. It is on disk when this returns.
@@ -69,6 +67,6 @@ impl StudyBook {
 
     /// Closes its connections, unless they are the server's.
     pub async fn close(&self) {
-        self.writer.close(&self.reader).await;
+        self.writer.close().await;
     }
 }
