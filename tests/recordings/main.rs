@@ -13,8 +13,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use parfocal_base::FocalPower;
-use parfocal_base::clock::{Clock, Moment, SystemClock};
-use parfocal_devices::camera::{self, CameraSettings, FrameImage};
+use parfocal_base::clock::{Clock, ManualClock, Moment, SystemClock};
+use parfocal_devices::camera::{self, Camera, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
 use parfocal_imaging::{Calibration, MosaicFrame};
 use parfocal_recording::{CALIBRATION, CapturedFrame, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, Writer};
@@ -241,14 +241,13 @@ fn the_phantom_is_recorded_small_enough_and_played_back() {
     assert!(paced > period, "3 frames within {paced} s, one every {period} s");
 }
 
-#[test]
-fn a_recording_whose_times_fall_is_played_too() {
-    let folder = TempDir::new().unwrap();
+/// A recording of frames that were exposed at these nanoseconds.
+fn exposed_at(folder: &TempDir, times: &[u64]) -> PathBuf {
     let path = folder.path().join("recording");
     let calibration = Calibration::default();
     let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
     let recorder = Recorder::start(writer, Moment::default()).unwrap();
-    for (number, exposed_at) in [(1, 90_000_000), (2, 20_000_000)] {
+    for (number, &exposed_at) in (1..).zip(times) {
         recorder.intake().offer(CapturedFrame {
             number,
             exposed_at: Moment::from_nanos(exposed_at),
@@ -260,14 +259,35 @@ fn a_recording_whose_times_fall_is_played_too() {
             mosaic: Arc::new(mosaic(number as usize)),
         });
     }
-    assert_eq!(recorder.stop().frames, 2);
-    assert_eq!(info(&path)["seconds"], 0.0);
+    assert_eq!(recorder.stop().frames, times.len() as u64);
+    path
+}
 
-    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+fn play(recording: &Path, clock: Arc<dyn Clock>) -> Box<dyn Camera> {
     let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
     let settings = CameraSettings { fps: 25.0, seed: 0, optics, clock };
-    let mut camera = camera::open(&format!("recording:{}", path.display()), settings).unwrap();
-    assert!(camera.next_frame(Duration::from_secs(5)).is_ok());
+    camera::open(&format!("recording:{}", recording.display()), settings).unwrap()
+}
+
+#[test]
+fn a_recording_whose_times_fall_is_played_too() {
+    let folder = TempDir::new().unwrap();
+    let path = exposed_at(&folder, &[90_000_000, 20_000_000]);
+    assert_eq!(info(&path)["seconds"], 0.0);
+    assert!(play(&path, Arc::new(SystemClock)).next_frame(Duration::from_secs(5)).is_ok());
+}
+
+#[test]
+fn a_recording_whose_frames_are_a_nanosecond_apart_is_played_too() {
+    let folder = TempDir::new().unwrap();
+    let clock = Arc::new(ManualClock::new(jiff::Timestamp::UNIX_EPOCH));
+    let mut camera = play(&exposed_at(&folder, &[1, 2]), clock.clone());
+    assert_eq!(camera.next_frame(Duration::ZERO).unwrap().number, 1);
+
+    // An hour has as many frames as nanoseconds.
+    clock.advance(Duration::from_secs(3600));
+    assert_eq!(camera.next_frame(Duration::ZERO).unwrap().number, 3_600_000_000_001);
+    assert_eq!(camera.health().lost, 3_599_999_999_999);
 }
 
 #[test]

@@ -26,8 +26,10 @@ pub fn open(path: &Path, settings: CameraSettings) -> Result<impl Camera + use<>
     Ok(Replay {
         name: name.into(),
         start: settings.clock.now(),
-        round: Duration::from_secs_f64(recording.seconds())
-            + rate.map_or(PAUSE, |rate| Duration::from_secs_f64(1.0 / rate)),
+        round: nanoseconds(
+            Duration::from_secs_f64(recording.seconds())
+                + rate.map_or(PAUSE, |rate| Duration::from_secs_f64(1.0 / rate)),
+        ),
         rate: rate.unwrap_or(0.0),
         clock: settings.clock,
         recording,
@@ -42,8 +44,8 @@ struct Replay {
     recording: Recording,
     clock: Arc<dyn Clock>,
     start: Moment,
-    /// Time from one beginning of the recording to the next.
-    round: Duration,
+    /// Nanoseconds from one beginning of the recording to the next; not 0.
+    round: u64,
     rate: f64,
     /// Frames whose time has come, shown or lost, over all rounds.
     shown: u64,
@@ -52,19 +54,20 @@ struct Replay {
 }
 
 impl Replay {
-    /// Time after the start at which frame `number` (from 0, over all rounds) is due.
-    fn due(&self, number: u64) -> Duration {
+    /// Nanoseconds after the start at which frame `number` (from 0, over all rounds) is due.
+    fn due(&self, number: u64) -> u64 {
         let rows = self.recording.rows();
         let count = rows.len() as u64;
         let first = rows.first().map_or(0, |row| row.time);
         let time = rows.get((number % count) as usize).map_or(0, |row| row.time.saturating_sub(first));
-        Duration::from_nanos(u64::try_from(time).unwrap_or(0))
-            + self.round * u32::try_from(number / count).unwrap_or(u32::MAX)
+        u64::try_from(time).unwrap_or(0).saturating_add(self.round.saturating_mul(number / count))
     }
 
     /// The frame to show next: the latest whose time has come, or the first that is still to come.
-    fn next(&self, elapsed: Duration) -> u64 {
-        let mut next = self.shown;
+    fn next(&self, elapsed: u64) -> u64 {
+        // Whole rounds that were missed are skipped at once: they may be billions, if frames are nanoseconds apart.
+        let begun = elapsed / self.round * self.recording.rows().len() as u64;
+        let mut next = self.shown.max(begun);
         while self.due(next + 1) <= elapsed {
             next += 1;
         }
@@ -74,10 +77,10 @@ impl Replay {
 
 impl Camera for Replay {
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
-        let elapsed = self.clock.now().since(self.start);
+        let elapsed = nanoseconds(self.clock.now().since(self.start));
         let next = self.next(elapsed);
 
-        let ahead = self.due(next).saturating_sub(elapsed);
+        let ahead = Duration::from_nanos(self.due(next).saturating_sub(elapsed));
         std::thread::sleep(ahead.min(timeout));
         if ahead > timeout {
             return Err(CameraError::Timeout(timeout));
@@ -121,4 +124,8 @@ impl Camera for Replay {
             lost: self.lost,
         }
     }
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
