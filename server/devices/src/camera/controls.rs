@@ -8,6 +8,9 @@ use utoipa::ToSchema;
 
 use super::LEAST_FPS;
 
+/// Longest exposure with which a camera still makes [`LEAST_FPS`], microseconds.
+const LONGEST_EXPOSURE: f64 = 1e6 / LEAST_FPS as f64;
+
 /// A setting of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -122,11 +125,15 @@ impl Controls {
         Ok(())
     }
 
-    /// For the camera: sets what it offers now. Of its frame rates, those below [`LEAST_FPS`] are left out, because the
-    /// control loop would take such a camera for one that fails.
+    /// For the camera: sets what it offers now. Frame rates below [`LEAST_FPS`] are left out, and so are exposures that
+    /// leave no time for as many frames: the control loop would take such a camera for one that fails.
     pub fn offer(&self, mut available: Vec<Adjustable>) {
-        for rate in available.iter_mut().filter(|one| one.setting == Setting::FrameRate) {
-            rate.min = rate.min.max(LEAST_FPS.into()).min(rate.max);
+        for one in &mut available {
+            match one.setting {
+                Setting::FrameRate => one.min = one.min.max(LEAST_FPS.into()).min(one.max),
+                Setting::Exposure => one.max = one.max.min(LONGEST_EXPOSURE).max(one.min),
+                Setting::Gain => {}
+            }
         }
         self.inner().offer.settings = available;
     }
@@ -179,5 +186,19 @@ mod tests {
         controls.offer(vec![Adjustable { setting: Setting::FrameRate, value: 50.0, min: 1.0, max: 120.0 }]);
         assert!(controls.ask(Setting::FrameRate, 4.0).is_err());
         assert_eq!(controls.ask(Setting::FrameRate, 5.0), Ok(()));
+    }
+
+    #[test]
+    fn an_exposure_too_long_for_the_control_loop_cannot_be_asked() {
+        let controls = Controls::default();
+        for (min, max, offered) in [(10.0, 1e6, 200_000.0), (10.0, 30_000.0, 30_000.0), (3e5, 1e6, 3e5)] {
+            controls.offer(vec![Adjustable { setting: Setting::Exposure, value: min, min, max }]);
+            let [exposure] = controls.offered().settings[..] else { panic!("the exposure is offered") };
+            assert_eq!((exposure.min, exposure.max), (min, offered));
+        }
+
+        controls.offer(vec![Adjustable { setting: Setting::Exposure, value: 8000.0, min: 10.0, max: 1e6 }]);
+        assert!(controls.ask(Setting::Exposure, 200_001.0).is_err());
+        assert_eq!(controls.ask(Setting::Exposure, 200_000.0), Ok(()));
     }
 }
