@@ -120,7 +120,8 @@ fn doubled_ranks(differences: &[f64]) -> Vec<usize> {
     let mut ranks = Vec::with_capacity(differences.len());
     while let Some(size) = differences.get(ranks.len()).map(|d| d.abs()) {
         let start = ranks.len();
-        let group = differences[start..].iter().take_while(|d| d.abs() - size <= 1e-12 * size).count();
+        let tied = differences[start + 1..].iter().take_while(|d| d.abs() - size <= 1e-12 * size).count();
+        let group = 1 + tied;
         ranks.extend(std::iter::repeat_n(2 * start + group + 1, group));
     }
     ranks
@@ -223,6 +224,12 @@ mod tests {
 
     fn vectors() -> Vectors {
         serde_json::from_str(include_str!("../../../tests/vectors/wilcoxon.json")).unwrap()
+    }
+
+    #[test]
+    fn differences_without_end_are_ranked_too() {
+        assert_eq!(rank_biserial(&[f64::INFINITY, -1.0, f64::INFINITY]), Some(2.0 / 3.0));
+        assert_eq!(wilcoxon(&[f64::NAN, 2.0], &[0.0, 1.0]).differing, 2);
     }
 
     #[test]

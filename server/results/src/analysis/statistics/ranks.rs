@@ -13,7 +13,8 @@ pub fn doubled_ranks(values: &[f64]) -> Vec<i64> {
     let mut ranks = vec![0; values.len()];
     let mut start = 0;
     while let Some(&first) = order.get(start) {
-        let equal = order[start..].iter().take_while(|&&place| are_equal(values[first], values[place])).count();
+        let others = &order[start + 1..];
+        let equal = 1 + others.iter().take_while(|&&place| are_equal(values[first], values[place])).count();
         for &place in &order[start..start + equal] {
             ranks[place] = (2 * start + equal + 1) as i64;
         }

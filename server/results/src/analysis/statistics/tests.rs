@@ -146,4 +146,5 @@ fn values_that_differ_by_rounding_share_their_rank() {
     let mean = (0.1 + 0.2 + 0.3) / 3.0;
     let other = (0.3 + 0.2 + 0.1) / 3.0;
     assert_eq!(super::ranks::doubled_ranks(&[mean, 1.0, other]), [3, 6, 3]);
+    assert_eq!(super::ranks::doubled_ranks(&[f64::NAN, 1.0, f64::NAN]), [4, 2, 6]);
 }
