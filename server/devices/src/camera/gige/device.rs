@@ -252,12 +252,14 @@ fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Resu
 }
 
 fn set_region(camera: &::aravis::Camera, setup: &Setup) -> Result<(usize, usize), DeviceError> {
+    // The greatest sides are those beyond the offsets, which another program may have left. Sides of 0 stay as they are.
+    camera.set_region(0, 0, 0, 0)?;
     let width_most = camera.width_bounds()?.1;
     let height_most = camera.height_bounds()?.1;
-    let width = setup.width.unwrap_or(width_most.min(SENSOR.0));
-    let height = setup.height.unwrap_or(height_most.min(SENSOR.1));
+    let width = setup.width.unwrap_or(whole_cells(width_most.min(SENSOR.0)));
+    let height = setup.height.unwrap_or(whole_cells(height_most.min(SENSOR.1)));
 
-    let fits = |side: i32, most: i32| side > 0 && side <= most && side % 4 == 0;
+    let fits = |side: i32, most: i32| side > 0 && side <= most && side == whole_cells(side);
     if !fits(width, width_most) || !fits(height, height_most) {
         return Err(DeviceError::Unsuitable(format!(
             "{width}x{height} cannot be used: sides must be multiples of {CELL}, at most {width_most}x{height_most}"
@@ -267,6 +269,11 @@ fn set_region(camera: &::aravis::Camera, setup: &Setup) -> Result<(usize, usize)
     camera.set_region(0, 0, width, height)?;
     let (_, _, width, height) = camera.region()?;
     Ok((usize::try_from(width).unwrap_or_default(), usize::try_from(height).unwrap_or_default()))
+}
+
+/// The longest side of whole mosaic cells that fits into `most` pixels.
+const fn whole_cells(most: i32) -> i32 {
+    most - most % CELL as i32
 }
 
 /// Sets the rate nearest to `fps` that the camera offers.
@@ -288,4 +295,14 @@ fn negotiate_packet(camera: &::aravis::Camera, wanted: Option<i32>) -> Result<Op
         None => camera.gv_auto_packet_size()?,
     }
     Ok(Some(camera.gv_get_packet_size()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_is_cut_to_whole_cells() {
+        assert_eq!([2048, 1088, 2046, 5, 3].map(whole_cells), [2048, 1088, 2044, 4, 0]);
+    }
 }
