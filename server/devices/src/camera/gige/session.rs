@@ -8,7 +8,7 @@ use ::aravis::Buffer;
 
 use super::device::{Arrival, Device, Setup};
 use super::shared::{Shared, words};
-use super::timestamps::{Timestamps, arrival};
+use super::timestamps::Timestamps;
 use crate::camera::pool::MosaicPool;
 use crate::camera::{Frame, FrameImage, Setting};
 use parfocal_imaging::MosaicFrame;
@@ -151,7 +151,7 @@ impl<'a> Session<'a> {
     }
 
     fn deliver(&mut self, buffer: &Buffer) {
-        let arrived = arrival(buffer.system_timestamp(), self.shared.clock.as_ref());
+        let arrived = self.timestamps.arrival(buffer.system_timestamp(), self.shared.clock.as_ref());
         let now = self.shared.clock.now();
 
         self.count(buffer.frame_id());
