@@ -42,13 +42,19 @@ impl Range {
     /// The range that the device allows, narrowed to the configured dioptres.
     ///
     /// # Errors
-    /// If the narrowed range is empty.
+    /// If the range of the device or the narrowed range is empty.
     pub fn new(
         scale: Scale,
         device: Limits,
         min_dioptre: Option<f64>,
         max_dioptre: Option<f64>,
     ) -> Result<Self, LensError> {
+        if device.min >= device.max {
+            return Err(LensError::Refused(
+                "it can hold no focal power at all temperatures from low to high: bring them closer together".into(),
+            ));
+        }
+
         let bound = |raw: f64| raw.clamp(f64::from(i16::MIN), f64::from(i16::MAX));
         // Rounded inwards, so that the range does not exceed the dioptres asked for.
         let min = min_dioptre.map_or(device.min, |dioptre| device.min.max(whole(bound(scale.raw(dioptre)).ceil())));
@@ -125,6 +131,13 @@ mod tests {
         assert_eq!((beyond.raw(FocalPower::MIN), beyond.raw(FocalPower::MAX)), (2000, 3000));
 
         assert!(range(Some(11.0), None).unwrap_err().to_string().contains("5.00 to 10.00 dpt"));
+    }
+
+    #[test]
+    fn a_device_without_any_range_says_what_takes_it_away() {
+        let none = Limits { status: 0, max: 1876, min: 3124 };
+        let error = Range::new(Scale::of_firmware(b'A'), none, None, None).unwrap_err().to_string();
+        assert!(error.contains("temperatures from low to high") && !error.contains("min"), "{error}");
     }
 
     proptest! {
