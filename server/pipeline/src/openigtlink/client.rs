@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
+use socket2::SockRef;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
@@ -19,6 +20,11 @@ use super::{LinkSource, condition};
 
 /// A client that takes nothing for so long is disconnected.
 const STUCK: Duration = Duration::from_secs(10);
+
+/// Bytes that the system may hold of what a client has not taken yet; Linux doubles them, up to its own limit. By itself
+/// it would take megabytes. Over a slow link those are pictures of half a minute ago, and it accepts no more until a
+/// third of them is gone, for which [`STUCK`] is too short.
+const SEND_BUFFER: usize = 256 << 10;
 
 /// What the two halves of a connection share.
 #[derive(Default)]
@@ -54,6 +60,7 @@ pub async fn serve(
 ) {
     // A picture must not wait for the acknowledgement of the one before.
     let _ = stream.set_nodelay(true);
+    let _ = SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
     let (from, to) = stream.into_split();
     let shared = Shared::default();
 
