@@ -1,6 +1,7 @@
 //! Everything that takes bytes from outside, each as a function of those bytes. The fuzzers of `fuzz/targets/` call the
 //! same functions.
 
+use std::fmt::Debug;
 use std::path::Path;
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -10,7 +11,7 @@ use parfocal_base::PolicyName;
 use parfocal_base::options::Options;
 use parfocal_devices::camera::footage::next_pnm;
 use parfocal_devices::lens::MeasuredDynamics;
-use parfocal_devices::lens::optotune::codec::{Request, error_reply};
+use parfocal_devices::lens::optotune::codec;
 use parfocal_imaging::{
     Calibration, GrayImage, MosaicFrame, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode, decode_raw,
 };
@@ -71,23 +72,6 @@ pub static TARGETS: [Target; 30] = [
 static KNOWN: LazyLock<Vec<PolicyName>> =
     LazyLock::new(|| Registry::standard().entries().into_iter().map(|entry| entry.name).collect());
 
-const REQUESTS: [Request; 14] = [
-    Request::FirmwareType,
-    Request::FirmwareVersion,
-    Request::Serial,
-    Request::MaxCurrent,
-    Request::SetCurrent(0),
-    Request::Current,
-    Request::CurrentMode,
-    Request::FocalPowerMode,
-    Request::Mode,
-    Request::TemperatureLimits { high: 640, low: 320 },
-    Request::SetFocalPower(0),
-    Request::FocalPower,
-    Request::Temperature,
-    Request::Status,
-];
-
 /// A calibration from any text is read or refused, and what is read can be worked with.
 pub fn calibration(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
@@ -101,15 +85,28 @@ pub fn calibration(bytes: &[u8]) {
 /// Any bytes from a lens driver's serial line are a reply, an error, or too few to tell. A reply stays the same,
 /// whatever follows.
 pub fn optotune(bytes: &[u8]) {
-    let _ = error_reply(bytes);
-    for request in REQUESTS {
-        let mut reply = None;
-        // As it comes: byte by byte.
-        for received in 0..=bytes.len() {
-            let now = request.reply(&bytes[..received]).ok().flatten();
-            assert!(reply.is_none() || reply == now, "{request:?} was answered {reply:?} and then {now:?}");
-            reply = now;
-        }
+    let _ = codec::error_reply(bytes);
+    replies(codec::FIRMWARE_TYPE, bytes);
+    replies(codec::FIRMWARE_VERSION, bytes);
+    replies(codec::SERIAL, bytes);
+    replies(codec::MAX_CURRENT, bytes);
+    replies(codec::CURRENT, bytes);
+    replies(codec::CURRENT_MODE, bytes);
+    replies(codec::FOCAL_POWER_MODE, bytes);
+    replies(codec::MODE, bytes);
+    replies(codec::temperature_limits(640, 320), bytes);
+    replies(codec::FOCAL_POWER, bytes);
+    replies(codec::TEMPERATURE, bytes);
+    replies(codec::STATUS, bytes);
+}
+
+fn replies<T: Copy + PartialEq + Debug>(request: codec::Request<T>, bytes: &[u8]) {
+    let mut reply = None;
+    // As it comes: byte by byte.
+    for received in 0..=bytes.len() {
+        let now = request.reply(&bytes[..received]).ok().flatten();
+        assert!(reply.is_none() || reply == now, "{request:?} was answered {reply:?} and then {now:?}");
+        reply = now;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::codec::{DeviceError, Limits, Reply, Request, WireError};
+use super::codec::{self, DeviceError, Limits, WireError};
 use super::link::{Link, LinkError};
 use super::range::{Range, Scale};
 use super::shared::Device;
@@ -57,32 +57,29 @@ pub fn perform(link: &mut Link, settings: &DriverSettings, path: &Path) -> Resul
         let_go_first(link)?;
     }
 
-    let Reply::FirmwareType(letter) = link.ask(Request::FirmwareType)? else { return Err(confused()) };
-    let version = match link.ask(Request::FirmwareVersion)? {
-        Reply::FirmwareVersion(major, minor, build, revision) => format!("{major}.{minor}.{build}.{revision}"),
-        _ => return Err(confused()),
-    };
-    let Reply::Serial(serial) = link.ask(Request::Serial)? else { return Err(confused()) };
+    let letter = link.ask(codec::FIRMWARE_TYPE)?;
+    let (major, minor, build, revision) = link.ask(codec::FIRMWARE_VERSION)?;
+    let serial = link.ask(codec::SERIAL)?;
 
-    let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
+    let status = link.ask(codec::STATUS)?;
     check_lens(Status(status))?;
 
     let limits = control_focal_power(link, settings)?;
     let scale = Scale::of_firmware(letter);
     let range = Range::new(scale, limits, settings.min_dioptre, settings.max_dioptre)?;
 
-    let Reply::Mode(mode) = link.ask(Request::Mode)? else { return Err(confused()) };
+    let mode = link.ask(codec::MODE)?;
     if mode != FOCAL_POWER_MODE {
         let mode = mode_name(mode);
         return Err(LensError::Refused(format!("it stays in {mode} mode instead of focal power mode")));
     }
 
-    let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
-    let Reply::Temperature(sixteenths) = link.ask(Request::Temperature)? else { return Err(confused()) };
-    let Reply::FocalPower(read_back) = link.ask(Request::FocalPower)? else { return Err(confused()) };
+    let status = link.ask(codec::STATUS)?;
+    let sixteenths = link.ask(codec::TEMPERATURE)?;
+    let read_back = link.ask(codec::FOCAL_POWER)?;
 
     Ok(Device {
-        firmware: format!("type {}, version {version}", char::from(letter)),
+        firmware: format!("type {}, version {major}.{minor}.{build}.{revision}", char::from(letter)),
         serial: String::from_utf8_lossy(&serial).trim_matches(['\0', ' ']).to_owned(),
         range,
         mode,
@@ -125,13 +122,9 @@ fn let_go_first(link: &mut Link) -> Result<(), LensError> {
 /// range of focal power from the last reply.
 fn control_focal_power(link: &mut Link, settings: &DriverSettings) -> Result<Limits, LensError> {
     let (low, high) = settings.temperatures;
-    let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };
-    let Reply::TemperatureLimits(_) = link.ask(request).map_err(explain_incompatible)? else { return Err(confused()) };
-
-    match link.ask(Request::FocalPowerMode).map_err(explain_incompatible)? {
-        Reply::FocalPowerMode(limits) => Ok(limits),
-        _ => Err(confused()),
-    }
+    let limits = codec::temperature_limits(sixteenths(high), sixteenths(low));
+    link.ask(limits).map_err(explain_incompatible)?;
+    link.ask(codec::FOCAL_POWER_MODE).map_err(explain_incompatible)
 }
 
 fn explain_incompatible(error: LinkError) -> LensError {
@@ -149,10 +142,6 @@ fn check_lens(status: Status) -> Result<(), LensError> {
         return Err(LensError::Gone(format!("the driver is there, but {words}: check the lens's cable")));
     }
     Ok(())
-}
-
-fn confused() -> LensError {
-    LensError::Refused("its reply does not match the request".into())
 }
 
 fn sixteenths(celsius: f64) -> i16 {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::codec::{self, DeviceError, READY, Reply, Request, START, WireError};
+use super::codec::{self, DeviceError, Order, READY, Request, START, WireError};
 use super::port::Port;
 use super::range::Range;
 use super::shared::Shared;
@@ -120,7 +120,7 @@ impl<'a> Link<'a> {
     /// Queues the command to go to `raw`.
     pub fn send_focal_power(&mut self, range: Range, raw: i16) {
         let now = self.shared.clock.now();
-        self.outgoing.extend(Request::SetFocalPower(raw).encode());
+        self.outgoing.extend(codec::set_focal_power(raw).encode());
         self.shared.response.command(now, range.focal_power(raw));
         self.sent = Some(SentCommand { raw, at: now });
     }
@@ -161,7 +161,7 @@ impl<'a> Link<'a> {
 
     /// Makes `request` and waits for its reply. If the line lost or damaged it, repeats the request, up to three times
     /// in all.
-    pub fn ask(&mut self, request: Request) -> Result<Reply, LinkError> {
+    pub fn ask<T: Copy>(&mut self, request: Request<T>) -> Result<T, LinkError> {
         let mut attempt = 1;
 
         loop {
@@ -181,10 +181,10 @@ impl<'a> Link<'a> {
         }
     }
 
-    fn ask_once(&mut self, request: Request) -> Result<Reply, LinkError> {
+    fn ask_once<T: Copy>(&mut self, request: Request<T>) -> Result<T, LinkError> {
         self.receive()?;
         self.incoming.clear();
-        self.outgoing.extend(request.encode());
+        self.outgoing.extend(request.order.encode());
         self.awaiting = true;
 
         let end = self.shared.clock.now() + REPLY_TIMEOUT;
@@ -205,7 +205,7 @@ impl<'a> Link<'a> {
 
     /// Finds the reply to `request` in the bytes received. Noise, or a late reply to another request, may come before
     /// it.
-    fn find_reply(&self, request: Request) -> Result<Reply, LinkError> {
+    fn find_reply<T: Copy>(&self, request: Request<T>) -> Result<T, LinkError> {
         let mut failure = if self.incoming.is_empty() { LinkError::Silent } else { WireError::Garbage.into() };
 
         for start in 0..self.incoming.len() {
@@ -271,12 +271,12 @@ impl<'a> Link<'a> {
     }
 
     fn relax_once(&mut self) -> Result<(), LinkError> {
-        let by_current = self.ask_once(Request::CurrentMode);
+        let by_current = self.ask_once(codec::CURRENT_MODE);
         // The current is set even if the change of mode was not confirmed: the lens must come to rest.
-        self.tell(Request::SetCurrent(0))?;
+        self.tell(codec::set_current(0))?;
         by_current?;
-        match self.ask_once(Request::Current)? {
-            Reply::Current(0) => Ok(()),
+        match self.ask_once(codec::CURRENT)? {
+            0 => Ok(()),
             _ => Err(WireError::Garbage.into()),
         }
     }
@@ -288,9 +288,9 @@ impl<'a> Link<'a> {
         self.relax()
     }
 
-    /// Sends a request that has no reply, or whose reply is not needed.
-    pub fn tell(&mut self, request: Request) -> Result<(), LinkError> {
-        self.outgoing.extend(request.encode());
+    /// Sends an order that has no reply, or whose reply is not needed.
+    pub fn tell(&mut self, order: Order) -> Result<(), LinkError> {
+        self.outgoing.extend(order.encode());
         self.flush()?;
         Ok(())
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::codec::{Reply, Request};
+use super::codec;
 use super::handshake::{self, DriverSettings};
 use super::link::{Link, SentCommand};
 use super::port::{Address, Port};
@@ -21,9 +21,9 @@ const BACKOFF_MOST: Duration = Duration::from_millis(400);
 /// Time between two readings. Each value is read every third time.
 const READING_EVERY: Duration = Duration::from_millis(200);
 /// The values read in turn.
-const READINGS: [Request; 3] = [Request::Status, Request::FocalPower, Request::Temperature];
+const READINGS: [Reading; 3] = [Reading::Status, Reading::FocalPower, Reading::Temperature];
 /// All values, in the order in which a refresh reads them.
-const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower];
+const KINDS: [Reading; 4] = [Reading::Status, Reading::Mode, Reading::Temperature, Reading::FocalPower];
 /// How long a due reading waits for a command. If it is made right after a command, its reply arrives before the next
 /// command.
 const GAP_PATIENCE: Duration = Duration::from_millis(60);
@@ -31,6 +31,15 @@ const GAP_PATIENCE: Duration = Duration::from_millis(60);
 const GAP: Duration = Duration::from_millis(5);
 /// How often a command is sent again before it counts as refused.
 const RESENDS: u32 = 2;
+
+/// A value that is read again and again.
+#[derive(Debug, Clone, Copy)]
+enum Reading {
+    Status,
+    Mode,
+    Temperature,
+    FocalPower,
+}
 
 /// Serves the device at `address` until it must stop. Then removes the lens's current.
 pub fn run(shared: &Shared, address: &Address, settings: &DriverSettings) {
@@ -167,8 +176,8 @@ impl Session<'_, '_> {
     }
 
     fn read_everything(&mut self) -> Result<(), LensError> {
-        for request in KINDS {
-            self.read(request)?;
+        for reading in KINDS {
+            self.read(reading)?;
         }
 
         self.publish();
@@ -176,22 +185,21 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    /// Reads the value of `request`. If the lens is gone, or the driver lost its settings, the connection ends.
-    fn read(&mut self, request: Request) -> Result<(), LensError> {
+    /// Reads a value. If the lens is gone, or the driver lost its settings, the connection ends.
+    fn read(&mut self, reading: Reading) -> Result<(), LensError> {
         let sent = self.link.sent();
         if let Some(error) = self.link.stray_error() {
             tracing::warn!(%error, "the lens driver did not accept a command");
         }
 
-        match self.link.ask(request)? {
-            Reply::Status(bits) => self.device.status.0 = bits,
-            Reply::Mode(mode) => self.device.mode = mode,
-            Reply::Temperature(sixteenths) => self.device.temperature = f64::from(sixteenths) / 16.0,
-            Reply::FocalPower(raw) => {
-                self.device.read_back = raw;
-                self.compare(sent, raw);
+        match reading {
+            Reading::Status => self.device.status.0 = self.link.ask(codec::STATUS)?,
+            Reading::Mode => self.device.mode = self.link.ask(codec::MODE)?,
+            Reading::Temperature => self.device.temperature = f64::from(self.link.ask(codec::TEMPERATURE)?) / 16.0,
+            Reading::FocalPower => {
+                self.device.read_back = self.link.ask(codec::FOCAL_POWER)?;
+                self.compare(sent, self.device.read_back);
             }
-            _ => {}
         }
 
         if self.device.status.without_lens() || self.device.status.restarted() {
