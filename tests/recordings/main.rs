@@ -285,7 +285,7 @@ fn a_recording_whose_frames_are_a_nanosecond_apart_is_played_too() {
     assert_eq!(camera.next_frame(Duration::ZERO).unwrap().number, 1);
 
     // An hour has as many frames as nanoseconds.
-    clock.advance(Duration::from_secs(3600));
+    clock.advance(Duration::from_hours(1));
     assert_eq!(camera.next_frame(Duration::ZERO).unwrap().number, 3_600_000_000_001);
     assert_eq!(camera.health().lost, 3_599_999_999_999);
 }
