@@ -1,7 +1,7 @@
 // The dialogs in which a researcher corrects, adds a note, erases words, and records a withdrawal.
 
 import { get, post, Refused } from "../shared/api.js";
-import { askIn, askReason } from "../shared/dialogs.js";
+import { askIn, askReason, isAsking } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { answerName, correctable, hint, read, soFar, written } from "./correction_words.js";
 import { voicePlayer } from "./voice.js";
@@ -20,6 +20,7 @@ import { voicePlayer } from "./voice.js";
 
 /** @param {Asked} asked */
 function ask({ heading, consequence, which, text, reason: usual = "", player, chosen, done }) {
+  if (isAsking()) return;
   setText(byId("correct-heading"), heading);
   setText(byId("correct-consequence"), consequence);
   // The player is removed when the dialog closes, which also stops its sound.

@@ -12,8 +12,14 @@ import { byId, setText } from "./dom.js";
  * @property {string} [confirm] a statement that has to be ticked too
  */
 
+/** Whether a dialog is open. A question that had to wait for the server must not take its place. */
+export function isAsking() {
+  return document.querySelector("dialog[open]") !== null;
+}
+
 /**
- * Opens `dialog`. On submit it awaits `done()`, and closes if that succeeds. If it fails, `trouble` shows why.
+ * Opens `dialog`. On submit it awaits `done()`, and closes if that succeeds. If it fails, `trouble` shows why. If the
+ * dialog was cancelled meanwhile and asks for something else by then, the answer leaves it as it is.
  *
  * @param {HTMLDialogElement} dialog
  * @param {HTMLElement} trouble
@@ -29,19 +35,26 @@ export function askIn(dialog, trouble, done) {
     if (button.dataset.close !== undefined) button.onclick = () => dialog.close();
   }
 
-  form.onsubmit = async (event) => {
+  const send = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     submit.disabled = true;
+    let failed = null;
     try {
       await done();
+    } catch (error) {
+      failed = inWords(error);
+    }
+    if (form.onsubmit !== send) return;
+
+    submit.disabled = false;
+    if (failed === null) {
       dialog.close();
       form.reset();
-    } catch (error) {
-      setText(trouble, inWords(error));
-    } finally {
-      submit.disabled = false;
-    }
+    } else setText(trouble, failed);
   };
+
+  form.onsubmit = send;
+  submit.disabled = false;
   dialog.showModal();
 }
 
@@ -78,6 +91,7 @@ export function askConfirmed(ask) {
  * @param {boolean} [confirmed] whether the passphrase has to be given
  */
 function openReasonDialog(ask, reasoned, confirmed = false) {
+  if (isAsking()) return;
   setText(byId("reason-heading"), ask.heading);
   setText(byId("reason-consequence"), ask.consequence);
 
