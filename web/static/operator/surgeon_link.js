@@ -2,8 +2,8 @@
 
 import { get } from "../shared/api.js";
 import { copyOnPress } from "../shared/copy.js";
-import { byId, setText } from "../shared/dom.js";
-import { tellTrouble } from "../shared/trouble.js";
+import { byId } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
 
 /** How often the link is asked for again. The server's address may change, for example with the network. */
 const ASK_AGAIN_MS = 60_000;
@@ -18,9 +18,11 @@ export function offerLink() {
 
 /** Updates the link to the server's present address. */
 async function askAgain() {
-  if (shownFor === null) return;
+  const wanted = shownFor;
+  if (wanted === null) return;
   try {
-    draw(await get("/api/operator/surgeon-link"));
+    const answer = await get("/api/operator/surgeon-link");
+    if (wanted === shownFor) draw(answer);
   } catch {
     // The shown link stays until the next attempt.
   }
@@ -49,21 +51,28 @@ export function followLink(session) {
   const wanted = linked ? session.session : "";
   if (wanted === shownFor) return;
   shownFor = wanted;
-  showLink(wanted !== "");
+  showLink(wanted);
 }
 
-/** @param {boolean} ofSession whether the link opens only one session */
-async function showLink(ofSession) {
+/**
+ * Asks for the link, and shows it unless another is wanted by the time the answer comes.
+ *
+ * @param {string} wanted the session that the link opens, or "" for the shared link
+ */
+async function showLink(wanted) {
   const trouble = byId("link-trouble");
   try {
-    draw(await get("/api/operator/surgeon-link"));
-    setText(trouble, "");
+    const answer = await get("/api/operator/surgeon-link");
+    if (wanted !== shownFor) return;
+    draw(answer);
+    tell(trouble, "");
   } catch (error) {
+    if (wanted !== shownFor) return;
     // The link is asked for again when the session changes, or when somebody has signed in.
     shownFor = null;
     byId("surgeon-link", HTMLInputElement).value = "";
     byId("qr").replaceChildren();
     tellTrouble(trouble, error);
   }
-  byId("link-session").hidden = !ofSession;
+  byId("link-session").hidden = wanted === "";
 }
