@@ -56,6 +56,9 @@ import {
 
 const TICK_MS = 250;
 
+/** A silent server is asked again after this time why the link has ended. */
+const ASK_AGAIN_MS = 2000;
+
 /** @typedef {Api.SurgeonView} View */
 
 /** @type {View | null} */
@@ -448,7 +451,7 @@ voice.subscribe(() => {
  * The tablet's link has ended. If its session has, too, the last words on the page stay as they were. What the tablet
  * holds is still sent.
  */
-async function leave() {
+function leave() {
   over = true;
   forgetPage();
   lastView.forget();
@@ -459,11 +462,18 @@ async function leave() {
   drawNow();
   if (isEnded(state)) return;
 
-  // The server's answer says why.
-  overBecause = await get("/api/surgeon/session").then(
-    () => "",
-    (error) => inWords(error),
-  );
+  tellWhyOver();
+}
+
+/** Shows the server's answer, which says why the link has ended. A server that is silent is asked again. */
+async function tellWhyOver() {
+  try {
+    await get("/api/surgeon/session");
+    overBecause = "";
+  } catch (error) {
+    overBecause = inWords(error);
+    if (!(error instanceof Refused)) setTimeout(tellWhyOver, ASK_AGAIN_MS);
+  }
   drawPanel();
 }
 
