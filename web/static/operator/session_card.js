@@ -3,6 +3,7 @@
 import { post, Refused } from "../shared/api.js";
 import { askReason, askWhetherMeant } from "../shared/dialogs.js";
 import { byId, make, redraw, setText } from "../shared/dom.js";
+import { secondText } from "../shared/text.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { askConsent } from "./consent.js";
 import {
@@ -116,15 +117,25 @@ export class SessionCard {
     if (!isWriting || this.#reasonFor === null) this.#reasonFor = wanted;
     const about = this.#reasonFor;
     byId("reason-wanted").hidden = !wanted;
-    if (about) setText(byId("pause-reason-label"), reasonWords(clockOf(about.at), about));
+    if (about) setText(byId("pause-reason-label"), reasonWords(secondText(about.at), about));
   }
 
   async #giveReason() {
     const box = byId("pause-reason", HTMLInputElement);
     const event = this.#reasonFor?.event;
     const reason = box.value.trim();
-    if (event === undefined || reason === "") return;
-    if (await this.#act({ action: "give-reason", event, reason })) box.value = "";
+    const save = byId("save-reason", HTMLButtonElement);
+    if (event === undefined || reason === "" || save.disabled) return;
+
+    save.disabled = true;
+    const given = await this.#act({ action: "give-reason", event, reason });
+    save.disabled = false;
+    if (!given) return;
+
+    if (box.value.trim() === reason) box.value = "";
+    // An earlier pause may still lack its reason, and is asked for next.
+    this.#reasonFor = null;
+    if (this.#session) this.#drawReasonWanted(this.#session);
   }
 
   /** @param {Deed} deed */
@@ -193,12 +204,8 @@ export class SessionCard {
   }
 
   /** @param {View} view */
-  async #dismiss({ session }) {
-    try {
-      await this.#followAnswer(post("/api/operator/dismissals", { session }));
-    } catch (error) {
-      tellTrouble(byId("session-trouble"), error);
-    }
+  #dismiss({ session }) {
+    return this.#attempt(this.#followAnswer(post("/api/operator/dismissals", { session })));
   }
 
   /**
@@ -221,9 +228,17 @@ export class SessionCard {
    * @param {Api.Action} action
    */
   async #act(action) {
-    if (!this.#session) return false;
+    return this.#session !== null && this.#attempt(this.#send(this.#session.session, action));
+  }
+
+  /**
+   * Returns whether it was done, and says in the card why not.
+   *
+   * @param {Promise<void>} deed
+   */
+  async #attempt(deed) {
     try {
-      await this.#send(this.#session.session, action);
+      await deed;
       tell(byId("session-trouble"), "");
       return true;
     } catch (error) {
@@ -272,12 +287,7 @@ function drawFeed(session) {
 }
 
 /** @param {string} at */
-function clockOf(at) {
-  return new Date(at).toLocaleTimeString([], { hour12: false });
-}
-
-/** @param {string} at */
 function timeOf(at) {
-  const text = clockOf(at);
+  const text = secondText(at);
   return make("time", { dateTime: at, title: at }, text);
 }

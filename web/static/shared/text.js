@@ -27,6 +27,16 @@ export function minuteText(millis) {
 }
 
 /**
+ * The time of day as `14:02:05`, in this device's time zone.
+ *
+ * @param {string} moment
+ */
+export function secondText(moment) {
+  // With `hour12: false` some browsers write the hour after midnight as 24.
+  return new Date(moment).toLocaleTimeString([], { hourCycle: "h23" });
+}
+
+/**
  * The time of day in `zone`, as `14:02`. If this browser does not know the zone, its own is used and named.
  *
  * @param {string} moment
