@@ -5,6 +5,7 @@ import { get } from "../shared/api.js";
 import { byId, make, redraw, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { heading, passed, shown, sorted, summary } from "./checks_words.js";
+import { Orders } from "./orders.js";
 
 /** @typedef {import("./checks_words.js").Finding} Finding */
 
@@ -12,6 +13,8 @@ import { heading, passed, shown, sorted, summary } from "./checks_words.js";
 const SETTLED_MS = 1000;
 
 const button = byId("check-again", HTMLButtonElement);
+/** One check at a time: the answer of an earlier one must not replace that of a later one. @type {Orders<null>} */
+const checks = new Orders(check);
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let soon;
 
@@ -63,7 +66,7 @@ async function check() {
 
 function checkSoon() {
   clearTimeout(soon);
-  soon = setTimeout(check, SETTLED_MS);
+  soon = setTimeout(() => checks.give(null), SETTLED_MS);
 }
 
 /**
@@ -74,7 +77,7 @@ function checkSoon() {
  */
 export function followChecks(found) {
   report = found;
-  button.addEventListener("click", check);
-  check();
+  button.addEventListener("click", () => checks.give(null));
+  checks.give(null);
   return checkSoon;
 }

@@ -41,6 +41,8 @@ let checkAgain = () => {};
 let wrong = false;
 /** Whether it is known which session, if any, is under way. */
 let known = false;
+/** Whether the connection was lost, and nothing was heard of the session since. */
+let wasLost = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator", byId("colour"));
 const pointing = viewer.pointBy(
@@ -60,7 +62,9 @@ const choices = followChoices(redrawFocus, followAnswer);
 
 /** @param {Api.OperatorView | null} next */
 function followSession(next) {
-  const isOver = isAtWork() && !(next && isUnderWay(next));
+  // While the server was silent or ended, anything that the checks look at may have changed.
+  const mayDiffer = (isAtWork() || wasLost) && !(next && isUnderWay(next));
+  wasLost = false;
   if (session && !next) {
     choices.refresh();
     // After practice the same participant comes next, after a real session another one.
@@ -69,7 +73,7 @@ function followSession(next) {
   if (known && next && next.session !== session?.session) forgetNotice();
   session = next;
   known = true;
-  if (isOver) checkAgain();
+  if (mayDiffer) checkAgain();
   sessionCard.follow(session);
   followLink(session);
   focus.follow(session);
@@ -188,6 +192,7 @@ viewer.live.listen({
   connection: (open) => {
     if (!open) {
       contact.lost();
+      wasLost = true;
       // If the sign-in has ended, the answer to this request opens the dialog to sign in. The live connection cannot.
       get("/api/operator/session").catch(() => {});
       return;
