@@ -17,6 +17,8 @@ import { CameraSettings, KINDS, labelOf, SETTLED_MS, shown, typed } from "./came
 const settings = new CameraSettings();
 /** @type {Map<Api.Setting, Row>} */
 const rows = new Map();
+/** The trouble that the camera has reported, until somebody changes a setting again, here or on another page. */
+let reported = "";
 
 /**
  * Draws the settings of `offer`. The card is hidden if the camera offers none.
@@ -26,7 +28,9 @@ const rows = new Map();
 export function drawCamera(offer) {
   settings.offered = offer?.settings ?? [];
   byId("camera-card").hidden = settings.offered.length === 0;
-  if (offer?.trouble) setText(byId("camera-trouble"), offer.trouble);
+  const report = offer?.trouble ?? "";
+  if (report !== reported || report !== "") setText(byId("camera-trouble"), report);
+  reported = report;
 
   for (const [setting, row] of rows) {
     if (settings.find(setting)) continue;
