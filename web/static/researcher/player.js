@@ -178,8 +178,13 @@ export class Player {
   }
 
   #show() {
-    const { seconds, playing, waiting } = this.#playhead;
     this.#ask();
+    this.#tell();
+  }
+
+  /** Draws everything that changes with the playhead. */
+  #tell() {
+    const { seconds, playing, waiting } = this.#playhead;
     this.#draw();
 
     setText(this.#play, playing ? "Pause" : "Play");
@@ -210,6 +215,7 @@ export class Player {
 
   /** @param {number} frame */
   #arrived(frame) {
+    setText(byId("player-trouble"), "");
     if (frame === this.#playhead.frame) this.#draw();
   }
 
@@ -217,6 +223,8 @@ export class Player {
     const frame = this.#playhead.frame;
     this.#canvas.classList.toggle("elsewhere", frame === null);
     if (frame === null) {
+      // Otherwise the spectra would not follow when the same frame is shown again.
+      this.#drawn = null;
       this.#say("Nothing was recorded at this time.");
       this.#spectra.follow(null);
       return;
@@ -269,6 +277,8 @@ export class Player {
   #failed(error) {
     this.#playhead.pause();
     setText(byId("player-trouble"), inWords(error));
-    this.#show();
+    // Without asking for pictures: each one that failed would have the others asked for again, for as long as the server
+    // is silent.
+    this.#tell();
   }
 }
