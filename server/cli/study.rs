@@ -263,11 +263,14 @@ fn whole(detail: &StudyDetail) -> String {
         );
     }
     for session in &detail.study_sessions {
-        let participant = session.corrected_participant.as_ref().unwrap_or(&session.participant);
         let _ = writeln!(
             text,
-            "session {} {participant} {} {} place {}",
-            session.session, session.site, session.protocol, session.place
+            "session {} {} {} {} place {}",
+            session.session,
+            session.surgeon(),
+            session.site,
+            session.protocol,
+            session.place
         );
     }
     for event in &detail.log {

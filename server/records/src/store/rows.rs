@@ -154,6 +154,13 @@ pub struct SessionLine {
     pub withdrawn: bool,
 }
 
+impl SessionLine {
+    /// The surgeon whose session it is: the corrected code if there is one, otherwise the recorded one.
+    pub fn surgeon(&self) -> &str {
+        self.corrected_participant.as_ref().unwrap_or(&self.participant)
+    }
+}
+
 /// A point of a session's focal path. Only people who know the policy may see its metric.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPoint {
