@@ -31,6 +31,12 @@ async fn the_operator_sees_the_checks_of_machine_devices_and_tablet() {
     assert_eq!(about(&found, "tablet")["found"], "No surgeon's page is open.");
     assert!(about(&found, "lens")["found"].as_str().unwrap().contains("simulated lens"), "{found:?}");
 
+    // A page that tries a tablet opens the connection, too, but says nothing on it.
+    let mut trial = Page::open(&server, "surgeon").await;
+    trial.message().await;
+    assert_eq!(about(&findings(&server).await, "tablet")["found"], "No surgeon's page is open.");
+    drop(trial);
+
     let mut page = Page::open(&server, "surgeon").await;
     page.say(json!({"type": "screen", "width": 1180})).await;
     page.watch(1).await;

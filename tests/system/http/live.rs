@@ -399,6 +399,7 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
     let mut operator = Page::open(&server, "operator").await;
     operator.until(|told| told["tablet"]["presence"] == "never-seen").await;
     let mut surgeon = Page::open(&server, "surgeon").await;
+    surgeon.say(json!({"type": "visible", "visible": true})).await;
     operator.until(|told| told["tablet"]["presence"] == "present").await;
 
     post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;

@@ -105,8 +105,7 @@ async fn live(
                 attend::<ForOperator>(socket, PageConnection::new(app, pass, token, None)).await;
             }
             Role::Surgeon | Role::System => {
-                let tablet = app.tablets.enter(&browser, app.clock.now());
-                attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(tablet))).await;
+                attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(browser))).await;
             }
         }
     }))
@@ -141,14 +140,17 @@ struct PageConnection<A: Audience> {
     /// The last status sent, so that only changes are sent.
     sent_status: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
-    /// The operator's entry for a surgeon's tablet.
+    /// What the browser of a surgeon's page calls itself.
+    surgeons_browser: Option<String>,
+    /// The operator's entry for a surgeon's tablet, from the page's first message on. What only tries the connection, as
+    /// the page does that tries a tablet, says nothing and is no tablet that shows the surgeon's page.
     tablet: Option<OpenTablet>,
     /// The message to send next, before any other.
     next: Option<Message>,
 }
 
 impl<A: Audience> PageConnection<A> {
-    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>, tablet: Option<OpenTablet>) -> Self {
+    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>, surgeons_browser: Option<String>) -> Self {
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
 
@@ -165,7 +167,8 @@ impl<A: Audience> PageConnection<A> {
             depth_maps: None,
             sent_status: None,
             shutdown: app.shutdown.clone(),
-            tablet,
+            surgeons_browser,
+            tablet: None,
             next: None,
             app,
         }
@@ -222,6 +225,9 @@ impl<A: Audience> PageConnection<A> {
             Message::Ping(_) => return Ok(None),
         };
 
+        if let (None, Some(browser)) = (&self.tablet, &self.surgeons_browser) {
+            self.tablet = Some(self.app.tablets.enter(browser, self.app.clock.now()));
+        }
         match serde_json::from_str(text) {
             Ok(PageMessage::Drawn { frame, held, shown }) => {
                 let pixels = self.pictures.drawn(frame, held).filter(|_| shown);
