@@ -57,6 +57,36 @@ async fn accounts_are_made_and_changed_and_somebody_always_leads() {
 }
 
 #[tokio::test]
+async fn of_two_leads_who_disable_each_other_at_the_same_moment_one_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let accounts = trial.accounts();
+    let one = trial.account("a.turing", AccountRole::Lead, "Dr Alan Turing").await;
+    let other = trial.account("g.hopper", AccountRole::Lead, "Dr Grace Hopper").await;
+
+    let (first, second) = tokio::join!(
+        accounts.change(&one.account, &AccountChange::Disable, Some(&other.account)),
+        accounts.change(&other.account, &AccountChange::Disable, Some(&one.account)),
+    );
+    assert_ne!(first.is_ok(), second.is_ok(), "{first:?} {second:?}");
+    assert_eq!(accounts.all().await.unwrap().iter().filter(|account| account.disabled).count(), 1);
+}
+
+#[tokio::test]
+async fn two_leads_who_make_the_same_account_at_the_same_moment_make_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let accounts = trial.accounts();
+    let make = |account: &str| {
+        let passphrase = Passphrase::new(PASSPHRASE).unwrap();
+        accounts.add(name(account), "Nurse Op", AccountRole::Operator, passphrase, None)
+    };
+    let (first, second) = tokio::join!(make("op"), make("nurse"));
+    let refused = first.err().or(second.err());
+    assert!(matches!(&refused, Some(AccountError::Taken(said)) if said.contains("'Nurse Op' already")), "{refused:?}");
+}
+
+#[tokio::test]
 async fn a_sign_in_lasts_until_it_is_ended_or_expires() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;

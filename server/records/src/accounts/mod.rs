@@ -100,19 +100,11 @@ impl Accounts {
         by: Option<&AccountName>,
     ) -> Result<Account, AccountError> {
         let new = Account { account, display: check_display(display)?, role, disabled: false };
-        for known in self.all().await? {
-            if known.account == new.account {
-                return Err(AccountError::Taken(format!("there is an account '{}' already", new.account)));
-            }
-            // Signatures show only the display name, so it must be unique.
-            if known.display == new.display {
-                let text = format!("account '{}' has the display name '{}' already", known.account, known.display);
-                return Err(AccountError::Taken(text));
-            }
-        }
+        check_new(&new, &self.all().await?)?;
 
         let hash = self.hash(passphrase).await?;
-        self.book.add(&new, &hash, by).await?;
+        // Again within the transaction: hashing takes a while, and another lead may make the same account meanwhile.
+        self.book.add(&new, &hash, by, |all| check_new(&new, all)).await?;
         Ok(new)
     }
 
@@ -126,11 +118,13 @@ impl Accounts {
         change: &AccountChange,
         by: Option<&AccountName>,
     ) -> Result<(), AccountError> {
-        let all = self.all().await?;
-        let account = all.iter().find(|account| account.account == *name);
-        let account = account.ok_or_else(|| AccountError::unknown(name, &all))?;
-        check_change(account, change, &all)?;
-        Ok(self.book.change(name, change, by).await?)
+        let check = |all: &[Account]| {
+            let account = all.iter().find(|account| account.account == *name);
+            let account = account.ok_or_else(|| AccountError::unknown(name, all))?;
+            Ok(check_change(account, change, all)?)
+        };
+        // Within the transaction: two leads who disable each other at the same moment would leave none.
+        self.book.change(name, change, by, check).await
     }
 
     /// Replaces the passphrase of an account, and ends its sign-ins.
@@ -327,4 +321,19 @@ impl Accounts {
     fn throttle(&self) -> std::sync::MutexGuard<'_, Throttle> {
         self.throttle.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Checks that the names of a `new` account are free. `all` are all accounts.
+fn check_new(new: &Account, all: &[Account]) -> Result<(), AccountError> {
+    for known in all {
+        if known.account == new.account {
+            return Err(AccountError::Taken(format!("there is an account '{}' already", new.account)));
+        }
+        // Signatures show only the display name, so it must be unique.
+        if known.display == new.display {
+            let text = format!("account '{}' has the display name '{}' already", known.account, known.display);
+            return Err(AccountError::Taken(text));
+        }
+    }
+    Ok(())
 }

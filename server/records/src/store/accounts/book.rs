@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use sqlx::sqlite::SqliteConnection;
 
+use super::reading::all_accounts;
 use super::{AccountEvent, ChangedBy, PassphraseHash};
 use crate::store::insert::Insert;
 use crate::store::schema::DATABASE;
@@ -45,13 +46,20 @@ impl AccountBook {
         self.writer.close().await;
     }
 
-    /// Creates `account`. It is on disk when this returns.
+    /// Creates `account` if `check` lets it, which gets all accounts; nobody writes between the check and the change. It
+    /// is on disk when this returns.
     ///
     /// # Errors
-    /// If the disk or database fails.
-    pub async fn add(&self, account: &Account, hash: &PassphraseHash, by: ChangedBy<'_>) -> Result<(), StoreError> {
+    /// If `check` refuses, or the disk or database fails.
+    pub async fn add<E: From<StoreError>>(
+        &self,
+        account: &Account,
+        hash: &PassphraseHash,
+        by: ChangedBy<'_>,
+        check: impl FnOnce(&[Account]) -> Result<(), E>,
+    ) -> Result<(), E> {
         let event = AccountEvent::Added(account.role);
-        self.write(Some(&account.account), &event, by, async |connection, _| {
+        self.write_checked(&account.account, &event, by, check, async |connection, _| {
             Insert::into("accounts")
                 .set("account", account.account.as_str())
                 .set("display", &account.display)
@@ -68,18 +76,21 @@ impl AccountBook {
         .await
     }
 
-    /// Changes `account`. The change is on disk when this returns. `Disable` and `SignOut` also end its sign-ins.
+    /// Changes `account` if `check` lets it, as [`add`](Self::add) does. The change is on disk when this returns.
+    /// `Disable` and `SignOut` also end its sign-ins.
     ///
     /// # Errors
-    /// If the disk or database fails.
-    pub async fn change(
+    /// If `check` refuses, or the disk or database fails.
+    pub async fn change<E: From<StoreError>>(
         &self,
         account: &AccountName,
         change: &AccountChange,
         by: ChangedBy<'_>,
-    ) -> Result<(), StoreError> {
+        check: impl FnOnce(&[Account]) -> Result<(), E>,
+    ) -> Result<(), E> {
         let name = account.as_str();
-        self.write(Some(account), &AccountEvent::Changed(change.clone()), by, async |connection, _| {
+        let event = AccountEvent::Changed(change.clone());
+        self.write_checked(account, &event, by, check, async |connection, _| {
             match change {
                 AccountChange::Role(role) => {
                     let query = sqlx::query("UPDATE accounts SET role = ? WHERE account = ?");
@@ -189,27 +200,52 @@ impl AccountBook {
         by: ChangedBy<'_>,
         apply: impl AsyncFnOnce(&mut SqliteConnection, &str) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
+        self.writer.write(async |connection| self.append(connection, account, event, by, apply).await).await
+    }
+
+    /// The same if `check`, which gets all accounts, lets it. Otherwise nothing is written.
+    async fn write_checked<E: From<StoreError>>(
+        &self,
+        account: &AccountName,
+        event: &AccountEvent,
+        by: ChangedBy<'_>,
+        check: impl FnOnce(&[Account]) -> Result<(), E>,
+        apply: impl AsyncFnOnce(&mut SqliteConnection, &str) -> Result<(), StoreError>,
+    ) -> Result<(), E> {
+        let checked = self.writer.write(async |connection| {
+            if let Err(refused) = check(&all_accounts(&mut *connection).await?) {
+                return Ok(Err(refused));
+            }
+            self.append(connection, Some(account), event, by, apply).await.map(Ok)
+        });
+        checked.await?
+    }
+
+    async fn append(
+        &self,
+        connection: &mut SqliteConnection,
+        account: Option<&AccountName>,
+        event: &AccountEvent,
+        by: ChangedBy<'_>,
+        apply: impl AsyncFnOnce(&mut SqliteConnection, &str) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let run = self.writer.run();
-        self.writer
-            .write(async |connection| {
-                let wall = self.clock.wall().to_string();
-                apply(connection, &wall).await?;
+        let wall = self.clock.wall().to_string();
+        apply(connection, &wall).await?;
 
-                let number = Insert::into("account_events")
-                    .set("run", run)
-                    .set("wall", &wall)
-                    .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
-                    .set("account", account.map(AccountName::as_str))
-                    .set("kind", event.name())
-                    .set("done_by", by.map(AccountName::as_str))
-                    .set("detail", event.detail())
-                    .execute(connection)
-                    .await?;
+        let number = Insert::into("account_events")
+            .set("run", run)
+            .set("wall", &wall)
+            .set("monotonic_ns", run.map(|_| nanoseconds(self.clock.now())))
+            .set("account", account.map(AccountName::as_str))
+            .set("kind", event.name())
+            .set("done_by", by.map(AccountName::as_str))
+            .set("detail", event.detail())
+            .execute(connection)
+            .await?;
 
-                chain::append(connection, "account-event", &number.to_string(), &wall).await?;
-                Ok(())
-            })
-            .await
+        chain::append(connection, "account-event", &number.to_string(), &wall).await?;
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use jiff::Timestamp;
-use sqlx::sqlite::SqliteRow;
+use sqlx::sqlite::{SqliteExecutor, SqliteRow};
 use sqlx::{AssertSqlSafe, Row};
 
 use super::{AccountLine, PassphraseHash, StoredAccount, StoredSignIn};
@@ -25,8 +25,7 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn accounts(&self) -> Result<Vec<Account>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM accounts ORDER BY account").fetch_all(self.pool()).await?;
-        rows.iter().map(account).collect()
+        all_accounts(self.pool()).await
     }
 
     /// All accounts, by name, as a lead sees them.
@@ -97,6 +96,12 @@ impl Reader {
         };
         row.as_ref().map(sign_in).transpose()
     }
+}
+
+/// All accounts, by name.
+pub(super) async fn all_accounts(database: impl SqliteExecutor<'_>) -> Result<Vec<Account>, StoreError> {
+    let rows = sqlx::query("SELECT * FROM accounts ORDER BY account").fetch_all(database).await?;
+    rows.iter().map(account).collect()
 }
 
 fn set_by_another(row: &SqliteRow) -> Result<bool, StoreError> {
