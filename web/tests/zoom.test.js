@@ -177,6 +177,26 @@ test("two fingers pinch around their middle, and neither is a tap", () => {
   assert.deepEqual(notes, ["zoom 2 at 150,100", "move 50,0"]);
 });
 
+test("a pinch takes back the tap just before it, and none of long ago", () => {
+  for (const [pause, isTakenBack] of /** @type {const} */ ([
+    [200, true],
+    [5000, false],
+  ])) {
+    let takenBack = 0;
+    const gestures = new Gestures(new Framing(), {
+      tap: () => {},
+      takeBack: () => {
+        takenBack += 1;
+      },
+    });
+    gestures.down(1, { x: 50, y: 50 }, 0);
+    gestures.up(1, { x: 50, y: 50 }, 40);
+    gestures.down(1, { x: 50, y: 50 }, pause);
+    gestures.down(2, { x: 90, y: 90 }, pause + 20);
+    assert.equal(takenBack > 0, isTakenBack, `${pause} ms`);
+  }
+});
+
 test("a pointer that the browser takes, or that never came down, does nothing", () => {
   const { notes, gestures } = noting();
   gestures.move(7, { x: 1, y: 1 });

@@ -57,8 +57,9 @@ export class Gestures {
     // A second finger makes this a pinch. Neither finger is a tap then.
     this.#press = this.#pointers.size === 1 ? { ...point, at: now } : null;
     if (this.#pointers.size > 1) {
+      // A tap of long ago stands, such as one that has set a place.
+      if (this.#tap && now - this.#tap.at <= DOUBLE_MS) this.#taps?.takeBack();
       this.#tap = null;
-      this.#taps?.takeBack();
     }
   }
 
