@@ -1,5 +1,7 @@
 // The texts that say whether everything is ready for a trial.
 
+import { counted } from "../shared/text.js";
+
 /** @typedef {Api.Schemas["Finding"]} Finding */
 
 /** How each verdict is shown, and what a screen reader says. The most serious comes first. */
@@ -34,14 +36,9 @@ export function summary(findings) {
   const wrong = count("wrong");
   const advice = count("advice");
 
-  if (wrong > 0) return `${things(wrong)} to fix before a trial.`;
-  if (advice > 0) return `A trial can run. ${things(advice)} to look at.`;
+  if (wrong > 0) return `${counted(wrong, "thing")} to fix before a trial.`;
+  if (advice > 0) return `A trial can run. ${counted(advice, "thing")} to look at.`;
   return "Everything is ready.";
-}
-
-/** @param {number} number */
-function things(number) {
-  return number === 1 ? "1 thing" : `${number} things`;
 }
 
 /**
@@ -50,7 +47,7 @@ function things(number) {
  * @param {number} number
  */
 export function passed(number) {
-  return number === 1 ? "1 check passed" : `${number} checks passed`;
+  return `${counted(number, "check")} passed`;
 }
 
 /**

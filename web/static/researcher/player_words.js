@@ -1,6 +1,6 @@
 // Texts beside the playback.
 
-import { nearestPoint, powerOf, settingAt } from "./timeline.js";
+import { nearestPoint, powerOf, settingAt, spanAt } from "./timeline.js";
 
 /** Values further away in time than this are not shown for the moment on screen. In seconds. */
 const NEAR = 2;
@@ -27,7 +27,7 @@ export function momentText(seconds) {
  * @param {number} seconds
  */
 function choiceAt({ choices, settings, patch_stays: stays }, seconds) {
-  const setting = settings.find(({ from, to }) => from <= seconds && (to == null || seconds <= to));
+  const setting = spanAt(settings, seconds);
   if (!setting) return null;
   const from = stays ? 0 : setting.from;
   const last = choices.findLast((choice) => from <= choice.seconds && choice.seconds <= seconds);
@@ -42,8 +42,7 @@ function choiceAt({ choices, settings, patch_stays: stays }, seconds) {
  */
 function focusAt(timeline, seconds) {
   if (settingAt(timeline.settings, seconds) === null) return "–";
-  const isHeld = timeline.holds.some(({ from, to }) => from <= seconds && (to == null || seconds <= to));
-  const held = isHeld ? ", held" : "";
+  const held = spanAt(timeline.holds, seconds) ? ", held" : "";
   const choice = choiceAt(timeline, seconds);
   return choice ? `${choice.x.toFixed(0)}, ${choice.y.toFixed(0)}${held}` : `centre${held}`;
 }

@@ -1,12 +1,9 @@
 // Texts about the state of a study's export.
 
+import { counted } from "../shared/text.js";
+
 /** Fraction of an export's time that is spent on exporting the sessions. The rest is spent on joining them. */
 const EXPORTING = 0.7;
-
-/** @param {number} count */
-function sessionsInWords(count) {
-  return count === 1 ? "1 session" : `${count} sessions`;
-}
 
 /** @param {boolean} unblinded */
 function withPolicies(unblinded) {
@@ -22,8 +19,8 @@ export function progressWords({ progress, unblinded }) {
   const { sessions, exported, steps, joined } = progress;
   const how = withPolicies(unblinded);
   if (sessions === 0) return `The export ${how} begins.`;
-  if (steps === 0) return `Exporting ${how}: ${exported} of ${sessionsInWords(sessions)}.`;
-  return `Exporting ${how}: ${sessionsInWords(sessions)} done. Joining them: step ${joined} of ${steps}.`;
+  if (steps === 0) return `Exporting ${how}: ${exported} of ${counted(sessions, "session")}.`;
+  return `Exporting ${how}: ${counted(sessions, "session")} done. Joining them: step ${joined} of ${steps}.`;
 }
 
 /**
@@ -39,7 +36,7 @@ export function progressShare({ sessions, exported, steps, joined }) {
 
 /** @param {Extract<Api.StudyExportState, { state: "ready" }>} ready */
 export function readyWords({ sessions, unblinded }) {
-  return `The export ${withPolicies(unblinded)} is ready: ${sessionsInWords(sessions)}. The server keeps it for an hour.`;
+  return `The export ${withPolicies(unblinded)} is ready: ${counted(sessions, "session")}. The server keeps it for an hour.`;
 }
 
 /** @param {Extract<Api.StudyExportState, { state: "failed" }>} failed */

@@ -133,16 +133,24 @@ export function nearestPoint(points, seconds) {
 }
 
 /**
+ * The first of `spans` that includes `seconds`. A span without an end goes on.
+ *
+ * @template {{ from: number, to?: number | null }} Span
+ * @param {Span[]} spans
+ * @param {number} seconds
+ */
+export function spanAt(spans, seconds) {
+  return spans.find(({ from, to }) => from <= seconds && (to == null || seconds <= to));
+}
+
+/**
  * The number of the setting under way at `seconds`, counted from 1; null between settings.
  *
  * @param {Timeline["settings"]} settings
  * @param {number} seconds
  */
 export function settingAt(settings, seconds) {
-  const span = settings.find(
-    ({ from, to }) => from <= seconds && seconds <= (to ?? Number.POSITIVE_INFINITY),
-  );
-  return span?.setting ?? null;
+  return spanAt(settings, seconds)?.setting ?? null;
 }
 
 /**

@@ -39,12 +39,14 @@ const POLICY_NAME_WIDTH = 130;
  */
 export function drawTimeline(figure, timeline, { scale, withPath, policies, recorded, zone, choose, jump }) {
   const points = withPath ? timeline.points : [];
+  const head = scale.y(1);
+  const foot = scale.y(0);
   const markers = timeline.comments.map((comment, index) => {
     const x = scale.x(comment.seconds);
     const y = scale.y(powerAt(points, comment.seconds));
     const group = commentMarker(
       comment,
-      { x, y, foot: scale.y(0) },
+      { x, y, foot },
       () => choose(index),
       () => jump(index),
     );
@@ -56,15 +58,21 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
     role: "img",
     "aria-label": description(timeline, withPath),
   });
-  const playhead = playheadLine({ top: scale.y(1), bottom: scale.y(0) });
+  const playhead = playheadLine({ top: head, bottom: foot });
   svg.append(
     ...timeline.settings.flatMap((setting) => settingShapes(setting, policies, scale)),
     ...pauseShapes(timeline.pauses, scale),
     ...timeline.sights.map((sight) => sightShape(sight, scale)),
-    ...timeline.absences.map((absence) => absenceShape(absence, scale)),
-    ...timeline.holds.map((hold) => holdShape(hold, scale)),
+    ...timeline.absences.map((absence) =>
+      stripShape("absence", absence, scale, { y: head, height: SIGHT, least: 2, title: absence.reason }),
+    ),
+    ...timeline.holds.map((hold) =>
+      stripShape("hold", hold, scale, { y: foot - 2 * SIGHT, height: SIGHT, least: 2, title: "Focus held" }),
+    ),
     ...timeline.choices.map((choice) => choiceShape(choice, scale)),
-    ...recorded.map((span) => recordedShape(span, scale)),
+    ...recorded.map((span) =>
+      stripShape("recorded", span, scale, { y: foot - STRIP, height: STRIP, least: 1 }),
+    ),
     ...axes(scale, withPath),
     shape("path", { class: "optimum", d: linePath(points, ({ optimal }) => optimal, scale) }),
     shape("path", { class: "path", d: linePath(points, powerOf, scale) }),
@@ -82,14 +90,18 @@ export function drawTimeline(figure, timeline, { scale, withPath, policies, reco
 }
 
 /**
- * A strip at the foot of the plot for a span of time that was recorded.
+ * A strip over a span of time, at least `least` pixels wide.
  *
- * @param {{ from: number, to: number }} span
+ * @param {string} kind
+ * @param {{ from: number, to?: number | null }} span
  * @param {Scale} scale
+ * @param {{ y: number, height: number, least: number, title?: string }} strip
  */
-function recordedShape(span, scale) {
-  const { x, width } = scale.box(span, 1);
-  return shape("rect", { class: "recorded", x, width, y: scale.y(0) - STRIP, height: STRIP });
+function stripShape(kind, span, scale, { y, height, least, title }) {
+  const { x, width } = scale.box(span, least);
+  const strip = shape("rect", { class: kind, x, width, y, height });
+  if (title !== undefined) strip.append(shape("title", {}, title));
+  return strip;
 }
 
 /**
@@ -99,37 +111,9 @@ function recordedShape(span, scale) {
  * @param {Scale} scale
  */
 function sightShape(sight, scale) {
-  const { x, width } = scale.box(sight, 1);
   const height = Math.max(2, (SIGHT * sight.width) / WIDEST);
-  const strip = shape("rect", { class: "sight", x, width, y: scale.y(1) + SIGHT - height, height });
-  strip.append(shape("title", {}, sightWords(sight)));
-  return strip;
-}
-
-/**
- * A bar at the head of the plot for a span of time in which no tablet showed the surgeon's page.
- *
- * @param {Timeline["absences"][number]} absence
- * @param {Scale} scale
- */
-function absenceShape(absence, scale) {
-  const { x, width } = scale.box(absence, 2);
-  const bar = shape("rect", { class: "absence", x, width, y: scale.y(1), height: SIGHT });
-  bar.append(shape("title", {}, absence.reason));
-  return bar;
-}
-
-/**
- * A bar at the foot of the plot for a span of time in which somebody held the focus.
- *
- * @param {Timeline["holds"][number]} hold
- * @param {Scale} scale
- */
-function holdShape(hold, scale) {
-  const { x, width } = scale.box(hold, 2);
-  const bar = shape("rect", { class: "hold", x, width, y: scale.y(0) - 2 * SIGHT, height: SIGHT });
-  bar.append(shape("title", {}, "Focus held"));
-  return bar;
+  const y = scale.y(1) + SIGHT - height;
+  return stripShape("sight", sight, scale, { y, height, least: 1, title: sightWords(sight) });
 }
 
 /**
