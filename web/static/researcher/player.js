@@ -277,8 +277,7 @@ export class Player {
   #failed(error) {
     this.#playhead.pause();
     setText(byId("player-trouble"), inWords(error));
-    // Without asking for pictures: each one that failed would have the others asked for again, for as long as the server
-    // is silent.
+    // Asks for no pictures: each failure would request the others again, for as long as the server is silent.
     this.#tell();
   }
 }

@@ -36,7 +36,8 @@ export function progressShare({ sessions, exported, steps, joined }) {
 
 /** @param {Extract<Api.StudyExportState, { state: "ready" }>} ready */
 export function readyWords({ sessions, unblinded }) {
-  return `The export ${withPolicies(unblinded)} is ready: ${counted(sessions, "session")}. The server keeps it for an hour.`;
+  const ready = `The export ${withPolicies(unblinded)} is ready: ${counted(sessions, "session")}`;
+  return `${ready}. The server keeps it for an hour.`;
 }
 
 /** @param {Extract<Api.StudyExportState, { state: "failed" }>} failed */

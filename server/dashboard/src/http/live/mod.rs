@@ -142,8 +142,8 @@ struct PageConnection<A: Audience> {
     shutdown: watch::Receiver<bool>,
     /// What the browser of a surgeon's page calls itself.
     surgeons_browser: Option<String>,
-    /// The operator's entry for a surgeon's tablet, from the page's first message on. What only tries the connection, as
-    /// the page does that tries a tablet, says nothing and is no tablet that shows the surgeon's page.
+    /// The operator's entry for a surgeon's tablet, from the page's first message on. The page that tries a tablet also
+    /// opens a connection, but sends nothing and does not count.
     tablet: Option<OpenTablet>,
     /// The message to send next, before any other.
     next: Option<Message>,

@@ -46,8 +46,8 @@ impl AccountBook {
         self.writer.close().await;
     }
 
-    /// Creates `account` if `check` lets it, which gets all accounts; nobody writes between the check and the change. It
-    /// is on disk when this returns.
+    /// Creates `account` if `check`, which gets all accounts, lets it. Nobody writes between the check and the change.
+    /// The account is on disk when this returns.
     ///
     /// # Errors
     /// If `check` refuses, or the disk or database fails.
