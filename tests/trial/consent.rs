@@ -1,5 +1,7 @@
 //! Consent before a session, and withdrawal after it.
 
+use std::time::Duration;
+
 use jiff::civil::date;
 use parfocal_records::store::export::verify::verify;
 use parfocal_records::store::export::{ExportError, export};
@@ -63,6 +65,22 @@ async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
         let checks = crate::chain::after(&database, sql, None).await;
         assert!(crate::chain::said(&checks, "chain").unwrap_err().contains("consents: consent 1 was changed"), "{sql}");
     }
+}
+
+#[tokio::test]
+async fn a_consent_of_today_is_taken_however_far_the_theatre_is_ahead_of_the_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = with_instruments(folder.path()).await;
+    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments", None).await.unwrap();
+    // 1 March, 11:00 UTC: 2 March has begun where days begin first, 14 hours ahead.
+    trial.clock.advance(Duration::from_hours(2));
+
+    let record = async |day: i8| {
+        let consent = Consent { given_on: date(2026, 3, day), ..consent() };
+        trial.conductor.record_consent(Role::Operator, NewConsent { session, consent }).await
+    };
+    assert!(record(3).await.unwrap_err().to_string().contains("in the future"));
+    record(2).await.unwrap();
 }
 
 #[tokio::test]

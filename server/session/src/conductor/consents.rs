@@ -1,6 +1,6 @@
 //! Consents of participants, recorded by the operator.
 
-use jiff::tz::TimeZone;
+use jiff::tz::{TimeZone, offset};
 
 use super::{ConductError, Conductor, Shared};
 use parfocal_base::boxed;
@@ -31,7 +31,8 @@ impl Shared {
             None => self.load(new.session).await?.protocol.consent,
         };
         let stamp = self.stamp();
-        let today = stamp.wall.to_zoned(TimeZone::system()).date();
+        // The theatre's clock may be ahead of the server's, which often is on UTC. No day begins earlier than at UTC+14.
+        let today = stamp.wall.to_zoned(TimeZone::fixed(offset(14))).date();
         let consent = consent::check(by.role, &new.consent, required.as_deref(), today)?;
 
         let before = self.store.reader().consents(new.session).await?;
