@@ -178,8 +178,8 @@ impl Now {
     }
 }
 
-/// Makes of what [`ViewTrace::see`] returned what it would have returned if focal powers were counted from the other end
-/// of the lens's range.
+/// Makes of what [`ViewTrace::see`] returned what it would have returned if focal powers were counted from the other
+/// end of the lens's range.
 pub fn count_from_other_end(input: &mut [f32]) {
     for part in input[BY_ITSELF..].chunks_exact_mut(COMPARED) {
         part[MOVED] = -part[MOVED];

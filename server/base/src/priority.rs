@@ -65,8 +65,8 @@ impl Scheduling {
     }
 }
 
-/// The longest that a thread at real-time priority may keep a processor without a pause. Much longer than the loop waits
-/// for a policy, a frame's time.
+/// The longest that a thread at real-time priority may keep a processor without a pause. Much longer than the loop
+/// waits for a policy, a frame's time.
 pub const LONGEST_RUN: Duration = Duration::from_secs(2);
 
 /// The signal that the kernel sends after a longer run.

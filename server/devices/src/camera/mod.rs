@@ -61,8 +61,8 @@ pub trait Camera: Send {
     }
 }
 
-/// Least frame rate of a camera that the control loop follows, frames a second. A slower one's frames would come so late
-/// that they count as missing.
+/// Least frame rate of a camera that the control loop follows, frames a second. A slower one's frames would come so
+/// late that they count as missing.
 pub const LEAST_FPS: u32 = 5;
 
 /// The settings common to all cameras.

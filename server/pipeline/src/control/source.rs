@@ -13,8 +13,8 @@ use super::runner::guarded;
 use parfocal_base::priority::{self, ThreadRole};
 use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame, LEAST_FPS};
 
-/// Longest wait for one frame: its time at the least rate, and a quarter more, because frames are never quite even. After
-/// it the thread checks whether it should stop, and asks the camera again.
+/// Longest wait for one frame: its time at the least rate, and a quarter more, because frames are never quite even.
+/// After it the thread checks whether it should stop, and asks the camera again.
 const TIMEOUT: Duration = Duration::from_millis(1250 / LEAST_FPS as u64);
 /// Pause after a failure without a wait, so that a dead camera does not keep a core busy.
 const PAUSE: Duration = Duration::from_millis(50);

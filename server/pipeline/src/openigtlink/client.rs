@@ -21,9 +21,9 @@ use super::{LinkSource, condition};
 /// A client that takes nothing for so long is disconnected.
 const STUCK: Duration = Duration::from_secs(10);
 
-/// Bytes that the system may hold of what a client has not taken yet; Linux doubles them, up to its own limit. By itself
-/// it would take megabytes. Over a slow link those are pictures of half a minute ago, and it accepts no more until a
-/// third of them is gone, for which [`STUCK`] is too short.
+/// Bytes that the system may hold of what a client has not taken yet; Linux doubles them, up to its own limit. By
+/// itself it would take megabytes. Over a slow link those are pictures of half a minute ago, and it accepts no more
+/// until a third of them is gone, for which [`STUCK`] is too short.
 const SEND_BUFFER: usize = 256 << 10;
 
 /// What the two halves of a connection share.
@@ -166,8 +166,8 @@ async fn show(
     }
 }
 
-/// Sends a message piece by piece: over a slow link a large picture takes longer than [`STUCK`], and the client takes it
-/// all the same.
+/// Sends a message piece by piece: over a slow link a large picture takes longer than [`STUCK`], and the client takes
+/// it all the same.
 async fn send(to: &mut OwnedWriteHalf, mut message: Bytes) -> Result<(), End> {
     while !message.is_empty() {
         match timeout(STUCK, to.write_buf(&mut message)).await {

@@ -266,8 +266,8 @@ impl Store {
     }
 }
 
-/// Refuses a folder whose database `file` is missing while its log is there: SQLite would make a new database and delete
-/// the log, which has the latest records of the missing one.
+/// Refuses a folder whose database `file` is missing while its log is there: SQLite would make a new database and
+/// delete the log, which has the latest records of the missing one.
 fn check_log(folder: &Path, file: &Path) -> Result<(), StoreError> {
     let name = format!("{DATABASE}-wal");
     let bytes = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());

@@ -35,8 +35,8 @@ impl Store {
 }
 
 impl Reader {
-    /// The events of camera and lens in `session`, each with its run. They go from the start of every run that served the
-    /// session to the end of the session, so they include the state in which it began.
+    /// The events of camera and lens in `session`, each with its run. They go from the start of every run that served
+    /// the session to the end of the session, so they include the state in which it began.
     ///
     /// # Errors
     /// If the database fails.

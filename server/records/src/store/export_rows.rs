@@ -34,8 +34,8 @@ impl RowOfSession for RunRow {
              ORDER BY run";
 }
 
-/// The events of camera and lens, from the start of every run that served the session to the end of the session, so that
-/// the state in which it began is among them.
+/// The events of camera and lens, from the start of every run that served the session to the end of the session, so
+/// that the state in which it began is among them.
 impl RowOfSession for DeviceRow {
     const SQL: &'static str = "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
          WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (

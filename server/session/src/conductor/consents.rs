@@ -31,7 +31,8 @@ impl Shared {
             None => self.load(new.session).await?.protocol.consent,
         };
         let stamp = self.stamp();
-        // The theatre's clock may be ahead of the server's, which often is on UTC. No day begins earlier than at UTC+14.
+        // The theatre's clock may be ahead of the server's, which often is on UTC. No day begins earlier than at
+        // UTC+14.
         let today = stamp.wall.to_zoned(TimeZone::fixed(offset(14))).date();
         let consent = consent::check(by.role, &new.consent, required.as_deref(), today)?;
 

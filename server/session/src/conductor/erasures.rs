@@ -127,8 +127,8 @@ impl Shared {
         Ok(erased?)
     }
 
-    /// The record itself and the notes on it, because a note may repeat the words. A note is erased in all its versions,
-    /// because a correction also has what stood there before it.
+    /// The record itself and the notes on it, because a note may repeat the words. A note is erased in all its
+    /// versions, because a correction also has what stood there before it.
     async fn with_its_notes(
         &self,
         session: SessionId,

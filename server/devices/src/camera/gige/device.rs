@@ -252,7 +252,8 @@ fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Resu
 }
 
 fn set_region(camera: &::aravis::Camera, setup: &Setup) -> Result<(usize, usize), DeviceError> {
-    // The greatest sides are those beyond the offsets, which another program may have left. Sides of 0 stay as they are.
+    // The greatest sides are those beyond the offsets, which another program may have left. Sides of 0 stay as they
+    // are.
     camera.set_region(0, 0, 0, 0)?;
     let width_most = camera.width_bounds()?.1;
     let height_most = camera.height_bounds()?.1;

@@ -43,8 +43,8 @@ impl Timestamps {
     /// wall clock.
     pub fn arrival(&mut self, noted: u64, clock: &dyn Clock) -> Moment {
         let wall = clock.wall().as_nanosecond();
-        // The monotonic clock is read last. A pause between the two makes the arrival late, which `moment` removes again;
-        // the other order would make it early, which `moment` would believe for seconds.
+        // The monotonic clock is read last. A pause between the two makes the arrival late, which `moment` removes
+        // again; the other order would make it early, which `moment` would believe for seconds.
         let now = clock.now();
 
         // A wall clock that was set in the meantime makes the age meaningless.

@@ -216,7 +216,8 @@ impl KnownSources {
         if now.is_some_and(|now| now.sha256 == begun.sha256) {
             if name == SCANS.name && planes(self.paths()) != planes(&begun.paths) {
                 return Err(LearningError::new(format!(
-                    "this training was begun on {names}; give each folder the same :PLANES, or none where there was none"
+                    "this training was begun on {names}; give each folder the same :PLANES, or none where there was \
+                     none"
                 )));
             }
             return Ok(());

@@ -269,8 +269,8 @@ impl Run {
         Ok(row.mae)
     }
 
-    /// Evaluates the best weights on the reference benchmark, stores the figures and adds them to their model card, unless
-    /// both is done.
+    /// Evaluates the best weights on the reference benchmark, stores the figures and adds them to their model card,
+    /// unless both is done.
     ///
     /// # Errors
     /// If the run folder cannot be read or written.
