@@ -107,21 +107,35 @@ impl Permit {
     /// # Errors
     /// If members have no permit left.
     pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), NoPermitLeft> {
-        let is_entitled = signed_in || ROLES.into_iter().any(|role| holds(headers, keys, role));
-        if is_entitled { self.make_members() } else { Ok(()) }
+        if self.is_members() || !signed_in && !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
+            return Ok(());
+        }
+        self.make_members()
+    }
+
+    fn is_members(&self) -> bool {
+        self.permits.given().connections.get(&self.number).is_some_and(|there| there.member)
     }
 
     fn make_members(&self) -> Result<(), NoPermitLeft> {
         let mut given = self.permits.given();
-        let is_full = given.count(true, Some(self.host)) >= MEMBERS.host || given.count(true, None) >= MEMBERS.all;
-        match given.connections.get_mut(&self.number) {
-            Some(there) if there.member || !is_full => {
-                there.member = true;
-                Ok(())
-            }
-            // There are enough members, or the connection has just given way.
-            _ => Err(NoPermitLeft),
+        let Some(there) = given.connections.get(&self.number) else {
+            // It has just given way.
+            return Err(NoPermitLeft);
+        };
+
+        if there.member {
+            return Ok(());
         }
+
+        if given.count(true, Some(there.host)) >= MEMBERS.host || given.count(true, None) >= MEMBERS.all {
+            return Err(NoPermitLeft);
+        }
+
+        if let Some(there) = given.connections.get_mut(&self.number) {
+            there.member = true;
+        }
+        Ok(())
     }
 }
 
