@@ -50,6 +50,9 @@ pub fn bootstrap_statistic(count: usize, seed: u64, statistic: impl Fn(&[usize])
 
 /// Most differing pairs for which [`wilcoxon`]'s p is exact; `SciPy` and R have the same bound.
 const MOST_EXACT: usize = 50;
+/// Relative difference up to which two values count as equal: means of the same ratings, summed in another order,
+/// differ by rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// How a [`SignedRank`]'s p was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -105,26 +108,36 @@ pub fn rank_biserial(differences: &[f64]) -> Option<f64> {
     (all > 0).then(|| (2.0 * positive as f64 - all as f64) / all as f64)
 }
 
-/// Twice the ranks of the differences that are not 0, and the sum of those of differences above 0.
+/// Twice the ranks of the differences that are not 0, by their size, and the sum of those of differences above 0.
 fn signed_ranks(differences: impl Iterator<Item = f64>) -> (Vec<usize>, usize) {
-    let mut differing: Vec<f64> = differences.filter(|d| *d != 0.0).collect();
-    differing.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let ranks = doubled_ranks(&differing);
+    let differing: Vec<f64> = differences.filter(|d| *d != 0.0).collect();
+    let sizes: Vec<f64> = differing.iter().map(|d| d.abs()).collect();
+    let ranks: Vec<usize> = doubled_ranks(&sizes).into_iter().map(|rank| rank as usize).collect();
     let positive = ranks.iter().zip(&differing).filter(|(_, d)| **d > 0.0).map(|(rank, _)| rank).sum();
     (ranks, positive)
 }
 
-/// Twice the rank of each of `differences`, which must rise in size. Twice a rank is a whole number even where ties
-/// share a mean rank.
-fn doubled_ranks(differences: &[f64]) -> Vec<usize> {
-    let mut ranks = Vec::with_capacity(differences.len());
-    while let Some(size) = differences.get(ranks.len()).map(|d| d.abs()) {
-        let start = ranks.len();
-        let tied = differences[start + 1..].iter().take_while(|d| d.abs() - size <= 1e-12 * size).count();
-        let group = 1 + tied;
-        ranks.extend(std::iter::repeat_n(2 * start + group + 1, group));
+/// Twice the rank of each of `values`: 2 for the lowest if no other equals it. Equal values share their mean rank, so
+/// twice a rank is a whole number. The doubled ranks of k values sum to k (k + 1).
+pub fn doubled_ranks(values: &[f64]) -> Vec<i64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+
+    let mut ranks = vec![0; values.len()];
+    let mut start = 0;
+    while let Some(&first) = order.get(start) {
+        let others = &order[start + 1..];
+        let equal = 1 + others.iter().take_while(|&&place| are_equal(values[first], values[place])).count();
+        for &place in &order[start..start + equal] {
+            ranks[place] = (2 * start + equal + 1) as i64;
+        }
+        start += equal;
     }
     ranks
+}
+
+fn are_equal(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 /// Two-sided p of the sum `positive`, if each of `ranks` is added with probability 1/2.

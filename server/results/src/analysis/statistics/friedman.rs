@@ -10,7 +10,7 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use utoipa::ToSchema;
 
-use super::ranks::doubled_ranks;
+use parfocal_base::statistics::doubled_ranks;
 
 /// Limit on the steps of the exact distribution; beyond it, permutations are drawn.
 const MOST_STEPS: usize = 4_000_000;

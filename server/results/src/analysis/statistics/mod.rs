@@ -4,7 +4,6 @@
 
 mod agreement;
 mod friedman;
-mod ranks;
 mod summary;
 mod trend;
 

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::*;
+use parfocal_base::statistics::doubled_ranks;
 
 #[derive(Deserialize)]
 struct FriedmanCase {
@@ -84,7 +85,7 @@ fn friedmans_test_agrees_with_scipy_and_with_counting() {
 #[test]
 fn a_p_that_was_drawn_is_near_the_exact_one() {
     for case in vectors().friedman.into_iter().filter(|case| case.p_exact.is_some()) {
-        let ranks: Vec<Vec<i64>> = case.blocks.iter().map(|block| super::ranks::doubled_ranks(block)).collect();
+        let ranks: Vec<Vec<i64>> = case.blocks.iter().map(|block| doubled_ranks(block)).collect();
         let p = case.p_exact.unwrap();
         let error = (p * (1.0 - p) / 9999.0).sqrt();
         let drawn = super::friedman::drawn_p(&ranks, 5);
@@ -145,6 +146,6 @@ fn what_has_no_answer_has_none() {
 fn values_that_differ_by_rounding_share_their_rank() {
     let mean = (0.1 + 0.2 + 0.3) / 3.0;
     let other = (0.3 + 0.2 + 0.1) / 3.0;
-    assert_eq!(super::ranks::doubled_ranks(&[mean, 1.0, other]), [3, 6, 3]);
-    assert_eq!(super::ranks::doubled_ranks(&[f64::NAN, 1.0, f64::NAN]), [4, 2, 6]);
+    assert_eq!(doubled_ranks(&[mean, 1.0, other]), [3, 6, 3]);
+    assert_eq!(doubled_ranks(&[f64::NAN, 1.0, f64::NAN]), [4, 2, 6]);
 }

@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::ranks::doubled_ranks;
-use parfocal_base::statistics::{Method, normal_two_sided};
+use parfocal_base::statistics::{Method, doubled_ranks, normal_two_sided};
 
 /// Most treatments for which p is exact.
 const MOST_TREATMENTS: usize = 8;
