@@ -195,7 +195,7 @@ async fn show(show: &Show) -> Result<(), Failure> {
     for name in names {
         let study: Option<StoredStudy> = reader.study(&name).await?;
         let study = study.ok_or_else(|| format!("there is no study '{name}'; `parfocal study show` lists all"))?;
-        details.push(StudyDetail::of(&study, &reader, SystemClock.wall()).await?);
+        details.push(StudyDetail::of(&study, &reader, |_| SystemClock.wall()).await?);
     }
 
     match (&show.study, details.as_slice()) {

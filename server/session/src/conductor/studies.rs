@@ -11,7 +11,9 @@ use super::{ConductError, Library};
 use parfocal_base::boxed;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Enrolment, NewStudy, Reader, Store, StoreError, StoredStudy, StudyBook, StudyChange};
+use parfocal_records::store::{
+    Enrolment, NewStudy, Reader, RunClocks, Store, StoreError, StoredStudy, StudyBook, StudyChange,
+};
 use parfocal_trial::allocation::Seed;
 use parfocal_trial::event::{Event, EventKind};
 use parfocal_trial::protocol::Protocol;
@@ -108,7 +110,7 @@ impl Studies {
         let study = self.stored(name).await?;
         let state = study.state();
         let outstanding = match change {
-            Change::Lock { .. } => outstanding_sessions(self.reader(), &study, self.now().await?).await?,
+            Change::Lock { .. } => outstanding_sessions(self.reader(), &study, |clocks| self.now(clocks)).await?,
             _ => 0,
         };
         let concerns = match change {
@@ -208,11 +210,11 @@ impl Studies {
     }
 
     /// The present time, on the clock that continues over the server's restarts.
-    pub(crate) async fn now(&self) -> Result<Timestamp, StoreError> {
-        Ok(match self.book.run() {
-            Some(run) => self.reader().run_clocks().await?.wall(run, self.clock.now()),
+    pub(crate) fn now(&self, clocks: &RunClocks) -> Timestamp {
+        match self.book.run() {
+            Some(run) => clocks.wall(run, self.clock.now()),
             None => self.clock.wall(),
-        })
+        }
     }
 
     /// The unblinding of each session of `study` that is still blinded.
@@ -260,13 +262,15 @@ pub(crate) async fn plan_concerns(reader: &Reader, study: &StoredStudy) -> Resul
     Ok(concerns(&study.definition, &enabled, &study.sites))
 }
 
-/// Number of sessions of `study` for which a surgeon's device may still hold something that counts at `now`.
+/// Number of sessions of `study` for which a surgeon's device may still hold something that counts. `now` tells the
+/// present time by the clocks of the server's runs.
 pub(crate) async fn outstanding_sessions(
     reader: &Reader,
     study: &StoredStudy,
-    now: Timestamp,
+    now: impl FnOnce(&RunClocks) -> Timestamp,
 ) -> Result<usize, StoreError> {
     let clocks = reader.run_clocks().await?;
+    let now = now(&clocks);
     let mut outstanding = 0;
     for enrolled in &study.sessions {
         let Some(stored) = reader.session(enrolled.session).await? else { continue };

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use crate::conductor::{ConductError, ProtocolSummary, Studies, outstanding_sessions, plan_concerns};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Reader, StoreError, StoredStudy};
+use parfocal_records::store::{Reader, RunClocks, StoreError, StoredStudy};
 use parfocal_trial::allocation::Order;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::{PlaceRules, Site};
@@ -168,15 +168,18 @@ impl StudyDetail {
     #[boxed]
     pub async fn read(studies: &Studies, name: &str) -> Result<Self, ConductError> {
         let study = studies.stored(name).await?;
-        Ok(Self::of(&study, studies.reader(), studies.now().await?).await?)
+        Ok(Self::of(&study, studies.reader(), |clocks| studies.now(clocks)).await?)
     }
 
-    /// The details of `study` at `now`.
+    /// The details of `study`. `now` tells the present time by the clocks of the server's runs.
     ///
     /// # Errors
     /// If the database failed.
-    #[boxed]
-    pub async fn of(study: &StoredStudy, reader: &Reader, now: Timestamp) -> Result<Self, StoreError> {
+    pub async fn of(
+        study: &StoredStudy,
+        reader: &Reader,
+        now: impl FnOnce(&RunClocks) -> Timestamp,
+    ) -> Result<Self, StoreError> {
         let definition = &study.definition;
         let line = line(study);
         let definition_sha256 = definition.sha256();
