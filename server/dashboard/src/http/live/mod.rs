@@ -140,7 +140,7 @@ struct PageConnection<A: Audience> {
     /// The last status sent, so that only changes are sent.
     sent_status: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
-    /// What the browser of a surgeon's page calls itself.
+    /// What the browser of a surgeon's page calls itself, until the page's first message.
     surgeons_browser: Option<String>,
     /// The operator's entry for a surgeon's tablet, from the page's first message on. The page that tries a tablet also
     /// opens a connection, but sends nothing and does not count.
@@ -225,8 +225,8 @@ impl<A: Audience> PageConnection<A> {
             Message::Ping(_) => return Ok(None),
         };
 
-        if let (None, Some(browser)) = (&self.tablet, &self.surgeons_browser) {
-            self.tablet = Some(self.app.tablets.enter(browser, self.app.clock.now()));
+        if let Some(browser) = self.surgeons_browser.take() {
+            self.tablet = Some(self.app.tablets.enter(&browser, self.app.clock.now()));
         }
         match serde_json::from_str(text) {
             Ok(PageMessage::Drawn { frame, held, shown }) => {
