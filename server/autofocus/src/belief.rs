@@ -30,6 +30,9 @@ const TURNS_FOR: f64 = 4.0;
 /// Change of focal power when the belief is tested.
 const TEST: f64 = 0.1;
 
+/// Ways of counting focal powers: from either end of the lens's range.
+const WAYS: usize = 2;
+
 /// Blur rate, in pixels per unit of focal power, that the network gets as 0: a usual value for optics.
 const USUAL_BLUR: f64 = 6.0;
 
@@ -351,7 +354,7 @@ fn target(focal_power: f64, belief: &[f32], way: Way) -> f64 {
 /// and pooled they err less than either.
 pub struct BeliefTracker {
     network: BeliefNetwork,
-    /// That of both ways of counting, `[1, 2, MEMORY]`.
+    /// That of both ways of counting, `[1, WAYS, MEMORY]`.
     memory: Tensor,
     trace: Trace,
     // Keeps alive the variables that the network's layers use.
@@ -367,21 +370,21 @@ impl BeliefTracker {
         let store = nn::VarStore::new(Device::Cpu);
         let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         weights::load(&store, bytes)?;
-        let memory = network.blank(2, Device::Cpu);
+        let memory = network.blank(WAYS, Device::Cpu);
         Ok(Self { network, memory, trace: Trace::default(), _store: store })
     }
 
     fn believe(&mut self, seen: &Observation<'_>) -> Vec<f32> {
         let input = self.trace.input(seen.view, seen.focal_power.get());
-        let ways = [input, from_other_end(&input)];
-        let inputs = Tensor::from_slice(ways.as_flattened()).view([2, 1, BELIEF_INPUT as i64]);
+        let ways: [_; WAYS] = [input, from_other_end(&input)];
+        let inputs = Tensor::from_slice(ways.as_flattened()).view([WAYS as i64, 1, BELIEF_INPUT as i64]);
 
         let (logits, memory) = tch::no_grad(|| self.network.forward(&inputs, &self.memory));
         self.memory = memory;
 
         // The geometric mean of both beliefs.
-        let logarithms = logits.view([2, -1]).log_softmax(1, Kind::Float);
-        let pooled = (logarithms.get(0) + logarithms.get(1).flip([0])) / 2.0;
+        let logarithms = logits.view([WAYS as i64, -1]).log_softmax(1, Kind::Float);
+        let pooled = (logarithms.get(0) + logarithms.get(1).flip([0])) / WAYS as f64;
         let mut belief = vec![0.0; BINS];
         pooled.softmax(0, Kind::Float).copy_data(&mut belief, BINS);
         belief
@@ -411,7 +414,7 @@ impl Policy for BeliefTracker {
     }
 
     fn forget(&mut self) {
-        self.memory = self.network.blank(2, Device::Cpu);
+        self.memory = self.network.blank(WAYS, Device::Cpu);
         self.trace = Trace::knowing(self.trace.blur);
     }
 }
