@@ -137,7 +137,7 @@ pub fn doubled_ranks(values: &[f64]) -> Vec<i64> {
 }
 
 fn are_equal(a: f64, b: f64) -> bool {
-    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+    (a - b).abs() <= ROUNDING * a.abs().min(b.abs())
 }
 
 /// Two-sided p of the sum `positive`, if each of `ranks` is added with probability 1/2.
