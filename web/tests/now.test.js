@@ -94,6 +94,9 @@ test("a server that does not answer is reported, with the time since when", () =
   assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
   assert.match(surgeonWords({ ...lost, heardAt: null, view: null }), /^The server cannot be reached\./);
   assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);
+  const signedOut = { ...OPERATOR, missed: true, signedOut: true, view: null };
+  assert.match(operatorWords(signedOut), /^You are signed out\. .* of 14:01\./);
+  assert.equal(operatorWords({ ...signedOut, missed: false }), operatorWords({ ...OPERATOR, view: null }));
 });
 
 test("an expired certificate is given as the reason, and only while the server does not answer", () => {

@@ -1,6 +1,6 @@
 // Spectra at places of the live picture, outside sessions: a mode in which taps set places, and the panel below.
 
-import { post } from "../shared/api.js";
+import { post, Refused } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { Asking } from "../spectra/asking.js";
 import { drawCircles, drawCross } from "../spectra/circles.js";
@@ -39,7 +39,9 @@ export class LiveSpectra {
     byId("point-focus").onclick = () => this.#choose(false);
     byId("point-spectrum").onclick = () => this.#choose(true);
     byId("view").addEventListener("blur", () => this.#hideCross());
-    document.addEventListener("visibilitychange", () => this.#askOn());
+    for (const event of ["visibilitychange", "signed-in"]) {
+      document.addEventListener(event, () => this.#askOn());
+    }
   }
 
   /** @param {Api.OperatorView | null} session */
@@ -176,7 +178,8 @@ export class LiveSpectra {
       this.#askOn(AGAIN_MS);
     } catch (error) {
       this.#panel.tellTrouble(error);
-      this.#askOn(FAILED_MS);
+      // Asked again at once, the server would ask to sign in every second.
+      if (!(error instanceof Refused && error.needsSignIn)) this.#askOn(FAILED_MS);
     }
   }
 }

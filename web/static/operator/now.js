@@ -15,25 +15,35 @@ import { isOver, isUnderWay, lacksConsent } from "./session_words.js";
  * @property {boolean} missed whether the server has been silent for too long
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
  * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
+ * @property {boolean} [signedOut] whether the server is silent because nobody is signed in any more
  * @property {boolean} working whether camera and lens work, as far as is known
  * @property {boolean} wrong whether the checks found something to put right before a trial
  * @property {boolean} [away] whether the surgeon's tablet was there and is not any more
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, refused, working, wrong, away = false }) {
-  if (missed) {
-    const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
-    return refused
-      ? `The server cannot be reached${since}. Its certificate has ended: renew it, or set this device’s clock.`
-      : `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
-  }
+export function nowWords(facts) {
+  const { view, known, missed, working, wrong, away = false } = facts;
+  if (missed) return missedWords(facts);
   if (!known) return "Connecting to the server…";
   if (!working) return "Fix the camera or the lens first. The warning below says what is wrong.";
   if (view !== null) return sessionWords(view, away);
   return wrong
     ? "First fix what the card “Ready for a trial?” marks with a cross."
     : "Choose a participant and a protocol, then prepare the session.";
+}
+
+/** @param {Pick<Facts, "heardAt" | "refused" | "signedOut">} facts */
+function missedWords({ heardAt, refused, signedOut = false }) {
+  if (signedOut) {
+    const old = heardAt === null ? "" : ` What this page shows is of ${minuteText(heardAt)}.`;
+    return `You are signed out.${old} Press “Sign in” at the top.`;
+  }
+
+  const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
+  return refused
+    ? `The server cannot be reached${since}. Its certificate has ended: renew it, or set this device’s clock.`
+    : `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
 }
 
 /**

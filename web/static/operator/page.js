@@ -1,6 +1,6 @@
 // The operator's page: the devices, and the session from preparing it to its end.
 
-import { get, post } from "../shared/api.js";
+import { get, post, Refused } from "../shared/api.js";
 import { Contact } from "../shared/contact.js";
 import { byId, setText } from "../shared/dom.js";
 import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
@@ -43,6 +43,8 @@ let wrong = false;
 let known = false;
 /** Whether the connection was lost, and nothing was heard of the session since. */
 let wasLost = false;
+/** Whether it was lost because nobody is signed in any more. */
+let signedOut = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator", byId("colour"));
 const pointing = viewer.pointBy(
@@ -136,6 +138,7 @@ function drawNow() {
     missed: contact.isMissed,
     heardAt: contact.heardAt,
     refused: contact.isCertificateOver,
+    signedOut,
     working: status === null || (status.camera.working && status.lens.working),
     wrong,
     away: status?.tablet.presence === "silent" || status?.tablet.presence === "hidden",
@@ -184,6 +187,20 @@ function followFrame({ header, receivedAt }) {
   byId("belief-choice").hidden = framesWithoutBelief >= BELIEF_FRAMES;
 }
 
+/**
+ * Finds out whether the connection was lost because the sign-in has ended: the live connection cannot tell. If so, the
+ * answer opens the dialog to sign in.
+ */
+async function askWhyLost() {
+  try {
+    await get("/api/operator/session");
+    signedOut = false;
+  } catch (error) {
+    signedOut = error instanceof Refused && error.needsSignIn;
+  }
+  drawNow();
+}
+
 viewer.live.listen({
   heard: () => contact.heard(),
   frame: followFrame,
@@ -193,8 +210,7 @@ viewer.live.listen({
     if (!open) {
       contact.lost();
       wasLost = true;
-      // If the sign-in has ended, the answer to this request opens the dialog to sign in. The live connection cannot.
-      get("/api/operator/session").catch(() => {});
+      askWhyLost();
       return;
     }
     contact.heard();

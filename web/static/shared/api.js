@@ -8,11 +8,13 @@ export class Refused extends Error {
    * @param {number} status
    * @param {string} message
    * @param {boolean} ours whether the server itself refused, and not a proxy in front of it
+   * @param {boolean} [needsSignIn] whether signing in would help
    */
-  constructor(status, message, ours) {
+  constructor(status, message, ours, needsSignIn = false) {
     super(message);
     this.status = status;
     this.ours = ours;
+    this.needsSignIn = needsSignIn;
   }
 
   /**
@@ -23,10 +25,15 @@ export class Refused extends Error {
   }
 }
 
-/** Called when the server requires somebody to sign in. */
+/** Called when the server requires somebody to sign in. @type {(isDeed: boolean) => void} */
 let signInNeeded = () => {};
 
-/** @param {() => void} ask called when the server refuses because nobody with the right to do this is signed in */
+/**
+ * Calls `ask` when the server refuses because nobody with the right to do this is signed in.
+ *
+ * @param {(isDeed: boolean) => void} ask `isDeed`: somebody wanted to do something. Otherwise the page may have asked by
+ *   itself.
+ */
 export function onSignInNeeded(ask) {
   signInNeeded = ask;
 }
@@ -88,7 +95,7 @@ function ask(path, asked) {
   return withPatience(async (signal) => {
     const response = await fetch(path, { ...asked, signal, cache: "no-store" });
     const text = await response.text();
-    if (!response.ok) throw refusal(text, response.status);
+    if (!response.ok) throw refusal(text, response.status, asked.method !== "GET");
     return { status: response.status, body: text ? JSON.parse(text) : null };
   });
 }
@@ -96,12 +103,14 @@ function ask(path, asked) {
 /**
  * @param {string} text
  * @param {number} status
+ * @param {boolean} isDeed whether the request was to change something
  */
-function refusal(text, status) {
+function refusal(text, status, isDeed) {
   try {
     const answer = JSON.parse(text);
-    if (answer.sign_in === true) signInNeeded();
-    if (typeof answer.error === "string") return new Refused(status, answer.error, true);
+    const needsSignIn = answer.sign_in === true;
+    if (needsSignIn) signInNeeded(isDeed);
+    if (typeof answer.error === "string") return new Refused(status, answer.error, true, needsSignIn);
   } catch {
     // Not JSON: a proxy's page, or a bare status.
   }
@@ -152,7 +161,7 @@ export function getPicture(path, names, query, signal) {
   const address = `${fill(path, names)}?${new URLSearchParams(query)}`;
   return withPatience(async (ending) => {
     const response = await fetch(address, { signal: ending, cache: "no-store" });
-    if (!response.ok) throw refusal(await response.text(), response.status);
+    if (!response.ok) throw refusal(await response.text(), response.status, false);
     return response.blob();
   }, signal);
 }

@@ -1,5 +1,7 @@
 // Signing in and out, on every page that can be used under a personal account. When the server asks for it, a dialog
-// to sign in opens over the page. Whatever was entered in the page's forms and dialogs stays there.
+// to sign in opens over the page. Whatever was entered in the page's forms and dialogs stays there. If somebody cancels
+// the dialog, it opens again only for what they do, because the page itself asks the server again and again. The top of
+// the page then says that one has to sign in.
 
 import { inWords, keep, onSignInNeeded, post } from "./api.js";
 import { make, setText } from "./dom.js";
@@ -7,10 +9,32 @@ import { tellTrouble } from "./trouble.js";
 
 /** @type {HTMLDialogElement | null} */
 let dialog = null;
+/** Whether the dialog has opened and nobody has signed in since. */
+let wasShown = false;
 
-function askToSignIn() {
+/** @param {boolean} isDeed whether somebody wanted to do something */
+function askToSignIn(isDeed) {
+  tellNeed();
+  if (isDeed || !wasShown) showDialog();
+}
+
+function showDialog() {
+  wasShown = true;
   dialog ??= makeDialog();
   if (!dialog.open) dialog.showModal();
+}
+
+/** Says at the top of the page that one has to sign in, until somebody has. */
+function tellNeed() {
+  if (document.getElementById("sign-in-need")) return;
+  document.getElementById("sign-in")?.remove();
+  const need = make("span", { id: "sign-in-need", className: "message", role: "status" }, "Sign-in needed");
+  const again = make(
+    "button",
+    { id: "sign-in", className: "small", type: "button", onclick: showDialog },
+    "Sign in",
+  );
+  document.querySelector(".person")?.append(need, " ", again);
 }
 
 function makeDialog() {
@@ -56,6 +80,7 @@ function makeDialog() {
     go.disabled = true;
     try {
       showPerson(await post("/api/sign-in", { name: name.value.trim(), passphrase: passphrase.value }));
+      wasShown = false;
       setText(trouble, "");
       passphrase.value = "";
       dialog?.close();
