@@ -16,7 +16,7 @@ const AHEAD = 25;
 const BEFORE_COMMENT = 3;
 
 /** Elements that need the keys for themselves. */
-const TYPING = "input:not(#player-scrub), textarea, select, dialog";
+const TYPING = "input:not(#player-scrub), textarea, select, dialog, audio";
 
 export class Player {
   #session;
