@@ -57,7 +57,8 @@ export class Player {
     this.#playhead = new Playhead(this.#track);
     this.#pictures = new Pictures({
       load: (frame, signal) => this.#load(frame, signal),
-      explain: (error) => (error instanceof Refused ? error.message : null),
+      // Who has to sign in first sees the frame afterwards.
+      explain: (error) => (error instanceof Refused && !error.needsSignIn ? error.message : null),
       arrived: (frame) => this.#arrived(frame),
       failed: (error) => this.#failed(error),
     });
