@@ -344,6 +344,8 @@ function followStatus(status) {
 function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
   const words = over || isEnded(state) ? kept() : mayResume ? saved() : "";
+  // Only the card before the trial has advice. New advice must not draw questions again that are being answered.
+  const advised = phase === "ready" ? advice() : [];
   const key = JSON.stringify([
     language(),
     known,
@@ -356,7 +358,7 @@ function drawPanel() {
     questions,
     mayResume,
     words,
-    advice(),
+    advised,
   ]);
   if (key === panelDrawn) return;
   panelDrawn = key;
