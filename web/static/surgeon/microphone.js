@@ -52,13 +52,18 @@ function recordedType() {
  * @property {() => void} stopped the recording has ended; no more pieces come
  */
 
+/** @typedef {{ stream: MediaStream, meter: Meter }} Microphone */
+
 /**
  * The microphone, open for as long as a session may use it: a browser may ask again at each opening, and takes a moment
  * each time. Between the recordings nothing listens to it.
  *
- * @type {{ stream: MediaStream, meter: Meter } | null}
+ * @type {Microphone | null}
  */
 let opened = null;
+
+/** An opening under way. @type {Promise<Microphone> | null} */
+let opening = null;
 
 /**
  * Opens the microphone, unless it is open. Called in a tap, it also wakes the meter, which browsers keep silent until
@@ -70,13 +75,31 @@ export async function openMicrophone() {
     opened.meter.wake();
     return opened;
   }
+  // Whoever needs the microphone meanwhile waits for the same opening: of two, only one would be closed again.
+  opening ??= openAnew().finally(() => {
+    opening = null;
+  });
+  const microphone = await opening;
+  // The tap may have come once the opening was under way.
+  microphone.meter.wake();
+  return microphone;
+}
+
+/** @returns {Promise<Microphone>} */
+async function openAnew() {
   closeMicrophone();
   // Made in the tap itself, before anything is awaited: later the browser would no longer let it sound.
   const meter = makeMeter();
-  const stream = await askForMicrophone();
-  meter.listen(stream);
-  opened = { stream, meter };
-  return opened;
+  try {
+    const stream = await askForMicrophone();
+    meter.listen(stream);
+    opened = { stream, meter };
+    return opened;
+  } catch (error) {
+    // A browser gives a page only a few meters.
+    meter.close();
+    throw error;
+  }
 }
 
 /** Closes the microphone, because the session is over. */

@@ -256,22 +256,29 @@ let microphone = "";
 
 /** Opens the microphone before the trial if the browser lets it, and closes it when no session can use it any more. */
 async function followMicrophone() {
-  if (!state?.voice || isEnded(state)) {
-    closeMicrophone();
-    microphone = "";
-    return;
-  }
-  const isAsked = microphone === "" && state.phase === "ready" && whyNoMicrophone(mayRecord) === "";
+  if (leaveMicrophone()) return;
+  const isAsked = microphone === "" && state?.phase === "ready" && whyNoMicrophone(mayRecord) === "";
   if (isAsked && (await mayOpenMicrophone())) await tryMicrophone();
 }
 
+/** Closes the microphone if no session can use it. Returns whether that is so. */
+function leaveMicrophone() {
+  if (state?.voice && !isEnded(state)) return false;
+  closeMicrophone();
+  microphone = "";
+  return true;
+}
+
 async function tryMicrophone() {
+  let words = say("microphone-ready");
   try {
     await openMicrophone();
-    microphone = say("microphone-ready");
   } catch (error) {
-    microphone = error instanceof Error ? error.message : say("microphone-failed");
+    words = error instanceof Error ? error.message : say("microphone-failed");
   }
+  // The session may be over by the time a browser has asked its person.
+  if (leaveMicrophone()) return;
+  microphone = words;
   drawPanel();
 }
 

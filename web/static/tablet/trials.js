@@ -96,14 +96,21 @@ async function tryPicture() {
 async function tryMicrophone() {
   const meter = new AudioContext();
   const resumed = meter.resume();
-  const stream = await navigator.mediaDevices.getUserMedia({ audio: true });
-  await resumed;
-  const recorder = new MediaRecorder(stream);
-  recorder.start();
-  recorder.stop();
-  for (const track of stream.getTracks()) track.stop();
-  await meter.close();
-  return true;
+  /** @type {MediaStreamTrack[]} */
+  let tracks = [];
+  try {
+    const stream = await navigator.mediaDevices.getUserMedia({ audio: true });
+    tracks = stream.getTracks();
+    await resumed;
+    const recorder = new MediaRecorder(stream);
+    recorder.start();
+    recorder.stop();
+    return true;
+  } finally {
+    // Also where only the recorder fails: otherwise the tablet would show that something listens.
+    for (const track of tracks) track.stop();
+    meter.close();
+  }
 }
 
 async function tryScreenLock() {
