@@ -5,6 +5,7 @@ import { byId, setText } from "../shared/dom.js";
 import "../shared/sign_in.js";
 import { Definition, exactText } from "./definition.js";
 
+const file = byId("file", HTMLInputElement);
 const shown = byId("definition", HTMLTextAreaElement);
 const definition = new Definition();
 const go = byId("plan-go", HTMLButtonElement);
@@ -15,8 +16,12 @@ function sites() {
   return named.map((site) => site.trim()).filter((site) => site !== "");
 }
 
-byId("file", HTMLInputElement).addEventListener("change", async (event) => {
-  const chosen = /** @type {HTMLInputElement} */ (event.target).files?.[0];
+// Browsers report no change when the same file is chosen again, as after it was corrected.
+file.addEventListener("click", () => {
+  file.value = "";
+});
+file.addEventListener("change", async () => {
+  const chosen = file.files?.[0];
   if (!chosen) return;
   setText(byId("plan-trouble"), "");
   try {
