@@ -3,6 +3,7 @@
 import { get, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
+import { exceptDouble } from "./double_click.js";
 import { diskWords, nowWords } from "./recording_words.js";
 
 const PATH = "/api/operator/recording";
@@ -77,7 +78,7 @@ async function turn() {
 
 /** Keeps the card up to date. */
 export function followRecording() {
-  button.addEventListener("click", turn);
+  button.addEventListener("click", exceptDouble(turn));
   document.addEventListener("visibilitychange", refresh);
   setInterval(refresh, EVERY_MS);
   refresh();

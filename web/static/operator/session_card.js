@@ -6,6 +6,7 @@ import { byId, make, redraw, setText } from "../shared/dom.js";
 import { secondText } from "../shared/text.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { askConsent } from "./consent.js";
+import { exceptDouble } from "./double_click.js";
 import {
   commentWords,
   consentWords,
@@ -102,7 +103,7 @@ export class SessionCard {
   /** @param {View} session */
   #drawDeeds(session) {
     const buttons = deeds(session).map(({ deed, label, className }) =>
-      make("button", { type: "button", className, onclick: () => this.#do(deed) }, label),
+      make("button", { type: "button", className, onclick: exceptDouble(() => this.#do(deed)) }, label),
     );
     redraw(byId("session-actions"), buttons);
   }

@@ -1,0 +1,14 @@
+// Buttons that change into others at a click, such as "Pause" into "Resume".
+
+/**
+ * Runs `run` at a click, but not at the other half of a double click: that one may hit a button which has just taken the
+ * place of the one that was meant.
+ *
+ * @param {() => unknown} run
+ * @returns {(click: { detail: number }) => void} `detail` is the number of the click among those in quick succession
+ */
+export function exceptDouble(run) {
+  return ({ detail }) => {
+    if (detail !== 2) run();
+  };
+}
