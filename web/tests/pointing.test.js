@@ -199,6 +199,33 @@ test("a release is sent only when its hold is answered, so that it cannot overta
   assert.deepEqual(asked, [true, false]);
 });
 
+test("a word of the server from before a hold does not keep its release from being sent", async () => {
+  /** @type {boolean[]} */
+  const asked = [];
+  /** @type {(() => void)[]} */
+  const answers = [];
+  const ask = (/** @type {boolean} */ held) => {
+    asked.push(held);
+    return new Promise((/** @type {(value: void) => void} */ resolve) => answers.push(resolve));
+  };
+  let now = 0;
+  const hold = new Hold({ ask, now: () => now });
+  hold.press("finger");
+  await settle();
+  hold.follow(false);
+  now = 900;
+  hold.release("finger");
+  answers.shift()?.();
+  await settle();
+  assert.deepEqual(asked, [true, false]);
+
+  // Once all is answered, the server's last word counts: somebody else may hold the focus.
+  hold.follow(true);
+  answers.shift()?.();
+  await settle();
+  assert.ok(hold.held);
+});
+
 test("a pedal's keys hold the focus, and fields keep those that they use", () => {
   assert.ok(isHoldKey({ key: "F24" }, true) && isHoldKey({ key: "PageUp" }, false));
   assert.ok(!isHoldKey({ key: "PageUp" }, true) && !isHoldKey({ key: "F13" }, false));

@@ -41,7 +41,7 @@ export function focusButtons(pointing, ask) {
 
     pointing.allowed = mayPoint;
     if (!mayPoint) pointing.takeBack();
-    hold.held = held;
+    hold.follow(held);
     centre.hidden = isOver || !(session === null || (session.pointing && inspecting));
     centre.disabled = !mayPoint;
     button.hidden = isOver || !(inspecting && session.holding);

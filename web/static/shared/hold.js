@@ -26,10 +26,24 @@ export class Hold {
   #press = null;
   /** Resolves once everything that was asked for is answered. @type {Promise<unknown>} */
   #answered = Promise.resolve();
+  /** How many requests are not answered yet. */
+  #open = 0;
+  /** What the server has said since the first of them; null if nothing. @type {boolean | null} */
+  #said = null;
 
   /** @param {{ ask: (hold: boolean) => Promise<void>, now: () => number }} parts */
   constructor(parts) {
     this.#parts = parts;
+  }
+
+  /**
+   * Follows the server's word. Before the answer to a request it may be older than the request, and counts only then.
+   *
+   * @param {boolean} held
+   */
+  follow(held) {
+    if (this.#open > 0) this.#said = held;
+    else this.held = held;
   }
 
   /** @param {string} by what presses it: a pointer or a key */
@@ -63,6 +77,15 @@ export class Hold {
   #ask(hold) {
     this.held = hold;
     // One after another: on a poor network a release could overtake its hold, and the focus would stay held.
-    this.#answered = this.#answered.then(() => this.#parts.ask(hold));
+    this.#open += 1;
+    this.#answered = this.#answered.then(() => this.#parts.ask(hold)).then(() => this.#heard());
+  }
+
+  /** A request is answered. */
+  #heard() {
+    this.#open -= 1;
+    if (this.#open > 0) return;
+    this.held = this.#said ?? this.held;
+    this.#said = null;
   }
 }
