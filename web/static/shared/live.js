@@ -54,6 +54,8 @@ export class Live {
   #over = false;
   /** Whether a timer runs that will send `#screen` to the server. */
   #screenWaits = false;
+  /** Runs until the next attempt to connect. @type {ReturnType<typeof setTimeout> | undefined} */
+  #retry;
 
   /** @param {"surgeon" | "operator" | "researcher"} role */
   constructor(role) {
@@ -121,6 +123,8 @@ export class Live {
 
   #connect() {
     if (this.#over || isAlive(this.#socket)) return;
+    // This is the attempt. Another timer beside that of its own end would double the attempts.
+    clearTimeout(this.#retry);
     const early = takeEarly();
     const socket = early?.socket ?? new WebSocket(this.#address());
     socket.binaryType = "arraybuffer";
@@ -168,7 +172,7 @@ export class Live {
       for (const listener of this.#listeners) listener.over?.();
       return;
     }
-    setTimeout(() => this.#connect(), this.#reconnection.nextWait(Math.random()));
+    this.#retry = setTimeout(() => this.#connect(), this.#reconnection.nextWait(Math.random()));
   }
 
   /** @param {{ type: string, view?: unknown }} message */
