@@ -1,5 +1,5 @@
 // Types that the pages use by name. What HTTP says comes from `api.d.ts`, which is generated from the server's
-// own description. The messages of the WebSocket are not described there: they follow `server/http/live*.rs`.
+// own description. The messages of the WebSocket are not described there: they follow `server/dashboard/src/http/live/`.
 
 import type { components, paths } from "./api.js";
 

@@ -9,7 +9,7 @@
 //!   [`withdraw`].
 //! * Besides, the kernel has a limit of its own (`kernel.sched_rt_runtime_us`).
 //!
-//! This is one of the package's two modules with unsafe code, for calls that no safe crate offers: setting
+//! This is one of the package's three modules with unsafe code, for calls that no safe crate offers: setting
 //! another thread's policy with `SCHED_RESET_ON_FORK`. The two calls are sound: they take numbers, and one
 //! a pointer to a value that outlives it.
 #![allow(unsafe_code, reason = "see above: two system calls")]

@@ -1,6 +1,6 @@
 //! The picture's weighted sums and colours in integer arithmetic, four cells at a time, on processors with AVX2.
 //!
-//! This is one of the package's two modules with unsafe code. Its two uses, and why they are sound:
+//! This is one of the package's three modules with unsafe code. Its two uses, and why they are sound:
 //! * `Kernel::row` calls a function compiled for AVX2 and FMA; a `Kernel` can only be made where both were detected.
 //! * `reinterpreted` turns arrays of numbers into vectors and back: both sides have the same size (checked when
 //!   compiled) and every bit pattern is a valid value of either.
