@@ -1,6 +1,7 @@
 // The buttons beside the picture for where the focus looks: *Centre*, and *Hold focus* where the protocol has it.
 
 import { byId, setText } from "./dom.js";
+import { followHeld } from "./held_button.js";
 import { Hold, isHoldKey } from "./hold.js";
 import { say } from "./language.js";
 import { tell, tellTrouble } from "./trouble.js";
@@ -50,45 +51,21 @@ export function focusButtons(pointing, ask) {
     setText(button, held ? say("focus-held") : say("hold-focus"));
   }
 
-  const open = () => !button.hidden && !button.disabled;
-
   centre.onclick = () => pointing.centre();
 
-  button.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0 || !open()) return;
-    // Keeps focus and selection where they are, in case a comment is being typed.
-    event.preventDefault();
-    button.setPointerCapture(event.pointerId);
-    hold.press(`pointer ${event.pointerId}`);
-  });
-  // On the whole window: the finger may have left the button.
-  for (const end of ["pointerup", "pointercancel"]) {
-    addEventListener(end, (event) => {
-      if (event instanceof PointerEvent) hold.release(`pointer ${event.pointerId}`);
-    });
-  }
-  button.addEventListener("contextmenu", (event) => event.preventDefault());
-
-  addEventListener(
-    "keydown",
-    (event) => {
-      const at = document.activeElement;
-      const inField = at?.matches("textarea, select, input, [contenteditable]") ?? false;
-      const onButton = at === button && (event.key === " " || event.key === "Enter");
-      if (!open() || event.isComposing || !(onButton || isHoldKey(event, inField))) return;
-      event.preventDefault();
-      event.stopImmediatePropagation();
-      if (!event.repeat) hold.press(`key ${event.code || event.key}`);
-    },
-    true,
-  );
-  addEventListener("keyup", (event) => {
-    if (hold.release(`key ${event.code || event.key}`)) event.preventDefault();
-  });
-  const leave = () => hold.leave();
-  addEventListener("blur", leave);
-  addEventListener("pagehide", leave);
-  document.addEventListener("visibilitychange", () => document.hidden && leave());
+  const isKey = (/** @type {KeyboardEvent} */ key) => {
+    const inField = document.activeElement?.matches("textarea, select, input, [contenteditable]") ?? false;
+    return isHoldKey(key, inField);
+  };
+  const held = {
+    isOpen: () => !button.hidden && !button.disabled,
+    isKey,
+    press: (/** @type {string} */ by) => hold.press(by),
+    release: (/** @type {string} */ by) => hold.release(by),
+    leave: () => hold.leave(),
+  };
+  // Its keys come first: a pedal that holds the focus does not talk.
+  followHeld(button, held, true);
 
   return { follow };
 }

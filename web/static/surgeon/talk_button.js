@@ -1,10 +1,12 @@
 // The button that is held to talk, and the keys that do the same.
 
 import { byId, setText } from "../shared/dom.js";
+import { followHeld } from "../shared/held_button.js";
 import { say } from "../shared/language.js";
 import { Grip } from "./grip.js";
 import { whyNoMicrophone } from "./microphone.js";
 import { focusOn, isTalkKey } from "./talk_keys.js";
+import { isEnded } from "./words.js";
 
 /**
  * Draws the state of `talk`, and passes presses on to it.
@@ -23,9 +25,7 @@ export function talkButton(talk, outbox, allowed) {
 
   /** @param {Api.SurgeonView | null} state */
   function follow(state) {
-    const asked = state?.voice ?? false;
-    const ended = state?.phase === "completed" || state?.phase === "aborted";
-    open = asked && !ended;
+    open = (state?.voice ?? false) && !isEnded(state);
     button.hidden = !open;
     button.disabled = why() !== "";
     setText(byId("voice-why"), open ? why() : "");
@@ -60,46 +60,15 @@ export function talkButton(talk, outbox, allowed) {
     status.classList.toggle("unsaved", kind === "unsaved");
   }
 
-  /** @param {string} by */
-  function press(by) {
-    if (open && why() === "") grip.press(by);
-  }
-
-  function leave() {
-    grip.leave();
-  }
-
-  button.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    // Keeps focus and selection where they are, in case a comment is being typed.
-    event.preventDefault();
-    button.setPointerCapture(event.pointerId);
-    press(`pointer ${event.pointerId}`);
+  followHeld(button, {
+    isOpen: () => open,
+    isKey: (key) => isTalkKey(key, focusOn(document.activeElement)),
+    press: (by) => {
+      if (why() === "") grip.press(by);
+    },
+    release: (by) => grip.release(by),
+    leave: () => grip.leave(),
   });
-  // On the whole window: the finger may have left the button.
-  for (const end of ["pointerup", "pointercancel"]) {
-    addEventListener(end, (event) => {
-      if (event instanceof PointerEvent) grip.release(`pointer ${event.pointerId}`);
-    });
-  }
-  // A long press must not open a menu.
-  button.addEventListener("contextmenu", (event) => event.preventDefault());
-
-  addEventListener("keydown", (event) => {
-    const onButton = document.activeElement === button && (event.key === " " || event.key === "Enter");
-    if (!open || event.isComposing || !(onButton || isTalkKey(event, focusOn(document.activeElement))))
-      return;
-    // The key must not scroll the page, nor press again and again while it is held.
-    event.preventDefault();
-    if (!event.repeat) press(`key ${event.code || event.key}`);
-  });
-  addEventListener("keyup", (event) => {
-    if (grip.release(`key ${event.code || event.key}`)) event.preventDefault();
-  });
-  addEventListener("blur", leave);
-  addEventListener("pagehide", leave);
-  document.addEventListener("visibilitychange", () => document.hidden && leave());
-
   outbox.subscribe(drawStatus);
   return { follow, draw };
 }
