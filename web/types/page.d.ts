@@ -21,8 +21,6 @@ declare global {
     type CameraOffer = Schemas["CameraOffer"];
     type CommentLine = Schemas["CommentLine"];
     type Focus = Schemas["Focus"];
-    type LogLine = Schemas["LogLine"];
-    type OpenStudy = Schemas["OpenStudy"];
     type OperatorView = Schemas["OperatorView"];
     type Origin = Schemas["Origin"];
     type NewConsent = Schemas["NewConsent"];

@@ -15,7 +15,7 @@ const ASK_AGAIN_MS = 1000;
  *
  * @param {number} bytes
  */
-export function sizeWords(bytes) {
+function sizeWords(bytes) {
   const megabytes = bytes / 1e6;
   return megabytes < 1 ? `${Math.ceil(bytes / 1e3)} kB` : `${megabytes.toFixed(1)} MB`;
 }

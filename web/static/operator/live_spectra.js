@@ -2,6 +2,7 @@
 
 import { post, Refused } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
+import { cellsOf } from "../shared/fit.js";
 import { Asking } from "../spectra/asking.js";
 import { drawCircles, drawCross } from "../spectra/circles.js";
 import { Cross } from "../spectra/cross.js";
@@ -112,9 +113,7 @@ export class LiveSpectra {
 
   /** The picture's extent in mosaic cells; null before the first. */
   get #cells() {
-    if (!this.#header) return null;
-    const { width, height, per_cell: perCell } = this.#header;
-    return { width: width / perCell, height: height / perCell };
+    return this.#header && cellsOf(this.#header);
   }
 
   /** @param {boolean} spectrum */

@@ -4,6 +4,7 @@ import { get } from "../shared/api.js";
 import { copyOnPress } from "../shared/copy.js";
 import { byId } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
+import { isOver } from "./session_words.js";
 
 /** How often the link is asked for again. The server's address may change, for example with the network. */
 const ASK_AGAIN_MS = 60_000;
@@ -47,7 +48,7 @@ let shownFor = null;
  * @param {Api.OperatorView | null} session
  */
 export function followLink(session) {
-  const linked = session?.study && session.phase !== "completed" && session.phase !== "aborted";
+  const linked = session?.study && !isOver(session);
   const wanted = linked ? session.session : "";
   if (wanted === shownFor) return;
   shownFor = wanted;

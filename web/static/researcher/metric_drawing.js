@@ -5,7 +5,7 @@ import { shape } from "../shared/svg.js";
 import { movePlayhead, playheadLine } from "./playhead_line.js";
 import { metricPath, Scale } from "./timeline.js";
 
-export const METRIC_HEIGHT = 96;
+const METRIC_HEIGHT = 96;
 const TOP = 8;
 const BOTTOM = METRIC_HEIGHT - 8;
 

@@ -3,7 +3,7 @@
 /** @typedef {Pick<Api.RecordingCourse, "name" | "kind" | "from" | "times_ms">} Recording */
 
 /** A frame is on screen until the next one, but for at most this many seconds. After that, nothing was recorded. */
-export const LONGEST = 1;
+const LONGEST = 1;
 
 /** The frames of all recordings, in the order of their exposure. A frame is identified by its index in this order. */
 export class Track {

@@ -19,6 +19,16 @@ const GLIDE_MS = 150;
 /** A glide ends when it is off by less than this, in mosaic cells. */
 const THERE = 0.25;
 
+/**
+ * A picture's extent in mosaic cells, the unit of all places on the picture.
+ *
+ * @param {Pick<Stream.Header, "width" | "height" | "per_cell">} header
+ * @returns {Extent}
+ */
+export function cellsOf({ width, height, per_cell: perCell }) {
+  return { width: width / perCell, height: height / perCell };
+}
+
 /** Follows the bright circle. Lengths are in mosaic cells, from the picture's upper left corner. */
 export class Fit {
   #glides;

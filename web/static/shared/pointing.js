@@ -1,10 +1,12 @@
 // Pointing at what is to be in focus: a tap on the picture, a key or a button. It says where a ring is drawn, and sends
 // the place once the tap cannot become a double tap any more. Nothing here depends on what the focus does.
 
+import { cellsOf } from "./fit.js";
+
 /** @typedef {{ x: number, y: number }} Cell a place in the picture, in mosaic cells from its upper left corner */
 
 /** A second tap this soon after the first one zooms. Only then is it known that the first one points. */
-export const SECOND_TAP_MS = 250;
+const SECOND_TAP_MS = 250;
 
 /** How long the ring stands. */
 const RING_MS = 1200;
@@ -88,7 +90,7 @@ export class Pointing {
   nudge(across, down) {
     if (!this.#isOpen() || !this.#header) return;
     const from = this.#waiting?.at ?? middleOf(this.#header.patch);
-    const step = (NUDGE * this.#header.height) / this.#header.per_cell;
+    const step = NUDGE * cellsOf(this.#header).height;
     const cell = { x: from.x + across * step, y: from.y + down * step };
     if (isInside(cell, this.#header)) this.#wait(cell);
   }
@@ -157,6 +159,6 @@ function middleOf({ x, y, width, height }) {
  */
 function isInside({ x, y }, header) {
   if (!header) return false;
-  const { width, height, per_cell: perCell } = header;
-  return x >= 0 && y >= 0 && x <= width / perCell && y <= height / perCell;
+  const { width, height } = cellsOf(header);
+  return x >= 0 && y >= 0 && x <= width && y <= height;
 }

@@ -2,7 +2,7 @@
 
 import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
 import { make, setText } from "./dom.js";
-import { Fit } from "./fit.js";
+import { cellsOf, Fit } from "./fit.js";
 import { Framing } from "./framing.js";
 import { say } from "./language.js";
 import { Live } from "./live.js";
@@ -311,15 +311,6 @@ export class Viewer {
     this.#stale.hidden = !isStale;
     if (isStale) setText(this.#stale, staleText(age, this.#connected));
   }
-}
-
-/**
- * A picture's extent in mosaic cells, the unit of all places on the picture.
- *
- * @param {Stream.Header} header
- */
-function cellsOf({ width, height, per_cell: perCell }) {
-  return { width: width / perCell, height: height / perCell };
 }
 
 /**

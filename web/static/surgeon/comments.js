@@ -3,7 +3,7 @@
 // shown.
 
 import { say, words } from "../shared/language.js";
-import { heldWords } from "./words.js";
+import { heldWords, isEnded } from "./words.js";
 
 export const PATH = "/api/surgeon/comments";
 
@@ -83,7 +83,7 @@ export class Comments {
     const session = state?.session ?? null;
     if (session !== this.#session) this.#begin(session);
     if (state?.segment != null) this.#numbers.set(state.segment, state.setting);
-    this.#closed = !state || state.phase === "completed" || state.phase === "aborted";
+    this.#closed = !state || isEnded(state);
     this.#saved = state?.comments ?? 0;
   }
 

@@ -3,6 +3,7 @@
 // number changes.
 
 import { Refused } from "../shared/api.js";
+import { isEnded } from "./words.js";
 
 const TRY_AGAIN_MS = 5000;
 const UNDER_WAY = "under way";
@@ -91,7 +92,7 @@ export class Holding {
   /** @param {string} session */
   #underWay(session) {
     const shown = this.#shown;
-    return shown?.session === session && shown.phase !== "completed" && shown.phase !== "aborted";
+    return shown?.session === session && !isEnded(shown);
   }
 
   /** The next thing that the server does not know yet, or null. */
