@@ -128,8 +128,9 @@ export function commentBox(comments, outbox, voice) {
 
   function endUndo() {
     clearTimeout(undoTimer);
-    // The focus goes back to where one writes on, unless that would open a keyboard.
-    if (document.activeElement === undo) undo.blur();
+    // Whoever works by keys writes on in the box. After a tap that would open a tablet's keyboard.
+    if (undo.matches(":focus-visible")) box.focus();
+    else if (document.activeElement === undo) undo.blur();
     undo.hidden = true;
   }
 
