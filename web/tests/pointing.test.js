@@ -85,6 +85,19 @@ test("a double tap or a pinch sends nothing and takes the ring back", () => {
   }
 });
 
+test("the other half of a double tap on what lay over the picture points at nothing", () => {
+  const { made, done } = pointing();
+  made.uncover();
+  done.wait(200);
+  made.tap({ x: 300, y: 90 });
+  done.wait(400);
+  assert.deepEqual([made.ring, done.sent], [null, []]);
+
+  made.tap({ x: 300, y: 90 });
+  done.wait(300);
+  assert.deepEqual(done.sent, [[7, { x: 300, y: 90 }]]);
+});
+
 test("a drag and a long press are no taps", () => {
   const { made, done } = pointing();
   const taps = { tap: (/** @type {any} */ point) => made.tap(point), takeBack: () => made.takeBack() };

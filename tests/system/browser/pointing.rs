@@ -38,8 +38,12 @@ async fn marked(browser: &Browser) -> u64 {
     browser.run(count, &[json!(PLACE.0), json!(PLACE.1)]).await.as_u64().unwrap()
 }
 
+/// Waits for a live picture that takes taps: right after a tap on the notice it takes none.
 async fn is_live(browser: &Browser) {
-    until("a picture", || async { browser.is(".viewer-stale", "hidden").await }).await;
+    until("a picture", || async {
+        browser.is(".viewer-stale", "hidden").await && browser.count("#view[data-fresh]").await == 0
+    })
+    .await;
 }
 
 /// Whether anything is drawn over the picture.

@@ -8,6 +8,9 @@ import { cellsOf } from "./fit.js";
 /** A second tap this soon after the first one zooms. Only then is it known that the first one points. */
 const SECOND_TAP_MS = 250;
 
+/** A tap this soon after one that removed something from over the picture is that one's other half. */
+export const OTHER_HALF_MS = 500;
+
 /** How long the ring stands. */
 const RING_MS = 1200;
 
@@ -33,6 +36,8 @@ export class Pointing {
   /** A place that is sent soon. @type {{ at: Cell, frame: number } | null} */
   #waiting = null;
   #forgetWaiting = () => {};
+  /** Taps before this moment are not meant for the picture. */
+  #coveredUntil = Number.NEGATIVE_INFINITY;
   /** What came with the latest picture. @type {Stream.Header | null} */
   #header = null;
 
@@ -62,13 +67,18 @@ export class Pointing {
     if (before && header.choices > before.choices && !this.#waiting) this.#draw(middleOf(header.patch));
   }
 
+  /** A tap removes something that lay over the picture. The other half of a double tap is not meant for the picture. */
+  uncover() {
+    this.#coveredUntil = this.#parts.now() + OTHER_HALF_MS;
+  }
+
   /**
    * The picture was tapped at `cell`.
    *
    * @param {Cell} cell
    */
   tap(cell) {
-    if (!this.#isOpen()) return;
+    if (this.#parts.now() < this.#coveredUntil || !this.#isOpen()) return;
     if (!isInside(cell, this.#header)) return;
     this.#wait(cell);
   }

@@ -7,6 +7,7 @@ import { focusButtons, tellPointing } from "../shared/focus_buttons.js";
 import { knows, language, say, speak } from "../shared/language.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
+import { OTHER_HALF_MS } from "../shared/pointing.js";
 import { Sight } from "../shared/sight.js";
 import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
@@ -103,9 +104,10 @@ const talk = new Talk({
 });
 const talking = talkButton(talk, voice, mayRecord);
 const holding = openHolding(outbox, voice, () => comments.unsent);
-const notice = noticeDialog(byId("comment", HTMLTextAreaElement), (segment) =>
-  act({ action: "acknowledge", segment }),
-);
+const notice = noticeDialog(byId("comment", HTMLTextAreaElement), (segment) => {
+  uncoverPicture();
+  act({ action: "acknowledge", segment });
+});
 const awake = new Awake({
   request: screenLock(),
   isVisible: () => !document.hidden,
@@ -114,6 +116,15 @@ const awake = new Awake({
 const forgetFirstPress = askForSecondPress(byId("finish"), byId("finish-heard"), () => {
   if (state?.segment) act({ action: "finish-segment", segment: state.segment });
 });
+
+/** A tap removes what lies over the picture. The other half of a double tap on it points at nothing. */
+function uncoverPicture() {
+  pointing.uncover();
+  // Whoever looks from outside sees when the picture takes taps.
+  const view = byId("view");
+  view.dataset.fresh = "true";
+  setTimeout(() => delete view.dataset.fresh, OTHER_HALF_MS + 20);
+}
 
 /** What is on screen at this moment; null outside a session. */
 function here() {
@@ -424,7 +435,10 @@ function pausedCard(view) {
   if (!view.may_resume) return card("aside sign", say("paused"), pausedWords(view, saved()));
 
   const resume = make("button", { type: "button", className: "primary" }, say("continue"));
-  resume.onclick = () => act({ action: "resume" });
+  resume.onclick = () => {
+    uncoverPicture();
+    act({ action: "resume" });
+  };
   return card("aside sign", say("paused"), pausedWords(view, saved()), resume);
 }
 
