@@ -177,12 +177,7 @@ export function lastComment(comments, seconds) {
  * @param {Scale} scale
  */
 export function linePath(points, value, scale) {
-  return brokenLine(
-    points,
-    value,
-    (seconds) => scale.x(seconds),
-    (power) => scale.y(power),
-  );
+  return brokenLine(points, value, scale, (power) => scale.y(power));
 }
 
 /**
@@ -203,21 +198,16 @@ export function metricPath(points, scale, top, bottom) {
 
   const share = (/** @type {Point} */ { setting, metric }) =>
     metric == null ? null : metric / (greatest.get(setting) || 1);
-  return brokenLine(
-    points,
-    share,
-    (seconds) => scale.x(seconds),
-    (part) => bottom - part * (bottom - top),
-  );
+  return brokenLine(points, share, scale, (part) => bottom - part * (bottom - top));
 }
 
 /**
  * @param {Point[]} points
  * @param {(point: Point) => number | null | undefined} value
- * @param {(seconds: number) => number} x
+ * @param {Scale} scale
  * @param {(value: number) => number} y
  */
-function brokenLine(points, value, x, y) {
+function brokenLine(points, value, scale, y) {
   /** @type {Point | null} */
   let before = null;
   let path = "";
@@ -229,7 +219,7 @@ function brokenLine(points, value, x, y) {
       continue;
     }
     const goesOn = before !== null && before.setting === point.setting && before.frame < point.frame;
-    path += `${goesOn ? "L" : "M"}${x(point.seconds).toFixed(1)} ${y(found).toFixed(1)}`;
+    path += `${goesOn ? "L" : "M"}${scale.x(point.seconds).toFixed(1)} ${y(found).toFixed(1)}`;
     before = point;
   }
   return path;
