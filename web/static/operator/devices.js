@@ -1,6 +1,6 @@
 // Draws the devices' health on the operator's page.
 
-import { make, redraw } from "../shared/dom.js";
+import { announce, make, redraw } from "../shared/dom.js";
 import { lamps, warnings } from "./device_words.js";
 
 /** @typedef {Stream.OperatorStatus} Status */
@@ -49,15 +49,18 @@ function deviceTerm(term, { name, message }) {
 }
 
 /**
- * Draws a line for each warning into `box`.
+ * Draws a line for each warning into `box`, and announces them in `heard`.
  *
  * @param {HTMLElement} box
+ * @param {HTMLElement} heard
  * @param {Status} status
  * @param {boolean} inSession whether a session has started and not ended
  */
-export function drawWarnings(box, status, inSession) {
-  const lines = warnings(status, inSession).map(({ text, level }) =>
-    make("p", { className: `notice-line ${level}` }, text),
+export function drawWarnings(box, heard, status, inSession) {
+  const all = warnings(status, inSession);
+  redraw(
+    box,
+    all.map(({ text, level }) => make("p", { className: `notice-line ${level}` }, text)),
   );
-  redraw(box, lines);
+  announce(heard, all.map(({ text }) => text).join(" "));
 }

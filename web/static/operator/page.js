@@ -171,7 +171,7 @@ function checked({ camera, lens, tablet }) {
 }
 
 function drawTheWarnings() {
-  if (status) drawWarnings(byId("warnings"), status, isAtWork());
+  if (status) drawWarnings(byId("warnings"), byId("warnings-heard"), status, isAtWork());
 }
 
 function redrawFocus() {

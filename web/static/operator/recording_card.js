@@ -1,7 +1,7 @@
 // The recording card: what is being recorded, how long the disk will last, and the button that starts and stops it.
 
 import { get, post } from "../shared/api.js";
-import { byId, setText } from "../shared/dom.js";
+import { announce, byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { exceptDouble } from "./double_click.js";
 import { diskWords, nowWords } from "./recording_words.js";
@@ -26,6 +26,7 @@ export function forgetNotice() {
 function draw(status) {
   recording = Boolean(status.recording);
   setText(byId("recording-now"), nowWords(status));
+  announce(byId("recording-heard"), nowWords(status));
   setText(byId("recording-disk"), diskWords(status));
   drawNotice(status);
   setText(byId("recording-unavailable"), recording ? "" : (status.unavailable ?? ""));

@@ -48,6 +48,23 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** What was announced last, without its numbers. @type {WeakMap<HTMLElement, string>} */
+const announced = new WeakMap();
+
+/**
+ * Says `text` in `element`, which screen readers read out at each change. A text that differs from the last one by its
+ * numbers alone is no news: it may count seconds.
+ *
+ * @param {HTMLElement} element
+ * @param {string} text
+ */
+export function announce(element, text) {
+  const news = text.replace(/[\d.]+/g, "#");
+  if (announced.get(element) === news) return;
+  announced.set(element, news);
+  element.textContent = text;
+}
+
 /** @type {WeakMap<HTMLElement, string>} */
 const drawn = new WeakMap();
 
