@@ -12,3 +12,15 @@ export function exceptDouble(run) {
     if (detail !== 2) run();
   };
 }
+
+/**
+ * A key that is held down presses a button within `element` once. Otherwise it would go on to press the button that takes
+ * its place and gets the focus.
+ *
+ * @param {HTMLElement} element
+ */
+export function ignoreHeldKeys(element) {
+  element.addEventListener("keydown", (event) => {
+    if (event.repeat && event.key === "Enter") event.preventDefault();
+  });
+}

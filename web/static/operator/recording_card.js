@@ -3,7 +3,7 @@
 import { get, post } from "../shared/api.js";
 import { announce, byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
-import { exceptDouble } from "./double_click.js";
+import { exceptDouble, ignoreHeldKeys } from "./double_click.js";
 import { diskWords, nowWords } from "./recording_words.js";
 
 const PATH = "/api/operator/recording";
@@ -80,6 +80,7 @@ async function turn() {
 /** Keeps the card up to date. */
 export function followRecording() {
   button.addEventListener("click", exceptDouble(turn));
+  ignoreHeldKeys(button);
   document.addEventListener("visibilitychange", refresh);
   setInterval(refresh, EVERY_MS);
   refresh();

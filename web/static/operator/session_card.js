@@ -6,7 +6,7 @@ import { byId, make, redraw, setText } from "../shared/dom.js";
 import { secondText } from "../shared/text.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
 import { askConsent } from "./consent.js";
-import { exceptDouble } from "./double_click.js";
+import { exceptDouble, ignoreHeldKeys } from "./double_click.js";
 import {
   commentWords,
   consentWords,
@@ -38,6 +38,7 @@ export class SessionCard {
   /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */
   constructor(followAnswer) {
     this.#followAnswer = followAnswer;
+    ignoreHeldKeys(byId("session-actions"));
     byId("reason-wanted", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
       this.#giveReason();
