@@ -26,7 +26,8 @@ const BUFFER: usize = 1 << 16;
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Scans: `simulated` over drawn pictures, `relief` over scenes with relief, or the folder of a recorded scan or of
-    /// a focal stack (`DIR:K` makes K of its planes the range 0 to 1). Each gets the same share.
+    /// a focal stack (`DIR:K` makes K of its planes the range 0 to 1). Each gets the same share; all folders together
+    /// count as one.
     #[arg(long, value_name = "simulated|relief|DIR", num_args = 1.., default_value = "simulated")]
     scans: Vec<String>,
     /// Format of .raw and .bin files in focal stacks: Mono8, Mono10, Mono10p, Mono12, Mono12p or Mono16; by default the
