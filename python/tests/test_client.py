@@ -253,6 +253,18 @@ def test_a_download_that_fails_leaves_no_file(course: Course, tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_download_that_cannot_be_saved_is_told_with_a_sentence(course: Course, tmp_path: Path) -> None:
+    path = f"/api/researcher/sessions/{course.session}/export.zip"
+    folder = tmp_path / "export.zip"
+    folder.mkdir()
+    for file in (tmp_path / "nowhere" / "export.zip", folder):
+        with pytest.raises(
+            parfocal.ParfocalError, match=r"export.zip cannot be written .*Make room on the disk"
+        ):
+            course.researcher.download(path, file)
+    assert list(tmp_path.rglob("*")) == [folder]
+
+
 def test_an_encrypted_server_is_trusted_by_its_authority() -> None:
     with Server(arguments=["--tls"]) as server:
         assert server.url.startswith("https://")

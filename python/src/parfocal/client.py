@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import AsyncIterator, Iterator, Mapping
 from pathlib import Path
@@ -11,6 +12,7 @@ import httpx
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from .connection import Address, Answer, check_version, read, refusal, request
+from .errors import ParfocalError
 from .interface import AsyncGroups, Groups
 from .live import Frame, Viewer, connect, connect_async
 
@@ -79,8 +81,13 @@ class Client(Groups):
             part.replace(file)
         except httpx.TransportError as error:
             raise self.address.unreachable(error) from error
+        except OSError as error:
+            raise ParfocalError(
+                f"{file} cannot be written ({error}). Make room on the disk, or name another file."
+            ) from error
         finally:
-            part.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                part.unlink()
         return file
 
     def close(self) -> None:
