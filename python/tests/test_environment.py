@@ -177,6 +177,9 @@ def test_what_the_program_refuses_is_its_own_sentence(tmp_path: Path) -> None:
         stranger.chmod(0o755)
         with pytest.raises(parfocal.NoProgram, match=r"did not start"):
             FocusEnv(program=stranger)
+    stranger.write_bytes(b"\x7fELF")
+    with pytest.raises(parfocal.NoProgram, match=r"parfocal cannot be started"):
+        FocusEnv(program=stranger)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import NoProgram, ParfocalError, ProgramEnded
-from .program import find_program, last_words
+from .program import find_program, last_words, starting
 
 try:
     import gymnasium
@@ -62,10 +62,12 @@ class _Simulation:
 
     def __init__(self, options: Sequence[str], count: int, program: str | os.PathLike[str] | None) -> None:
         command = [find_program(program), "environment", "--count", str(count), *options]
-        self._log = tempfile.TemporaryFile(prefix="parfocal-log-")
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, bufsize=0
-        )
+        with starting(command[0]), contextlib.ExitStack() as opened:
+            self._log = opened.enter_context(tempfile.TemporaryFile(prefix="parfocal-log-"))
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, bufsize=0
+            )
+            opened.pop_all()
         self._finalizer = weakref.finalize(self, _end, self._process, self._log)
         assert self._process.stdin is not None
         assert self._process.stdout is not None

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from .errors import BadExport
-from .program import find_program, last_words
+from .program import find_program, last_words, starting
 
 NEWEST_FORMAT = 1
 """The newest format of exports that this version reads."""
@@ -167,7 +167,10 @@ class Export(Mapping[str, pd.DataFrame]):
         if self.path.is_file():
             raise BadExport(f"{self.path} is a ZIP file: unpack it, then load and verify the folder.")
         command = [find_program(program), "verify", str(self.path), "--json"]
-        done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+        with starting(command[0]):
+            done = subprocess.run(
+                command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
+            )
         try:
             checks = pd.DataFrame(json.loads(done.stdout), columns=["name", "verdict", "detail"])
         except ValueError:

@@ -11,7 +11,7 @@ from queue import Empty, Queue
 from typing import Literal
 
 from .errors import NoProgram, ParfocalError, ProgramEnded
-from .program import find_program, last_words
+from .program import find_program, last_words, starting
 
 Fault = Literal[
     "none",
@@ -40,9 +40,10 @@ class EmulatedLens:
         self, *, program: str | os.PathLike[str] | None = None, arguments: list[str] | None = None
     ) -> None:
         command = [find_program(program), "lens", "emulate", *(arguments or [])]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        with starting(command[0]):
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
         self._said: Queue[str] = Queue()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()

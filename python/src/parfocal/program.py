@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import NoProgram
@@ -20,6 +22,15 @@ def find_program(program: str | os.PathLike[str] | None = None) -> str:
             "variable PARFOCAL to the program's path, such as target/release/parfocal."
         )
     return str(Path(found).absolute())
+
+
+@contextlib.contextmanager
+def starting(program: str) -> Iterator[None]:
+    """Raise `NoProgram` for a program that the system cannot start, such as one for another processor."""
+    try:
+        yield
+    except OSError as error:
+        raise NoProgram(f"{program} cannot be started: {error}.") from error
 
 
 def last_words(text: str, lines: int = 5) -> str:

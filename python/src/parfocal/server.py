@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from .errors import NoProgram, ProgramEnded
-from .program import find_program, last_words
+from .program import find_program, last_words, starting
 
 if TYPE_CHECKING:
     from .client import AsyncClient, Client
@@ -68,13 +68,13 @@ class Server:
         # Its messages go into a file, so that no full pipe can ever hold the server up.
         self._log = Path(self._own.name, "log")
         try:
-            with self._log.open("w") as log:
+            with starting(found), self._log.open("w") as log:
                 self._process = subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True
                 )
-        except OSError as error:
+        except NoProgram:
             self._own.cleanup()
-            raise NoProgram(f"{found} cannot be started: {error}.") from error
+            raise
         self._finalizer = weakref.finalize(self, _end, self._process)
         self._said: list[str] = []
         self._ready = threading.Event()
