@@ -171,6 +171,8 @@ def test_what_the_program_refuses_is_its_own_sentence(tmp_path: Path) -> None:
         FocusEnv(tmp_path / "nowhere")
     with pytest.raises(parfocal.NoProgram, match=r"did not start: .*Mono9"):
         FocusEnv(raw="Mono9")
+    with pytest.raises(parfocal.NoProgram, match=r"did not start: .*nothing.mp4"):
+        FocusEnv(footage=tmp_path / "nothing.mp4")
     stranger = tmp_path / "parfocal"
     for then in ("exit", "cat >/dev/null"):
         stranger.write_text(f"#!/bin/sh\necho hello\n{then}\n")

@@ -11,7 +11,6 @@ import tempfile
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO, Any, Literal
 
 import numpy as np
@@ -30,6 +29,8 @@ except ImportError:
 
 Observation = dict[str, npt.NDArray[Any]]
 Floats = npt.NDArray[np.float32]
+Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+"""One path, or several."""
 Reward = Callable[[Floats, Floats], npt.NDArray[Any]]
 """Makes rewards of focal powers and optimal ones, both arrays with a value for each environment."""
 
@@ -175,6 +176,11 @@ def _end(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
     log.close()
 
 
+def _several(paths: Paths) -> Sequence[str | os.PathLike[str]]:
+    """Return one path as a list of it, and several as they are."""
+    return [paths] if isinstance(paths, (str, os.PathLike)) else paths
+
+
 class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]]):
     """Many environments side by side, stepped together in one program: see `FocusEnv`.
 
@@ -186,7 +192,7 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
     def __init__(
         self,
         num_envs: int = 1,
-        scans: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = "simulated",
+        scans: Paths = "simulated",
         *,
         observation: Literal["patch", "view"] = "patch",
         actions: Literal["steps", "continuous"] = "steps",
@@ -195,7 +201,7 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
         variety: float = 0.0,
         split: Literal["training", "validation", "test"] = "training",
         scenes: int = 32,
-        footage: Sequence[str | os.PathLike[str]] = (),
+        footage: Paths = (),
         raw: str | None = None,
         reward: Reward = minus_error,
         program: str | os.PathLike[str] | None = None,
@@ -206,16 +212,15 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
             raise ValueError("num_envs must be 1 or more")
         if actions not in ("steps", "continuous"):
             raise ValueError(f"actions must be 'steps' or 'continuous', not {actions!r}")
-        chosen = [scans] if isinstance(scans, (str, os.PathLike)) else list(scans)
         options = ["--observation", observation, "--frames", str(frames), "--variety", str(variety)]
         options += ["--split", split, "--scenes", str(scenes)]
         # Without a seed from the caller, two runs should differ.
         options += ["--seed", str(np.random.SeedSequence().generate_state(1)[0])]
-        for path in footage:
-            options += ["--footage", str(Path(path))]
+        for path in _several(footage):
+            options += ["--footage", os.fspath(path)]
         if raw is not None:
             options += ["--raw", raw]
-        options += ["--scans", *(os.fspath(one) for one in chosen)]
+        options += ["--scans", *(os.fspath(one) for one in _several(scans))]
 
         self.num_envs = num_envs
         self.reward = reward
@@ -331,7 +336,7 @@ class FocusEnv(gymnasium.Env[Observation, Any]):
 
     def __init__(
         self,
-        scans: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = "simulated",
+        scans: Paths = "simulated",
         *,
         render_mode: str | None = None,
         **options: Any,
