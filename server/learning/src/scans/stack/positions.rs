@@ -16,6 +16,8 @@ pub(super) fn listed(list: &Path) -> Result<Vec<(String, f64)>, LearningError> {
     let text = std::fs::read_to_string(list).map_err(unreadable)?;
     let mut placed = Vec::new();
 
+    // Spreadsheets put a mark of UTF-8 before the first name.
+    let text = text.trim_start_matches('\u{feff}');
     for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()) {
         let entry = line.rsplit_once(',').map(|(name, position)| (name.trim(), position.trim().parse::<f64>()));
         match entry {
@@ -119,6 +121,17 @@ mod tests {
     fn placed(names: &[&str]) -> Vec<(String, f64)> {
         let files = names.iter().map(PathBuf::from).collect();
         named(files).into_iter().map(|(file, position)| (file_name(&file), position)).collect()
+    }
+
+    #[test]
+    fn a_list_is_read_as_spreadsheets_save_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("list.csv");
+        for heading in ["", "name,position\r\n"] {
+            std::fs::write(&file, format!("\u{feff}{heading}far.png,2.5\r\nnear.png,0\r\n")).unwrap();
+            let expected = [("far.png".to_owned(), 2.5), ("near.png".to_owned(), 0.0)];
+            assert_eq!(listed(&file).unwrap(), expected, "{heading}");
+        }
     }
 
     #[test]
