@@ -179,7 +179,7 @@ fn ask() -> Result<Passphrase, Failure> {
     let first = line("passphrase (10 characters or more; 15 are recommended): ")?;
     let passphrase = Passphrase::new(&first)?;
     if std::io::stdin().is_terminal() && line("repeat the passphrase: ")? != first {
-        return Err("the two passphrases differ; nothing was changed; try again".into());
+        bail!("the two passphrases differ; nothing was changed; try again");
     }
     Ok(passphrase)
 }

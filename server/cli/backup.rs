@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn send(arguments: &Arguments) -> Result<Backup, Failure> {
     let mut output = std::io::stdout();
     if output.is_terminal() {
-        return Err("a backup is no text: send it into a file, such as `parfocal backup --out - > backup.db`".into());
+        bail!("a backup is no text: send it into a file, such as `parfocal backup --out - > backup.db`");
     }
     Ok(wait_for(backup::backup_to(&arguments.data_dir, &mut output, Arc::new(SystemClock)))??)
 }

@@ -105,11 +105,10 @@ fn dark(capture: &Capture) -> Result<(), Failure> {
 fn white(capture: &Capture) -> Result<(), Failure> {
     let mut calibration = calibration::begun(&capture.to.out)?;
     let Reference::PerPixel(dark) = &calibration.dark else {
-        return Err(format!(
+        bail!(
             "{} has no dark reference yet: put the lens cap on and run `parfocal calibrate dark` first",
             capture.to.out.display()
-        )
-        .into());
+        );
     };
 
     let white = take(capture, &calibration)?.white(dark).map_err(|error| refused("white", &error))?;
@@ -136,11 +135,7 @@ fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure
             FrameImage::Mosaic(mosaic) if number >= WARM_UP => average.add(&mosaic)?,
             FrameImage::Mosaic(_) => {}
             FrameImage::Rgb(_) => {
-                return Err(format!(
-                    "the camera {} delivers colour pictures, which need no calibration",
-                    capture.camera
-                )
-                .into());
+                bail!("the camera {} delivers colour pictures, which need no calibration", capture.camera);
             }
         }
     }
@@ -150,7 +145,7 @@ fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure
 
 fn import(arguments: &Import) -> Result<(), Failure> {
     if arguments.from.is_none() && arguments.responses.is_none() && arguments.correction.is_none() {
-        return Err("there is nothing to import: name a TOML file, --responses or --correction".into());
+        bail!("there is nothing to import: name a TOML file, --responses or --correction");
     }
 
     let mut calibration = calibration::begun(&arguments.to.out)?;

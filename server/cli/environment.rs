@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
     if !arguments.footage.is_empty() && !arguments.scans.iter().any(|scans| scans == "simulated") {
-        return Err("--footage needs simulated scans; add simulated to --scans".into());
+        bail!("--footage needs simulated scans; add simulated to --scans");
     }
     if !arguments.footage.is_empty() && arguments.split != Split::Training {
         tell(format_args!("note: footage is the same for training, validation and test"));

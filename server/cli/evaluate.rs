@@ -150,9 +150,10 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     let registry = library::policies(arguments.weights.as_deref(), arguments.blur_rate())?;
 
     if matches!(arguments.blur, Some(Blur::Measured)) && arguments.stacks.is_empty() {
-        return Err("--blur measured works only with --stacks; for other scans give the pixels; `parfocal scan info` \
+        bail!(
+            "--blur measured works only with --stacks; for other scans give the pixels; `parfocal scan info` \
              shows them for a recorded scan"
-            .into());
+        );
     }
 
     let policies = policies(&arguments.policies, &registry);
@@ -182,7 +183,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     let part = arguments.shard.unwrap_or(Part::WHOLE);
     let Scans { set, seed, count, between } = scans(arguments, part, kept(&registry, &policies)?)?;
     if set.count() == 0 {
-        return Err(format!("shard {part} has no scans: there are only {count}; make fewer shards").into());
+        bail!("shard {part} has no scans: there are only {count}; make fewer shards");
     }
 
     let blank = without_detail(set.as_ref());
@@ -311,7 +312,7 @@ struct Scans {
 fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure> {
     let are_drawn = ["simulated", "relief"].contains(&arguments.scans.as_str());
     if are_drawn && arguments.between.is_some() {
-        return Err("--between is for recorded scans, which have pictures at some focal powers only".into());
+        bail!("--between is for recorded scans, which have pictures at some focal powers only");
     }
 
     if arguments.scans == "simulated" {
@@ -319,7 +320,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
     }
 
     if !arguments.footage.is_empty() {
-        return Err("--footage needs simulated scans; leave out --scans".into());
+        bail!("--footage needs simulated scans; leave out --scans");
     }
 
     if arguments.scans == "relief" {
@@ -335,7 +336,7 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
 
     if arguments.scans == "phantom" {
         if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {
-            return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
+            bail!("--count is at most {MOST_PHANTOM} over the phantom");
         }
         let count = arguments.count.unwrap_or(1);
         let scans = part.scans(count).map(|index| phantom(arguments.seed().wrapping_add(index as u64), kept));
@@ -344,21 +345,17 @@ fn scans(arguments: &Arguments, part: Part, kept: Kept) -> Result<Scans, Failure
 
     let folder = Path::new(&arguments.scans);
     if !folder.is_dir() {
-        return Err(format!(
-            "unknown scans '{0}'; use simulated, relief, phantom or the folder of a recorded scan",
-            arguments.scans
-        )
-        .into());
+        bail!("unknown scans '{0}'; use simulated, relief, phantom or the folder of a recorded scan", arguments.scans);
     }
 
     if arguments.count.is_some_and(|count| count > 1) {
-        return Err("a folder holds one scan; leave out --count".into());
+        bail!("a folder holds one scan; leave out --count");
     }
     if part != Part::WHOLE {
-        return Err("a folder holds one scan, which cannot be split; leave out --shard".into());
+        bail!("a folder holds one scan, which cannot be split; leave out --shard");
     }
     if arguments.seed.is_some() {
-        return Err("a recorded scan has its own seed; leave out --seed".into());
+        bail!("a recorded scan has its own seed; leave out --seed");
     }
 
     let folder = ScanFolder::open(folder)?;

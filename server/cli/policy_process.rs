@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // The kernel ends this process with the program, however that ends.
     set_parent_process_death_signal(Some(Signal::KILL))?;
     if getppid().is_none_or(|parent| parent.as_raw_nonzero().get() != arguments.parent) {
-        return Err("the program that started this policy has ended".into());
+        bail!("the program that started this policy has ended");
     }
 
     let socket = rustix::io::dup(std::io::stdin().as_fd())?.into_raw_fd();

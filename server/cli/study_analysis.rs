@@ -76,27 +76,24 @@ async fn package_of(arguments: &Arguments) -> Result<Option<&Path>, Failure> {
 
     if !package::is_package(folder) {
         if is_path || folder.exists() && !is_study(arguments).await {
-            return Err(format!(
+            bail!(
                 "{name} is not a package of a study; give a folder that `parfocal export --study` or `parfocal study \
                  merge` wrote (unpack a ZIP file first), or the name of a study"
-            )
-            .into());
+            );
         }
         if arguments.data_dir.is_none() && !folder_of(arguments).exists() {
-            return Err(format!(
+            bail!(
                 "there is no package '{name}' here, and no server's data folder: give the folder of a package, or name \
                  the server's data folder with --data-dir"
-            )
-            .into());
+            );
         }
         return Ok(None);
     }
     if !is_path && is_study(arguments).await {
-        return Err(format!(
+        bail!(
             "'{name}' is a package here, and also a study of the database in data: write ./{name} for the package, or \
              add --data-dir data for the study"
-        )
-        .into());
+        );
     }
     Ok(Some(folder))
 }
@@ -113,11 +110,10 @@ fn verified(folder: &Path) -> Result<Analysis, Failure> {
         match check.verdict {
             Verdict::Failed(problem) => {
                 let (folder, name) = (folder.display(), check.name);
-                return Err(format!(
+                bail!(
                     "{folder} was not analysed, because it does not verify: {name}: {problem}; `parfocal verify \
                      {folder}` shows every check"
-                )
-                .into());
+                );
             }
             Verdict::NotChecked(reason) => notices::tell(format_args!("{}: not checked: {reason}", check.name)),
             Verdict::Passed(_) => {}

@@ -216,9 +216,7 @@ fn own_recipe(arguments: &Training) -> Result<Option<Recipe>, Failure> {
         let file = file.display();
         let made = &recipe.policy;
         let asked = &arguments.policy;
-        return Err(
-            format!("the recipe {file} makes '{made}', not '{asked}'; give that policy, or another recipe").into()
-        );
+        bail!("the recipe {file} makes '{made}', not '{asked}'; give that policy, or another recipe");
     }
 
     Ok(Some(recipe))

@@ -33,15 +33,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.path;
     if !path.exists() {
-        return Err(format!("{} does not exist; give an export, a data folder or a database", path.display()).into());
+        bail!("{} does not exist; give an export, a data folder or a database", path.display());
     }
 
     if is_zip(path) {
-        return Err(format!(
+        bail!(
             "{0} is a ZIP file: unpack it, for example with `unzip {0}`, and verify the folder that was in it",
             path.display()
-        )
-        .into());
+        );
     }
 
     let (what, checks) = if is_package(path) {

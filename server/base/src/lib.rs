@@ -31,3 +31,11 @@ pub use blur_rate::BlurRate;
 pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
 pub use patch_place::PatchPlace;
 pub use policy_name::PolicyName;
+
+/// Returns the error that a sentence says. The sentence is formatted as by `format!`.
+#[macro_export]
+macro_rules! bail {
+    ($($sentence:tt)*) => {
+        return Err(format!($($sentence)*).into())
+    };
+}

@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     if failed > 0 {
-        return Err(format!("cannot inspect {failed} of {} files", paths.len()).into());
+        bail!("cannot inspect {failed} of {} files", paths.len());
     }
     Ok(())
 }

@@ -137,7 +137,7 @@ fn glass(emulator: &Emulator) -> String {
 /// The serial number: the prefix that marks an emulated unit, then `text`.
 fn parse_serial(text: &str) -> Result<[u8; 8], String> {
     if text.is_empty() || text.len() > 4 || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
-        return Err("must be one to four letters and digits".into());
+        bail!("must be one to four letters and digits");
     }
 
     let mut serial = *b"EMUL0000";

@@ -179,7 +179,7 @@ fn watch(
         }
         if now.since(seen.1) > PATIENCE {
             let message = control.status.borrow().camera.message.clone();
-            return Err(format!("no frame comes from the camera {}: {message}", arguments.camera).into());
+            bail!("no frame comes from the camera {}: {message}", arguments.camera);
         }
     }
 }

@@ -38,7 +38,7 @@ pub struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     if recording.rows().is_empty() {
-        return Err(format!("{} holds no frame to step a policy over", arguments.folder.display()).into());
+        bail!("{} holds no frame to step a policy over", arguments.folder.display());
     }
 
     let calibration = calibration::read(&recording.calibration())?;

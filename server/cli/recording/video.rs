@@ -51,10 +51,10 @@ enum Pictures {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = format(&arguments.out)?;
     if format.is_some() && arguments.pictures.is_some() {
-        return Err("--pictures is for a folder of pictures; a video is always developed".into());
+        bail!("--pictures is for a folder of pictures; a video is always developed");
     }
     if arguments.pictures == Some(Pictures::Tiff) && arguments.size.is_some() {
-        return Err("--size is for developed pictures; raw mosaics have the size that they were recorded with".into());
+        bail!("--size is for developed pictures; raw mosaics have the size that they were recorded with");
     }
 
     let recording = Recording::open(&arguments.folder)?;
@@ -90,15 +90,14 @@ fn format(out: &Path) -> Result<Option<&'static str>, Failure> {
     let known = VIDEOS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known));
 
     let Some((_, format)) = known else {
-        return Err(format!(
+        bail!(
             "{}: videos are .mp4, .mkv, .mov or .avi, not .{}; for a folder of pictures, end its name with a /",
             out.display(),
             ending.display()
-        )
-        .into());
+        );
     };
     if fs::symlink_metadata(out).is_ok() {
-        return Err(format!("{} exists already; give a name that is not taken", out.display()).into());
+        bail!("{} exists already; give a name that is not taken", out.display());
     }
     Ok(Some(*format))
 }
@@ -116,11 +115,7 @@ fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Fa
     let frames: Vec<usize> = (0..rows.len()).filter(within).collect();
     if frames.is_empty() {
         let length = recording.seconds();
-        return Err(format!(
-            "no frame of {} lies within the seconds asked for; it lasts {length:.1} s",
-            arguments.folder.display()
-        )
-        .into());
+        bail!("no frame of {} lies within the seconds asked for; it lasts {length:.1} s", arguments.folder.display());
     }
     Ok(frames)
 }

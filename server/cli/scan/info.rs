@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     if let Some(damage) = damages.first() {
         let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
-        return Err(format!("{} is damaged: {}{more}", damage.file, damage.reason).into());
+        bail!("{} is damaged: {}{more}", damage.file, damage.reason);
     }
 
     scan.whole()?;

@@ -21,9 +21,7 @@ use parfocal_devices::simulation::phantom::Trajectory;
 use parfocal_imaging::{Calibration, Reconstructor};
 use parfocal_learning::scans::benchmark::SEED;
 use parfocal_learning::scans::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
-use parfocal_learning::scans::recording::{
-    Devices, PhantomPoses, PoseSource, RecordError, Stepper, StepperError, record,
-};
+use parfocal_learning::scans::recording::{Devices, PhantomPoses, PoseSource, RecordError, Stepper, record};
 
 /// Arguments of `parfocal scan record`.
 #[derive(Debug, clap::Args)]
@@ -95,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn phantom(arguments: &Arguments) -> Result<(Box<dyn PoseSource>, Header), Failure> {
     if arguments.calibration.is_some() {
-        return Err("the phantom's sensor needs no calibration: leave out --calibration, or give a --lens".into());
+        bail!("the phantom's sensor needs no calibration: leave out --calibration, or give a --lens");
     }
 
     let trajectory = Trajectory::new(arguments.seed, arguments.poses, HASTE);
@@ -155,11 +153,7 @@ fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: 
 }
 
 /// Asks on the terminal for each pose and waits for Enter.
-fn asker(
-    poses: usize,
-    interrupt: Interrupt,
-    progress: ProgressBar,
-) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
+fn asker(poses: usize, interrupt: Interrupt, progress: ProgressBar) -> impl FnMut(usize) -> Result<(), String> + Send {
     let (sender, lines) = channel();
     hear_lines(move |line| sender.send(line).is_ok());
     let typed = std::io::stdin().is_terminal();
@@ -171,10 +165,10 @@ fn asker(
         loop {
             match lines.recv_timeout(Duration::from_millis(100)) {
                 Ok(_) => return Ok(()),
-                Err(RecvTimeoutError::Disconnected) => return Err(StepperError::Unattended(pose)),
-                Err(RecvTimeoutError::Timeout) if interrupt.asked() => {
-                    return Err(StepperError::Stopped(pose));
+                Err(RecvTimeoutError::Disconnected) => {
+                    bail!("nobody confirmed pose {pose}: the input has ended; use --stepper if nobody can press Enter")
                 }
+                Err(RecvTimeoutError::Timeout) if interrupt.asked() => bail!("stopped before pose {pose}"),
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }

@@ -195,11 +195,11 @@ fn dynamics(
     let file = arguments.lens_dynamics.as_deref().map_or_else(String::new, |path| path.display().to_string());
     let Some(info) = info else {
         let problem = "the lens does not answer, so nobody knows whether they belong to it";
-        return Err(format!("lens dynamics {file}: {problem}; switch the lens on, or leave out --lens-dynamics").into());
+        bail!("lens dynamics {file}: {problem}; switch the lens on, or leave out --lens-dynamics");
     };
     if measured.serial != info.serial {
         let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
-        return Err(format!("lens dynamics {file}: {problem}; measure it with `parfocal lens measure`").into());
+        bail!("lens dynamics {file}: {problem}; measure it with `parfocal lens measure`");
     }
     Ok(measured.dynamics())
 }

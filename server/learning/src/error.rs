@@ -30,6 +30,12 @@ impl LearningError {
     }
 }
 
+impl From<String> for LearningError {
+    fn from(text: String) -> Self {
+        Self(text)
+    }
+}
+
 impl From<FootageError> for LearningError {
     fn from(error: FootageError) -> Self {
         Self(error.to_string())

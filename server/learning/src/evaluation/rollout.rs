@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::LearningError;
 use crate::scans::FocalTimeScan;
 use parfocal_autofocus::belief::{SURE, Sides, best};
 use parfocal_autofocus::networks::BINS;
@@ -139,11 +140,6 @@ impl Path {
     }
 }
 
-/// A policy's answer that is not a focal power: at which frame, and what it was.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct NoTarget(String);
-
 /// The mean gradient magnitude of the patch at the optimum, for each of `frames` frames of `scan`.
 pub fn sharpest(scan: &mut dyn FocalTimeScan, frames: usize) -> Vec<f64> {
     let mut out = Vec::with_capacity(frames);
@@ -166,7 +162,11 @@ fn kept(sharpness: f64, at_optimum: f64) -> f64 {
 /// # Errors
 /// If the policy returns something that is not a focal power. The live loop would then hold the lens, and the rest of
 /// the path would not be the policy's.
-pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest: &[f64]) -> Result<Path, NoTarget> {
+pub fn roll_out(
+    policy: &mut dyn Policy,
+    scan: &mut dyn FocalTimeScan,
+    sharpest: &[f64],
+) -> Result<Path, LearningError> {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
     for (frame, at_optimum) in (1..).zip(sharpest) {
@@ -179,7 +179,7 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, sharpest:
         course.claims.extend(decision.belief.as_deref().and_then(Claim::of));
         let target = decision.target;
         focal_power = FocalPower::new(target).map_err(|_| {
-            NoTarget(match policy.fault() {
+            LearningError::new(match policy.fault() {
                 Some(fault) => format!("at frame {frame}, {fault}"),
                 None => format!("at frame {frame} it returned {target}, which is not a focal power"),
             })

@@ -173,15 +173,10 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(EvaluationReport, Vec<
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
         if let Some(what) = a.difference(b) {
-            return Err(LearningError::new(format!(
-                "{first} and {second} are shards of different evaluations: they differ in {what}"
-            )));
+            bail!("{first} and {second} are shards of different evaluations: they differ in {what}");
         }
         if a.part == b.part {
-            return Err(LearningError::new(format!(
-                "{first} and {second} are both shard {}; give each shard once",
-                a.part
-            )));
+            bail!("{first} and {second} are both shard {}; give each shard once", a.part);
         }
     }
 

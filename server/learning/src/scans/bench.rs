@@ -81,20 +81,20 @@ fn recording(folder: &str, raw: Option<PixelFormat>) -> Result<(Vec<Scene>, Vec<
     if Path::new(folder).join(HEADER).exists() {
         let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, Kept::Surroundings, &|| ())?;
         if scan.poses().len() < 2 {
-            return Err(LearningError::new(format!(
+            bail!(
                 "the scan {folder} has only one pose; to use its pictures as a focal stack, name the folder that holds \
                  them"
-            )));
+            );
         }
         return Ok((vec![Scene::Recorded(Arc::new(scan))], Vec::new()));
     }
 
     let source = StackSource::parse(folder, raw);
     if !source.folder.exists() {
-        return Err(LearningError::new(format!(
+        bail!(
             "there is no folder {folder}; name folders of recorded scans (scan.json) or focal stacks (pictures, or a \
              TIFF)"
-        )));
+        );
     }
 
     let (scaled, doubts) = source.at_scales()?;

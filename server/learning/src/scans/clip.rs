@@ -39,7 +39,7 @@ impl Clip {
         let size = (first.width, first.height);
 
         if let Some(index) = frames.iter().position(|frame| (frame.width, frame.height) != size) {
-            return Err(LearningError::new(format!("picture {index} differs in size from the first one")));
+            bail!("picture {index} differs in size from the first one");
         }
 
         let area = area.unwrap_or(Area { left: 0, top: 0, right: size.0, bottom: size.1 });
@@ -47,10 +47,10 @@ impl Clip {
         let width = area.right.saturating_sub(area.left);
         let height = area.bottom.saturating_sub(area.top);
         if width < 64 || height < 64 {
-            return Err(LearningError::new(format!(
+            bail!(
                 "pictures must show at least 64x64 pixels to scan, in the square within their content area where they \
                  have one; these show {width}x{height}"
-            )));
+            );
         }
 
         let coarse = vec![OnceLock::new(); frames.len()];

@@ -30,10 +30,10 @@ pub fn without_detail(set: &dyn ScanSet) -> usize {
 /// If all scans are without detail.
 pub fn warning(blank: usize, count: usize) -> Result<Option<String>, LearningError> {
     if blank == count {
-        return Err(LearningError::new(format!(
+        bail!(
             "there is nothing to focus on: even the sharpest patch shows no detail in any of {count} scans; use \
              pictures of something with texture, taken in focus"
-        )));
+        );
     }
     let percent = 100.0 * blank as f64 / count as f64;
     let words =

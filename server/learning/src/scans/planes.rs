@@ -42,15 +42,12 @@ impl PlaneStack {
         let width = first.width;
         let height = first.height;
         if width < 64 || height < 64 {
-            let least = "the pictures of the focal stack need at least 64x64 pixels";
-            return Err(LearningError::new(format!("{least}, but have {width}x{height}")));
+            bail!("the pictures of the focal stack need at least 64x64 pixels, but have {width}x{height}");
         }
         if let Some(index) = pictures.iter().position(|(_, picture)| (picture.width, picture.height) != (width, height))
         {
             let number = index + 1;
-            return Err(LearningError::new(format!(
-                "picture {number} of the focal stack differs in size from the first"
-            )));
+            bail!("picture {number} of the focal stack differs in size from the first");
         }
         if !pictures.is_sorted_by(|a, b| a.0 < b.0) {
             return Err(too_few());

@@ -1,7 +1,7 @@
 //! A bench of real devices: a camera, a lens, and a person or a command that moves the camera to the next pose.
 
 use std::io;
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,44 +22,28 @@ const TOLERANCE: f64 = 0.01;
 /// What moves the camera to its next pose.
 pub enum Stepper {
     /// A person, who is asked for each pose and confirms when the camera is there.
-    Asked(Box<dyn FnMut(usize) -> Result<(), StepperError> + Send>),
+    Asked(Box<dyn FnMut(usize) -> Result<(), String> + Send>),
     /// A shell command in which `{pose}` stands for the pose's number.
     Command(String),
 }
 
-/// Why the camera was not moved.
-#[derive(Debug, thiserror::Error)]
-pub enum StepperError {
-    /// Nobody is there to move the camera.
-    #[error("nobody confirmed pose {0}: the input has ended; use --stepper if nobody can press Enter")]
-    Unattended(usize),
-    /// Recording was stopped.
-    #[error("stopped before pose {0}")]
-    Stopped(usize),
-    /// The command cannot be started.
-    #[error("cannot start the stepper's shell: {0}")]
-    NotStarted(io::Error),
-    /// The command reported a failure.
-    #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to continue")]
-    Failed {
-        /// Pose that it should have reached.
-        pose: usize,
-        /// Exit status of the command.
-        status: ExitStatus,
-    },
-}
-
 impl Stepper {
-    /// Moves the camera to `pose` and waits until it is there.
-    fn go(&mut self, pose: usize) -> Result<(), StepperError> {
+    /// Moves the camera to `pose` and waits until it is there. An error says why it is not.
+    fn go(&mut self, pose: usize) -> Result<(), String> {
         match self {
             Self::Asked(ask) => ask(pose),
             Self::Command(command) => {
                 let command = command.replace("{pose}", &pose.to_string());
                 let mut shell = Command::new("sh");
                 let status = shell.args(["-c", &command]).stdin(Stdio::null()).stdout(io::stderr()).status();
-                let status = status.map_err(StepperError::NotStarted)?;
-                if status.success() { Ok(()) } else { Err(StepperError::Failed { pose, status }) }
+                let status = status.map_err(|error| format!("cannot start the stepper's shell: {error}"))?;
+                if status.success() {
+                    return Ok(());
+                }
+                bail!(
+                    "the stepper failed at pose {pose} ({status}); once it works, run the same command again to \
+                     continue"
+                )
             }
         }
     }
@@ -81,7 +65,7 @@ pub struct Devices {
 
 impl PoseSource for Devices {
     fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<PosePictures, RecordError> {
-        self.stepper.go(pose)?;
+        self.stepper.go(pose).map_err(RecordError::Stepper)?;
         let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;
         let Some(GrayImage { width, height, .. }) = pictures.first() else { return Err(RecordError::TooSmall(0, 0)) };
         let width = *width;

@@ -52,15 +52,17 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, LearningErr
     let (width, height) = stack.size();
     let of = stack.planes().len();
     if planes >= of {
-        return Err(LearningError::new(format!(
+        bail!(
             "a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; give --planes at \
              most {}",
             of - 1
-        )));
+        );
     }
     if size < LEAST_SIDE || size > width || size > height {
-        let window = format!("a window of {size}x{size} pixels does not fit into pictures of {width}x{height}");
-        return Err(LearningError::new(format!("{window}; give a smaller --size or --scale")));
+        bail!(
+            "a window of {size}x{size} pixels does not fit into pictures of {width}x{height}; give a smaller --size or \
+             --scale"
+        );
     }
 
     let mut rng = ChaCha8Rng::seed_from_u64(cut.seed);

@@ -61,13 +61,14 @@ impl Imported {
 
         let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
         if !missing.is_empty() {
-            let are = format!("{} in {}", numbered(&missing), folder.display());
-            return Err(LearningError::new(format!("there is no picture of {are}; pose numbers must have no gaps")));
+            let poses = numbered(&missing);
+            bail!("there is no picture of {poses} in {}; pose numbers must have no gaps", folder.display());
         }
 
         if poses.len() > MOST_POSES {
-            let holds = format!("{} holds {} poses", folder.display(), poses.len());
-            return Err(LearningError::new(format!("{holds}; a scan has at most {MOST_POSES}: import it in parts")));
+            let folder = folder.display();
+            let count = poses.len();
+            bail!("{folder} holds {count} poses; a scan has at most {MOST_POSES}: import it in parts");
         }
 
         let imported = Self { poses, bits, raw };
@@ -79,17 +80,13 @@ impl Imported {
         let powers = self.powers();
         if let [one] = powers[..] {
             let one = one.get();
-            return Err(LearningError::new(format!(
-                "a scan needs at least two focal powers; every picture is at {one:.3}"
-            )));
+            bail!("a scan needs at least two focal powers; every picture is at {one:.3}");
         }
         for (&pose, stack) in &self.poses {
             let lacks = |power: &&FocalPower| !stack.iter().any(|(have, _)| have == *power);
             if let Some(power) = powers.iter().find(lacks) {
                 let power = power.get();
-                return Err(LearningError::new(format!(
-                    "pose {pose} has no picture at focal power {power:.3}, which other poses have"
-                )));
+                bail!("pose {pose} has no picture at focal power {power:.3}, which other poses have");
             }
         }
         Ok(())
@@ -230,17 +227,13 @@ impl Reader {
         let (width, height) = size;
         let is = format!("{} is {width}x{height} pixels", path.display());
         if width < LEAST_SIDE || height < LEAST_SIDE {
-            return Err(LearningError::new(format!(
-                "{is}; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}"
-            )));
+            bail!("{is}; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}");
         }
 
         let (first, (first_width, first_height)) = self.first.get_or_insert_with(|| (path.to_owned(), size));
         if (*first_width, *first_height) != size {
             let first = first.display();
-            return Err(LearningError::new(format!(
-                "{is}, but {first} is {first_width}x{first_height}; all pictures of a scan must have one size"
-            )));
+            bail!("{is}, but {first} is {first_width}x{first_height}; all pictures of a scan must have one size");
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ mod from_stack;
 mod import;
 mod phantom;
 
-pub use devices::{Devices, Stepper, StepperError};
+pub use devices::{Devices, Stepper};
 pub use from_stack::{Cut, Window, from_stack, windows};
 pub use import::{Imported, import};
 pub use phantom::PhantomPoses;
@@ -45,9 +45,9 @@ pub enum RecordError {
     /// Recording was stopped.
     #[error("stopped")]
     Stopped,
-    /// The camera could not be moved to the next pose.
-    #[error(transparent)]
-    Stepper(#[from] StepperError),
+    /// The camera could not be moved to the next pose: why, as a sentence.
+    #[error("{0}")]
+    Stepper(String),
     /// The camera failed.
     #[error(transparent)]
     Camera(#[from] CameraError),

@@ -54,9 +54,7 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Learn
 
     let note = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
-        return Err(LearningError::new(format!(
-            "{note}, where focus cannot be judged; shorten the exposure and take it again"
-        )));
+        bail!("{note}, where focus cannot be judged; shorten the exposure and take it again");
     }
 
     if share > 0.05 {
@@ -96,10 +94,11 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), LearningError>
         let levels = |picture: &GrayImage| steady.iter().map(|&index| picture.data[index]).collect::<Vec<_>>();
 
         if correlation(&levels(&pair[0]), &levels(&pair[1])).is_some_and(|alike| alike < LEAST_ALIKE) {
-            return Err(LearningError::new(format!(
+            bail!(
                 "{} and {} show different scenes; a focal stack is of one still scene",
-                planes[0].name, planes[1].name
-            )));
+                planes[0].name,
+                planes[1].name
+            );
         }
     }
     Ok(())
@@ -130,31 +129,31 @@ fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<Strin
     let ratio = |curve: &&Vec<f64>| least_and_most(curve).1 / least_and_most(curve).0.max(0.1);
     let peaked: Vec<&Vec<f64>> = curves.iter().filter(|curve| ratio(curve) >= LEAST_PEAK).collect();
     if peaked.len() * 10 < curves.len().max(1) {
-        return Err(LearningError::new(format!(
+        bail!(
             "the focus curve has no peak: sharpness changes by a fifth or more in only {} of {} places; \
              take a scene with texture over a wider range of focus",
             peaked.len(),
             curves.len()
-        )));
+        );
     }
 
     let count = stack.planes().len();
     let peaks = mean(&peaked.iter().map(|curve| peaks(curve) as f64).collect::<Vec<_>>());
     if peaks >= if count < 10 { 2.0 } else { 3.0 } {
-        return Err(LearningError::new(format!(
+        bail!(
             "sharpness rises and falls {peaks:.1} times from the first picture to the last: they are not \
              in order of focus, or not of one scene; name them so that a number gives the order, or give a --list"
-        )));
+        );
     }
 
     let at_end = |curve: &&&Vec<f64>| [0, count - 1].contains(&best(curve));
     let share = peaked.iter().filter(at_end).count() as f64 / peaked.len() as f64;
     if share > 0.7 {
-        return Err(LearningError::new(format!(
+        bail!(
             "the focus curve has no peak inside the stack: {:.0} % of the places are sharpest in its first \
              or last picture; take pictures beyond that",
             100.0 * share
-        )));
+        );
     }
     if share > 0.3 {
         notes.push(format!("{:.0} % of the places are sharpest in the first or last picture", 100.0 * share));

@@ -44,10 +44,10 @@ impl FocalStack {
         planes.sort_by(|a, b| a.position.total_cmp(&b.position));
         if planes.len() < LEAST_PLANES {
             let count = planes.len();
-            return Err(LearningError::new(format!(
+            bail!(
                 "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {count}; take \
                  more between them"
-            )));
+            );
         }
 
         for pair in planes.windows(2) {
@@ -55,16 +55,16 @@ impl FocalStack {
             let [(width, height), other] =
                 [&pair[0], &pair[1]].map(|plane| (plane.picture.width, plane.picture.height));
             if (width, height) != other {
-                return Err(LearningError::new(format!(
+                bail!(
                     "{second} is {}x{} pixels, but {first} is {width}x{height}; all pictures of a stack must have one \
                      size",
-                    other.0, other.1
-                )));
+                    other.0,
+                    other.1
+                );
             }
             let position = pair[1].position;
             if pair[0].position >= position {
-                let both = format!("{first} and {second} are both at position {position}");
-                return Err(LearningError::new(format!("{both}; leave one out")));
+                bail!("{first} and {second} are both at position {position}; leave one out");
             }
         }
         Ok(Self { planes })
@@ -85,9 +85,7 @@ impl FocalStack {
     ) -> Result<Self, LearningError> {
         if folder.is_file() && is_raw(folder) {
             let folder = folder.display();
-            return Err(LearningError::new(format!(
-                "{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}"
-            )));
+            bail!("{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}");
         }
         if folder.is_file() {
             return Self::new(pages::planes(folder, list, scale)?);

@@ -46,7 +46,7 @@ impl RunFolder {
             } else {
                 "holds other files, or a training that ended before its first checkpoint; choose a new or empty folder"
             };
-            return Err(LearningError::new(format!("{} {problem}", path.display())));
+            bail!("{} {problem}", path.display());
         }
 
         Ok(Self { path: path.to_owned(), _lock: lock })
@@ -59,10 +59,10 @@ impl RunFolder {
     /// If there is no checkpoint, it cannot be used, or another process is training there.
     pub fn go_on(path: &Path) -> Result<(Self, Checkpoint<'static>), LearningError> {
         if !path.join(CHECKPOINT).exists() {
-            return Err(LearningError::new(format!(
+            bail!(
                 "{} has no checkpoint to continue from; check the folder, or start again without --resume",
                 path.display()
-            )));
+            );
         }
 
         let lock = lock(path)?;

@@ -179,9 +179,7 @@ impl KnownSources {
         if begun.is_none() && !asked.is_empty() {
             let Kind { name, option } = kind;
             let instead = if name == FOOTAGE.name { "on drawn pictures" } else { "without recordings" };
-            return Err(LearningError::new(format!(
-                "this training was begun {instead}; leave out {option} to continue"
-            )));
+            bail!("this training was begun {instead}; leave out {option} to continue");
         }
         Ok(Self { kind, begun, asked })
     }
@@ -215,10 +213,10 @@ impl KnownSources {
 
         if now.is_some_and(|now| now.sha256 == begun.sha256) {
             if name == SCANS.name && planes(self.paths()) != planes(&begun.paths) {
-                return Err(LearningError::new(format!(
+                bail!(
                     "this training was begun on {names}; give each folder the same :PLANES, or none where there was \
                      none"
-                )));
+                );
             }
             return Ok(());
         }

@@ -26,22 +26,18 @@ impl ResumeRequest {
     pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), LearningError> {
         let folder = folder.display();
         let made = &recipe.policy;
-        let differs = |text: String| Err(LearningError::new(text));
 
         if self.name != *made {
             let ships = shipped(&self.name).and_then(|text| Recipe::parse(text).ok());
             let same_policy = ships.as_ref().is_some_and(|ships| ships.policy == *made);
             if !same_policy {
-                return differs(format!(
-                    "{folder} holds a training of {made}, not of {}; name {made} to continue",
-                    self.name
-                ));
+                bail!("{folder} holds a training of {made}, not of {}; name {made} to continue", self.name);
             }
             if ships.map(|ships| ships.with_updates(recipe.updates())).as_ref() != Some(recipe) {
-                return differs(format!(
+                bail!(
                     "{folder} holds a training of {made} by another recipe than {}; name {made} to continue",
                     self.name
-                ));
+                );
             }
         }
 
@@ -51,19 +47,19 @@ impl ResumeRequest {
         }
 
         if let Some((key, was, is)) = recipe.difference(&requested) {
-            return differs(format!(
+            bail!(
                 "the training in {folder} was begun with {key} = {was}, not {is}; leave out --config and --updates to \
                  continue, or start again in another folder"
-            ));
+            );
         }
 
-        match self.seed {
-            Some(other) if other != seed => differs(format!(
-                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, \
-                 or start again in another folder"
-            )),
-            _ => Ok(()),
+        if let Some(other) = self.seed.filter(|other| *other != seed) {
+            bail!(
+                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, or \
+                 start again in another folder"
+            );
         }
+        Ok(())
     }
 }
 
