@@ -98,10 +98,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
-    let runs = without_systems_own(folders)
-        .into_iter()
-        .map(|folder| TrainedRun::read(folder))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut runs = Vec::new();
+    for folder in without_systems_own(folders) {
+        match TrainedRun::read(folder)? {
+            Some(run) => runs.push(run),
+            None => tell(format_args!("note: {} is left out: it has saved nothing yet", folder.display())),
+        }
+    }
     print_result(json, &runs, || markdown(&runs))
 }
 

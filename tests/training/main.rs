@@ -190,6 +190,12 @@ fn trainings_are_compared_by_what_their_folders_hold() {
     let card = std::fs::read_to_string(short.join("MODEL_CARD.md")).unwrap();
     assert!(card.contains(&format!("(seed 2023): mean absolute focal power error {mae:.4} ")), "{card}");
 
+    let begun = folder.path().join("begun");
+    drop(run(LEG, &begun));
+    let output = parfocal(&["train", "--compare", first, begun.to_str().unwrap()]);
+    assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 3);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("begun is left out: it has saved nothing yet"));
+
     let nothing = parfocal(&["train", "--compare", folder.path().to_str().unwrap()]);
     assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no saved training"));
     for wrong in [["train", "parfocal"].as_slice(), &["train"], &["train", "parfocal", "--compare", first]] {

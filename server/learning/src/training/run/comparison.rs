@@ -13,6 +13,8 @@ use crate::LearningError;
 use crate::evaluation::Row;
 use crate::training::recipe::Recipe;
 
+/// File in a run folder with its recipe, which is there before anything is trained.
+pub const RECIPE: &str = "recipe.toml";
 /// File in a run folder with the figures of its weights on the reference benchmark.
 pub const BENCHMARK: &str = "benchmark.json";
 /// The recipe's key that always has a column.
@@ -63,17 +65,17 @@ pub struct TrainedRun {
 }
 
 impl TrainedRun {
-    /// Reads the training in `folder`, which may still be running.
+    /// Reads the training in `folder`, which may still be running; `None` if it has saved nothing yet.
     ///
     /// # Errors
     /// If it holds no training, or the training cannot be read.
-    pub fn read(folder: &Path) -> Result<Self, LearningError> {
+    pub fn read(folder: &Path) -> Result<Option<Self>, LearningError> {
         let file = folder.join(CHECKPOINT);
         if !file.is_file() {
-            return Err(LearningError::new(format!(
-                "{} holds no saved training; give run folders of `parfocal train`",
-                folder.display()
-            )));
+            if folder.join(RECIPE).is_file() {
+                return Ok(None);
+            }
+            bail!("{} holds no saved training; give run folders of `parfocal train`", folder.display());
         }
 
         let checkpoint = Checkpoint::read_notes(&file)?;
@@ -85,7 +87,7 @@ impl TrainedRun {
         let best: f64 = checkpoint.number("best")?;
         let curve = curves::parse(note("curve"));
 
-        Ok(Self {
+        Ok(Some(Self {
             run: folder.to_owned(),
             seed: checkpoint.number("seed")?,
             updates: curve.last().map_or(0, |point| point.0),
@@ -93,7 +95,7 @@ impl TrainedRun {
             best_validation: best.is_finite().then_some(best),
             benchmark: benchmark(&folder.join(BENCHMARK))?,
             recipe: flat(&recipe),
-        })
+        }))
     }
 }
 

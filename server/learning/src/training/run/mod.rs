@@ -28,7 +28,7 @@ use crate::scans::relief;
 use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scene;
 use checkpoint::Checkpoint;
-use comparison::{BENCHMARK, BenchmarkFigures};
+use comparison::{BENCHMARK, BenchmarkFigures, RECIPE};
 use curves::Point;
 use folder::{RunFolder, unwritable};
 use material::Material;
@@ -41,7 +41,6 @@ use parfocal_base::clock::Clock;
 use resume::ResumeRequest;
 use tensorboard::EventFile;
 
-const RECIPE: &str = "recipe.toml";
 const CARD: &str = "MODEL_CARD.md";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
