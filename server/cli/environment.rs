@@ -114,15 +114,12 @@ fn scenery(arguments: &Arguments) -> Result<Scenery, Failure> {
 
 /// Scenes with everything at one distance.
 fn flat(arguments: &Arguments) -> Result<Vec<Scene>, Failure> {
-    let mut clips = Vec::new();
-    for path in &arguments.footage {
-        clips.extend(footage::clips(path)?);
-    }
-
-    if arguments.footage.is_empty() {
+    let clips = if arguments.footage.is_empty() {
         // Scans that are those of the reference benchmark are over its kind of pictures.
         let draw = if arguments.variety > 0.0 { varied } else { reference };
-        clips = draw(arguments.split, arguments.scenes)?;
-    }
+        draw(arguments.split, arguments.scenes)?
+    } else {
+        footage::clips(&arguments.footage)?
+    };
     Ok(clips.into_iter().map(Scene::Flat).collect())
 }

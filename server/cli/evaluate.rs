@@ -375,11 +375,7 @@ fn phantom(seed: u64, kept: Kept) -> Arc<RecordedScan> {
 }
 
 fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
-    let mut clips = Vec::new();
-    for path in &arguments.footage {
-        clips.extend(footage::clips(path)?);
-    }
-
+    let clips = footage::clips(&arguments.footage)?;
     let seed = arguments.seed();
     let count = arguments.count.unwrap_or(COUNT);
 

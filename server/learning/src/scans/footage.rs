@@ -1,8 +1,10 @@
 //! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures of at most 480
 //! lines.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use super::clip::{Area, Clip};
 use crate::LearningError;
@@ -15,12 +17,17 @@ const LINES: usize = 480;
 /// Most frames taken of one video: a minute at 25 a second.
 const FRAMES: usize = 1500;
 
-/// The clips in `path`: one for a video or an image, or one for each image in a folder. If a video is damaged or longer
-/// than 1500 frames, a note on standard error says what is left out.
+/// The clips in `paths`: one for a video or an image, or one for each image in a folder. If a video is damaged or
+/// longer than 1500 frames, a note on standard error says what is left out.
 ///
 /// # Errors
-/// If it cannot be read, holds no picture, or its pictures are too small.
-pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
+/// If one cannot be read, holds no picture, or its pictures are too small.
+pub fn clips(paths: &[PathBuf]) -> Result<Vec<Arc<Clip>>, LearningError> {
+    let clips = paths.par_iter().map(|path| clips_in(path)).collect::<Result<Vec<_>, _>>()?;
+    Ok(clips.concat())
+}
+
+fn clips_in(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
     if path.is_dir() {
         return footage::pictures_in(path)?.iter().map(|file| clip(file, vec![Arc::new(image(file)?)])).collect();
     }
@@ -138,11 +145,11 @@ mod tests {
     #[test]
     fn missing_and_empty_footage_is_reported() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(clips(&folder.path().join("no.mp4")).unwrap_err().to_string().contains("there is no such file"));
-        assert!(clips(folder.path()).unwrap_err().to_string().contains("there is no picture"));
+        assert!(clips_in(&folder.path().join("no.mp4")).unwrap_err().to_string().contains("there is no such file"));
+        assert!(clips_in(folder.path()).unwrap_err().to_string().contains("there is no picture"));
         let small = folder.path().join("small.png");
         image::GrayImage::new(40, 40).save(&small).unwrap();
-        assert!(clips(&small).unwrap_err().to_string().contains("at least 64x64"));
+        assert!(clips_in(&small).unwrap_err().to_string().contains("at least 64x64"));
     }
 
     #[test]
@@ -152,7 +159,7 @@ mod tests {
         // Blocks of 2x2 pixels: each becomes one pixel of the result.
         let gray = |x: u32, y: u32| u8::try_from((7 * (x / 2) + 31 * (y / 2)) % 256).unwrap();
         image::GrayImage::from_fn(1000, 960, |x, y| image::Luma([gray(x, y)])).save(&file).unwrap();
-        let clips = clips(&file).unwrap();
+        let clips = clips_in(&file).unwrap();
         let picture = clips[0].at(0);
         assert_eq!((picture.width, picture.height), (500, 480));
         let expected = (0..480).flat_map(|y| (0..500).map(move |x| f32::from(gray(2 * x, 2 * y))));
@@ -167,7 +174,7 @@ mod tests {
         let bands: Vec<u16> = (0..16).map(|band| 100 + 40 * band).collect();
         let sample = |x: u32, y: u32| image::Luma([bands[(4 * (y % 4) + x % 4) as usize]]);
         image::ImageBuffer::from_fn(2048, 1088, sample).save(&file).unwrap();
-        let clips = clips(&file).unwrap();
+        let clips = clips_in(&file).unwrap();
         let picture = clips[0].at(0);
         assert_eq!((picture.width, picture.height), (512, 272), "a pixel for each 4x4 samples");
         let (least, most) = picture.data.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
@@ -179,6 +186,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("is-a-png.jpg");
         image::GrayImage::new(70, 70).save_with_format(&file, image::ImageFormat::Png).unwrap();
-        assert_eq!(clips(&file).unwrap().len(), 1);
+        assert_eq!(clips_in(&file).unwrap().len(), 1);
     }
 }

@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::checkpoint::Checkpoint;
@@ -255,9 +254,7 @@ fn footage(paths: &[PathBuf]) -> Result<Option<Footage>, LearningError> {
         return Ok(None);
     }
 
-    let clips: Vec<Vec<Arc<Clip>>> = paths.par_iter().map(|path| footage::clips(path)).collect::<Result<_, _>>()?;
-    let clips = clips.concat();
-
+    let clips = footage::clips(paths)?;
     let mut hash = Sha256::new();
     for clip in &clips {
         clip.digest(&mut hash);
