@@ -160,3 +160,24 @@ fn samples_of_twelve_bit_in_files_of_sixteen_keep_their_levels() {
     assert!(!notes(&output).contains("bit"), "{}", notes(&output));
     assert_eq!(levels(&out).len(), 256);
 }
+
+#[test]
+fn a_colour_picture_of_the_sensors_size_keeps_its_levels_too() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    let out = folder.path().join("scan");
+    fs::create_dir_all(&pictures).unwrap();
+    for name in ["pose1_f0.png", "pose1_f1.png"] {
+        let level = |x: u32, y: u32| image::Rgb([(x + y) as u16; 3]);
+        image::ImageBuffer::from_fn(2048, 1088, level).save(pictures.join(name)).unwrap();
+    }
+
+    let told = notes(&parfocal(&["scan", "import", text(&pictures), "--out", text(&out)]));
+    assert!(told.contains("reach 3134, so they are read as 12 bit: 4095 is white"), "{told}");
+
+    let scan = ScanFolder::open(&out).unwrap();
+    let pose = &scan.poses()[&1];
+    let picture = scan.picture(pose, &pose.images[0]).unwrap();
+    // 255 * 3134 / 4095 is 195.2.
+    assert_eq!((picture.data[0] as u8, picture.data[2048 * 1088 - 1] as u8), (0, 195));
+}

@@ -6,10 +6,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::jpeg_read;
-use super::picture::{DecodeError, LARGEST_MEMORY, LARGEST_SIDE, Picture, Samples, check_size};
+use super::picture::{DecodeError, LARGEST_MEMORY, LARGEST_SIDE, Picture, SENSOR_SIZE, Samples, check_size};
 use super::tiff::Tiff;
 
 /// A PNG, JPEG or TIFF file.
@@ -120,13 +120,17 @@ impl<'a> PictureFile<'a> {
         Ok(picture)
     }
 
-    /// Whether the samples of the first picture fill 16 bit, so that nothing says how many bits they were taken with.
+    /// Whether the samples of the first picture fill 16 bit, and nothing says how many bits they were taken with. Of a
+    /// mosaic its calibration says it.
     pub fn is_wide(&self) -> bool {
         let wide = guarded(|| {
             Ok(match &self.contents {
                 Contents::Png(bytes) => {
-                    let colour = png(bytes)?.color_type();
-                    colour.bytes_per_pixel() == 2 * colour.channel_count()
+                    let png = png(bytes)?;
+                    let colour = png.color_type();
+                    let (width, height) = png.dimensions();
+                    let is_mosaic = colour == ColorType::L16 && (width as usize, height as usize) == SENSOR_SIZE;
+                    colour.bytes_per_pixel() == 2 * colour.channel_count() && !is_mosaic
                 }
                 Contents::Jpeg(_) => false,
                 Contents::Tiff(tiff) => tiff.is_wide(),

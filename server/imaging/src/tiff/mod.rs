@@ -10,7 +10,7 @@ use image::metadata::Orientation;
 use tiff_reader::{Ifd, OpenOptions, ParseBudgets, TagValue, TiffError, TiffFile};
 
 use super::jpeg_read;
-use super::picture::{DecodeError, LARGEST_MEMORY, Samples, check_size};
+use super::picture::{DecodeError, LARGEST_MEMORY, SENSOR_SIZE, Samples, check_size};
 use colours::{Colours, JPEG};
 
 /// Numbers of the fields that `tiff-reader` does not name.
@@ -96,10 +96,14 @@ impl Tiff {
         orientation.unwrap_or(Orientation::NoTransforms)
     }
 
-    /// Whether samples of the first page have 16 bit.
+    /// Whether samples of the first page have 16 bit and are no mosaic's.
     pub(super) fn is_wide(&self) -> bool {
-        let bits = self.page(0).ok().and_then(|page| page.bits_per_sample().ok());
-        bits.is_some_and(|bits| bits.first() == Some(&16))
+        let Ok(page) = self.page(0) else { return false };
+        let bits = page.bits_per_sample().unwrap_or_default();
+        let colours = Colours::of(page, usize::from(page.samples_per_pixel()));
+        let is_gray = matches!(colours, Ok(Colours::Gray | Colours::WhiteIsZero));
+        let is_mosaic = is_gray && (page.width() as usize, page.height() as usize) == SENSOR_SIZE;
+        bits.first() == Some(&16) && !is_mosaic
     }
 
     /// The samples of a page, before it is turned.

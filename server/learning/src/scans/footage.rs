@@ -7,10 +7,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::clip::{Area, Clip};
+use super::wide::WideSamples;
 use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{self, SQUARE_PIXELS, cut_off, ffmpeg, is_picture, read_picture};
-use parfocal_imaging::{ContentArea, GrayImage, Reconstructor, content_area, reduced};
+use parfocal_imaging::{ContentArea, DecodeError, GrayImage, PictureFile, Reconstructor, content_area, reduced};
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: usize = 480;
@@ -28,29 +29,37 @@ pub fn clips(paths: &[PathBuf]) -> Result<Vec<Arc<Clip>>, LearningError> {
 }
 
 fn clips_in(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
-    if path.is_dir() {
-        return footage::pictures_in(path)?.iter().map(|file| clip(file, vec![Arc::new(image(file)?)])).collect();
-    }
+    let files = if path.is_dir() {
+        footage::pictures_in(path)?
+    } else if is_picture(path) {
+        vec![path.to_owned()]
+    } else {
+        return Ok(vec![clip(path, video(path)?)?]);
+    };
 
-    let frames = if is_picture(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
-    Ok(vec![clip(path, frames)?])
+    let mut wide = WideSamples::default();
+    let mut images = files.iter().map(|file| image(file, &mut wide)).collect::<Result<Vec<_>, _>>()?;
+    wide.correct(path, images.iter_mut().map(|(image, is_wide)| (image, *is_wide)))?;
+    files.iter().zip(images).map(|(file, (image, _))| clip(file, vec![Arc::new(image)])).collect()
 }
 
 fn unreadable(path: &Path, reason: &str) -> LearningError {
     footage::FootageError::unreadable(path, reason).into()
 }
 
-fn image(path: &Path) -> Result<GrayImage, LearningError> {
+/// A picture, and whether it is one of those that `wide` has seen.
+fn image(path: &Path, wide: &mut WideSamples) -> Result<(GrayImage, bool), LearningError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
-    let picture = read_picture(path, &bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
-    let gray = picture.into_gray(&mut Reconstructor::default());
+    let unusable = |error: DecodeError| unreadable(path, &error.to_string());
+    let gray = read_picture(path, &bytes, false).map_err(unusable)?.into_gray(&mut Reconstructor::default());
+    let is_wide = PictureFile::open(&bytes).and_then(|file| wide.see(path, &file, 0)).map_err(unusable)?;
 
     if gray.height <= LINES {
-        return Ok(gray);
+        return Ok((gray, is_wide));
     }
 
     let width = gray.width * LINES / gray.height;
-    Ok(reduced(&gray, width, LINES))
+    Ok((reduced(&gray, width, LINES), is_wide))
 }
 
 fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, LearningError> {
@@ -164,6 +173,20 @@ mod tests {
         assert_eq!((picture.width, picture.height), (500, 480));
         let expected = (0..480).flat_map(|y| (0..500).map(move |x| f32::from(gray(2 * x, 2 * y))));
         assert!(picture.data.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-3));
+    }
+
+    #[test]
+    fn samples_of_twelve_bit_in_files_of_sixteen_keep_their_levels() {
+        let folder = tempfile::tempdir().unwrap();
+        let bright = image::ImageBuffer::from_pixel(64, 64, image::Luma([4095_u16]));
+        bright.save(folder.path().join("a.png")).unwrap();
+        let dark = image::ImageBuffer::from_pixel(64, 64, image::Luma([819_u16]));
+        dark.save(folder.path().join("b.png")).unwrap();
+        image::GrayImage::from_pixel(64, 64, image::Luma([100])).save(folder.path().join("c.png")).unwrap();
+
+        let clips = clips_in(folder.path()).unwrap();
+        let levels: Vec<u8> = clips.iter().map(|clip| clip.at(0).data[0].round() as u8).collect();
+        assert_eq!(levels, [255, 51, 100]);
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub mod scenery;
 pub mod simulated;
 pub mod stack;
 pub mod variety;
+mod wide;
 
 use parfocal_base::FocalPower;
 use parfocal_imaging::{Patch, View};

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{PosePictures, header, shot};
 use crate::LearningError;
 use crate::scans::mosaics::RawMosaics;
+use crate::scans::wide::WideSamples;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
@@ -114,12 +115,21 @@ impl Imported {
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), LearningError> {
     let header = header(camera.to_owned(), 0, imported.count(), imported.powers());
 
-    let mosaics = RawMosaics::new(imported.raw);
-    let mut reader =
-        Reader { reconstructor: Reconstructor::default(), mosaics, first: None, largest: None, scale: 1.0 };
+    let mut reader = Reader {
+        reconstructor: Reconstructor::default(),
+        mosaics: RawMosaics::new(imported.raw),
+        first: None,
+        wide: WideSamples::default(),
+        scale: 1.0,
+    };
+
     // Checks all sizes before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
-    reader.set_scale(imported.bits)?;
+    let (scale, note) = reader.wide.scale(imported.bits)?;
+    reader.scale = scale;
+    if let Some(note) = note {
+        tell(format_args!("note: {note}; --bits says otherwise"));
+    }
 
     let mut recording = ScanRecording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
@@ -169,9 +179,8 @@ struct Reader {
     reconstructor: Reconstructor,
     mosaics: RawMosaics,
     first: Option<(PathBuf, (usize, usize))>,
-    /// The largest sample of all 16-bit pictures, and the file that holds it.
-    largest: Option<(u16, PathBuf)>,
-    /// Factor for gray levels of 16-bit pictures, whose white is 65535 until the bits of their samples are known.
+    wide: WideSamples,
+    /// Factor for the gray levels of wide pictures.
     scale: f32,
 }
 
@@ -189,36 +198,10 @@ impl Reader {
         let size = size.map_err(unusable(path))?;
         self.check(path, size)?;
 
-        // A mosaic's counts have the scale of its calibration.
-        if size != SENSOR_SIZE && PictureFile::open(&head).map_err(unusable(path))?.is_wide() {
+        if PictureFile::open(&head).map_err(unusable(path))?.is_wide() {
             let bytes = std::fs::read(path).map_err(unreadable(path))?;
-            let sample = PictureFile::open(&bytes).and_then(|file| file.largest_sample(0)).map_err(unusable(path))?;
-            if self.largest.as_ref().is_none_or(|(largest, _)| sample > *largest) {
-                self.largest = Some((sample, path.to_owned()));
-            }
-        }
-        Ok(())
-    }
-
-    /// Sets what is white in 16-bit pictures, one for the whole scan.
-    fn set_scale(&mut self, given: Option<u8>) -> Result<(), LearningError> {
-        let Some((largest, path)) = self.largest.clone() else { return Ok(()) };
-        let needed = (16 - largest.leading_zeros() as u8).max(8);
-        let bits = given.unwrap_or(needed);
-        if bits < needed {
-            let holds = format!("{} holds a sample of {largest}", path.display());
-            return Err(LearningError::new(format!(
-                "{holds}, which is more than {bits} bit; give --bits {needed} or more"
-            )));
-        }
-
-        let white = u16::MAX >> (16 - bits.min(16));
-        self.scale = f32::from(u16::MAX) / f32::from(white);
-        if given.is_none() && bits < 16 {
-            tell(format_args!(
-                "note: the samples of the 16-bit pictures reach {largest}, so they are read as {bits} bit: {white} is \
-                 white; --bits says otherwise"
-            ));
+            let seen = PictureFile::open(&bytes).and_then(|file| self.wide.see(path, &file, 0));
+            seen.map_err(unusable(path))?;
         }
         Ok(())
     }
@@ -245,14 +228,9 @@ impl Reader {
             return Ok(Picture::Mosaic(frame).into_gray(&mut self.reconstructor));
         }
 
-        let opened = PictureFile::open(&bytes).and_then(PictureFile::single);
-        let wide = opened.as_ref().is_ok_and(PictureFile::is_wide);
-        let picture = opened.and_then(|file| file.read(0, false)).map_err(unusable(path))?;
-
-        // A mosaic's counts have the scale of its calibration.
-        let scaled = wide && !matches!(picture, Picture::Mosaic(_));
-        let mut gray = picture.into_gray(&mut self.reconstructor);
-        if scaled {
+        let file = PictureFile::open(&bytes).and_then(PictureFile::single).map_err(unusable(path))?;
+        let mut gray = file.read(0, false).map_err(unusable(path))?.into_gray(&mut self.reconstructor);
+        if file.is_wide() {
             gray.data.iter_mut().for_each(|level| *level *= self.scale);
         }
         Ok(gray)

@@ -11,10 +11,11 @@ pub mod source;
 use std::path::{Path, PathBuf};
 
 use super::mosaics::{RawMosaics, mosaics_in};
+use super::wide::WideSamples;
 use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_raw, pictures_in};
-use parfocal_imaging::{GrayImage, Picture, PixelFormat, Reconstructor, decode, in_blocks};
+use parfocal_imaging::{GrayImage, Picture, PictureFile, PixelFormat, Reconstructor, in_blocks};
 
 pub use plane::{LEAST_PLANES, Plane};
 use positions::{file_name, listed, named};
@@ -73,7 +74,8 @@ impl FocalStack {
     /// Reads the pictures in `folder`, made smaller by blocks of `scale` x `scale` pixels. Positions are
     /// those of `list` (lines of `name,position`), else the one number in which the names differ, else
     /// the natural order of names. `folder` may also be a TIFF with a page for each position, which `list` counts
-    /// from 1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of their length.
+    /// from 1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of their length. Samples in
+    /// files of 16 bit are numbers of the fewest bits that hold the largest of all.
     ///
     /// # Errors
     /// If a picture or the list cannot be read, or the pictures are not a stack.
@@ -87,8 +89,11 @@ impl FocalStack {
             let folder = folder.display();
             bail!("{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}");
         }
+
+        let mut wide = WideSamples::default();
         if folder.is_file() {
-            return Self::new(pages::planes(folder, list, scale)?);
+            let planes = pages::planes(folder, list, scale, &mut wide)?;
+            return Self::corrected(planes, &wide, folder);
         }
 
         let files = pictures_or_mosaics_in(folder, raw.is_some())?;
@@ -101,13 +106,26 @@ impl FocalStack {
         let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|error| LearningError::unreadable(&path, &error))?;
-            let picture =
-                if is_raw(&path) { mosaics.read(&path, &bytes).map(Picture::Mosaic) } else { decode(&bytes, false) };
-            let gray = picture.map_err(|error| LearningError::of(&path, error))?.into_gray(&mut reconstructor);
-            Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
+            let unusable = |error| LearningError::of(&path, error);
+            let (picture, is_wide) = if is_raw(&path) {
+                (Picture::Mosaic(mosaics.read(&path, &bytes).map_err(unusable)?), false)
+            } else {
+                let file = PictureFile::open(&bytes).and_then(PictureFile::single).map_err(unusable)?;
+                (file.read(0, false).map_err(unusable)?, wide.see(&path, &file, 0).map_err(unusable)?)
+            };
+
+            let picture = in_blocks(&picture.into_gray(&mut reconstructor), scale);
+            Ok((Plane { name: file_name(&path), position, picture }, is_wide))
         };
 
-        Self::new(placed.into_iter().map(read).collect::<Result<_, LearningError>>()?)
+        let planes = placed.into_iter().map(read).collect::<Result<Vec<_>, LearningError>>()?;
+        Self::corrected(planes, &wide, folder)
+    }
+
+    /// A stack of pictures of `folder`, each with whether it is one of those that `wide` has seen.
+    fn corrected(mut planes: Vec<(Plane, bool)>, wide: &WideSamples, folder: &Path) -> Result<Self, LearningError> {
+        wide.correct(folder, planes.iter_mut().map(|(plane, is_wide)| (&mut plane.picture, *is_wide)))?;
+        Self::new(planes.into_iter().map(|(plane, _)| plane).collect())
     }
 
     /// The pictures, in rising position.
@@ -288,6 +306,22 @@ mod tests {
         let (even, _) = at(&[0.0, 1.3, 2.1, 3.0, 4.4, 5.0, 6.2]).unwrap();
         assert!(even.planes.iter().all(|plane| (plane.picture.data[0] - 10.0 * plane.position as f32).abs() < 1e-3));
         assert!(at(&[0.0, 1.0, 2.0, 3.0, 7.5, 8.5, 9.25]).is_err(), "nobody knows what lies between 3 and 7.5");
+    }
+
+    #[test]
+    fn samples_of_twelve_bit_in_files_of_sixteen_keep_their_levels() {
+        let folder = tempfile::tempdir().unwrap();
+        let levels = || (0..64 * 64).map(|index| (index % 4096) as u16).collect::<Vec<_>>();
+        for number in 0..5 {
+            let file = folder.path().join(format!("{number}.png"));
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(64, 64, levels()).unwrap().save(file).unwrap();
+        }
+
+        let expected: Vec<f32> = levels().into_iter().map(|sample| 255.0 * f32::from(sample) / 4095.0).collect();
+        for plane in FocalStack::load(folder.path(), None, 1, None).unwrap().planes() {
+            let mut pairs = plane.picture.data.iter().zip(&expected);
+            assert!(pairs.all(|(found, expected)| (found - expected).abs() < 1e-2), "{}", plane.name);
+        }
     }
 
     #[test]

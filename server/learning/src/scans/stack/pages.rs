@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::LearningError;
+use crate::scans::wide::WideSamples;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{PictureFile, Reconstructor, in_blocks};
 
@@ -20,14 +21,21 @@ struct Depth {
     source: String,
 }
 
-/// Reads the pages of the file at `path`, made smaller by blocks of `scale` x `scale` pixels. Positions are those of
-/// `list` (lines of `page,position`, pages counted from 1), else what the file says, else the order of the pages.
+/// Reads the pages of the file at `path`, made smaller by blocks of `scale` x `scale` pixels, each with whether its
+/// samples are `wide`. Positions are those of `list` (lines of `page,position`, pages counted from 1), else what the
+/// file says, else the order of the pages.
 ///
 /// # Errors
 /// If a page or the list cannot be read, or the pages vary in more than focus.
-pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, LearningError> {
+pub(super) fn planes(
+    path: &Path,
+    list: Option<&Path>,
+    scale: usize,
+    wide: &mut WideSamples,
+) -> Result<Vec<(Plane, bool)>, LearningError> {
+    let unusable = |error| LearningError::of(path, error);
     let bytes = std::fs::read(path).map_err(|error| LearningError::unreadable(path, &error))?;
-    let file = PictureFile::open(&bytes).map_err(|error| LearningError::of(path, error))?;
+    let file = PictureFile::open(&bytes).map_err(unusable)?;
 
     let depth = match list {
         Some(list) => of_list(list, file.pages())?,
@@ -41,10 +49,10 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
     let placed = depth.pages.iter().zip(&depth.positions);
     placed
         .map(|(&page, &position)| {
-            let picture = file.read(page, false).map_err(|error| LearningError::of(path, error))?;
-            let gray = picture.into_gray(&mut reconstructor);
+            let gray = file.read(page, false).map_err(unusable)?.into_gray(&mut reconstructor);
+            let is_wide = wide.see(path, &file, page).map_err(unusable)?;
             let name = format!("page {} of {name}", page + 1);
-            Ok(Plane { name, position, picture: in_blocks(&gray, scale) })
+            Ok((Plane { name, position, picture: in_blocks(&gray, scale) }, is_wide))
         })
         .collect()
 }
