@@ -7,7 +7,7 @@ use std::path::Path;
 
 use parfocal_autofocus::weights;
 use parfocal_base::FocalPower;
-use parfocal_devices::camera::recorded::{FORMAT, Header, PictureOrder, ScanFolder, ScanRecording, TakenPose, VERSION};
+use parfocal_devices::camera::recorded::{Header, PictureOrder, ScanFolder, ScanRecording, TakenPose};
 use parfocal_imaging::{GrayImage, PatchArea};
 use parfocal_learning::evaluation::shard::{Shard, merge};
 use parfocal_learning::scans::recorded::{Kept, RecordedScan, evenly_spread};
@@ -148,19 +148,7 @@ fn picture(focal_power: FocalPower) -> GrayImage {
 /// A scan of one pose.
 fn make_scan(folder: &Path) {
     let focal_powers = evenly_spread(PICTURES);
-    let header = Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        software: "a test".to_owned(),
-        camera: "a test's".to_owned(),
-        lens: None,
-        simulated: true,
-        calibration: None,
-        seed: 1,
-        order: PictureOrder::Random,
-        poses: 1,
-        focal_powers: focal_powers.clone(),
-    };
+    let header = Header { order: PictureOrder::Random, ..Header::new("a test's", 1, 1, focal_powers.clone()) };
 
     let mut recording = ScanRecording::open(folder, &header).unwrap();
     let images = focal_powers.iter().map(|&power| (power, picture(power))).collect();

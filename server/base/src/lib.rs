@@ -32,6 +32,9 @@ pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
 pub use patch_place::PatchPlace;
 pub use policy_name::PolicyName;
 
+/// The program and its version, as files and pages name what made them.
+pub const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
+
 /// Returns the error that a sentence says. The sentence is formatted as by `format!`.
 #[macro_export]
 macro_rules! bail {

@@ -10,8 +10,8 @@ use crate::cli::input::{frame_rate, frame_rate_help};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, print};
 use parfocal_autofocus::Registry;
-use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::{PolicyName, SOFTWARE};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
 use parfocal_imaging::{Calibration, Reconstructor};
@@ -103,7 +103,7 @@ fn start(arguments: &Arguments) -> Result<(ControlLoop, ControlHandle, Recorder)
     let header = Header {
         format: FORMAT.to_owned(),
         version: VERSION,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
+        software: SOFTWARE.to_owned(),
         started: clock.wall(),
         camera: camera.health().name.to_string(),
         lens: lens.health().name.to_string(),

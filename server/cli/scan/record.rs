@@ -14,7 +14,7 @@ use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, bar_of_poses, poses, print};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::recorded::{FORMAT, Header, MOST_POSES, PictureOrder, ScanRecording, VERSION};
+use parfocal_devices::camera::recorded::{Header, MOST_POSES, PictureOrder, ScanRecording};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
 use parfocal_devices::simulation::phantom::Trajectory;
@@ -137,19 +137,9 @@ fn devices(
 }
 
 fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: bool) -> Header {
-    Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
-        camera: camera.to_owned(),
-        lens,
-        simulated,
-        calibration: None,
-        seed: arguments.seed,
-        order: PictureOrder::Random,
-        poses: arguments.poses,
-        focal_powers: evenly_spread(arguments.focal_powers),
-    }
+    let powers = evenly_spread(arguments.focal_powers);
+    let header = Header::new(camera, arguments.seed, arguments.poses, powers);
+    Header { lens, simulated, order: PictureOrder::Random, ..header }
 }
 
 /// Asks on the terminal for each pose and waits for Enter.

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
 /// Name and version.
-pub(super) const PROGRAM: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
+pub(super) const PROGRAM: &str = parfocal_base::SOFTWARE;
 
 /// The server's time zone, in which the researcher's pages give all times, such as `Europe/London`.
 pub(super) fn zone() -> String {

@@ -13,12 +13,11 @@ use super::{Outcome, ScanSet, compare};
 use crate::LearningError;
 use crate::scans::FocalTimeScan;
 use crate::scans::detail::warning;
+use parfocal_base::SOFTWARE;
 
 const FORMAT: &str = "parfocal-evaluation-shard";
 /// Most stretches into which a path is cut.
 const MOST_STRETCHES: usize = 1000;
-
-const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
 
 /// One of several parts of a set of scans: with n parts, every n-th scan. So every part has scans of all kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::parts::RecorderParts;
 use super::running::Running;
 use super::view::ViewRecorder;
+use parfocal_base::SOFTWARE;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
 use parfocal_devices::camera::calibration;
@@ -13,9 +14,6 @@ use parfocal_recording::{
     ViewWriter, Writer, room,
 };
 use parfocal_trial::protocol::Record;
-
-/// The program and its version.
-const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
 
 /// Why a recording was not started.
 #[derive(Debug, thiserror::Error)]

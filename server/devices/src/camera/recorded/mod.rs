@@ -14,7 +14,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use parfocal_base::FocalPower;
+use parfocal_base::{FocalPower, SOFTWARE};
 use parfocal_imaging::{PATCH_SIDE, PatchArea};
 
 /// Name of the file that says what was to be recorded.
@@ -56,6 +56,25 @@ pub struct Header {
     pub poses: usize,
     /// The focal powers of each pose, in rising order.
     pub focal_powers: Vec<FocalPower>,
+}
+
+impl Header {
+    /// The plan of a scan of pictures that were taken before, in an order that nobody knows, by `camera`.
+    pub fn new(camera: &str, seed: u64, poses: usize, focal_powers: Vec<FocalPower>) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            software: SOFTWARE.to_owned(),
+            camera: camera.to_owned(),
+            lens: None,
+            simulated: false,
+            calibration: None,
+            seed,
+            order: PictureOrder::Unknown,
+            poses,
+            focal_powers,
+        }
+    }
 }
 
 /// In which order each pose's focal powers were taken.
@@ -193,19 +212,7 @@ mod tests {
     fn a_picture_of_the_sensors_size_is_read_back_as_it_was_stored() {
         let folder = tempfile::tempdir().unwrap();
         let focal_powers = vec![FocalPower::MIN, FocalPower::MAX];
-        let header = Header {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            software: "a test".to_owned(),
-            camera: "a colour camera".to_owned(),
-            lens: None,
-            simulated: true,
-            calibration: None,
-            seed: 1,
-            order: PictureOrder::Unknown,
-            poses: 1,
-            focal_powers: focal_powers.clone(),
-        };
+        let header = Header::new("a colour camera", 1, 1, focal_powers.clone());
 
         let (width, height) = SENSOR_SIZE;
         let picture = |level: f32| GrayImage { width, height, data: vec![level; width * height] };

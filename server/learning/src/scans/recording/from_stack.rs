@@ -6,13 +6,13 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{PosePictures, header, shot};
+use super::{PosePictures, shot};
 use crate::LearningError;
 use crate::scans::recorded::{evenly_spread, patch_at};
 use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use crate::scans::stack::{FocalStack, cropped};
 use parfocal_autofocus::mgm;
-use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanRecording};
+use parfocal_devices::camera::recorded::{Header, LEAST_SIDE, ScanRecording};
 use parfocal_devices::simulation::gaussian::smoothed;
 use parfocal_devices::simulation::walk::Walk;
 use parfocal_imaging::{PATCH_SIDE, PatchArea};
@@ -101,7 +101,7 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
 
     let camera =
         format!("focal stack {}, windows of {2}x{2} pixels over {1} planes", cut.name, stack.planes().len(), cut.size);
-    let header = header(camera, cut.seed, cut.poses, powers.clone());
+    let header = Header::new(&camera, cut.seed, cut.poses, powers.clone());
 
     let patch = middle(cut.size);
     let mut recording = ScanRecording::open(out, &header)?;

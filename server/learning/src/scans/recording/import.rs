@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{PosePictures, header, shot};
+use super::{PosePictures, shot};
 use crate::LearningError;
 use crate::scans::mosaics::RawMosaics;
 use crate::scans::wide::WideSamples;
@@ -13,7 +13,7 @@ use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
 use parfocal_devices::camera::recorded::{
-    LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording, poses as numbered,
+    Header, LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording, poses as numbered,
 };
 use parfocal_imaging::{
     DecodeError, GrayImage, PatchArea, Picture, PictureFile, PixelFormat, Reconstructor, SENSOR_SIZE, content_area,
@@ -113,7 +113,7 @@ impl Imported {
 /// # Errors
 /// If a picture cannot be used, `out` holds another scan, or it cannot be written.
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), LearningError> {
-    let header = header(camera.to_owned(), 0, imported.count(), imported.powers());
+    let header = Header::new(camera, 0, imported.count(), imported.powers());
 
     let mut reader = Reader {
         reconstructor: Reconstructor::default(),

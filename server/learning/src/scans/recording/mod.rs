@@ -13,9 +13,7 @@ pub use phantom::PhantomPoses;
 use super::recorded::{capture_order, patch_at, sharpest};
 use parfocal_base::FocalPower;
 use parfocal_devices::camera::CameraError;
-use parfocal_devices::camera::recorded::{
-    FORMAT, Header, LEAST_SIDE, PictureOrder, ScanError, ScanRecording, TakenPose, VERSION,
-};
+use parfocal_devices::camera::recorded::{LEAST_SIDE, ScanError, ScanRecording, TakenPose};
 use parfocal_devices::lens::LensError;
 use parfocal_imaging::{GrayImage, PatchArea};
 
@@ -96,23 +94,6 @@ pub fn record(
         progress();
     }
     Ok(())
-}
-
-/// The header of a scan of pictures that were taken before, in an order that nobody knows.
-fn header(camera: String, seed: u64, poses: usize, focal_powers: Vec<FocalPower>) -> Header {
-    Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
-        camera,
-        lens: None,
-        simulated: false,
-        calibration: None,
-        seed,
-        order: PictureOrder::Unknown,
-        poses,
-        focal_powers,
-    }
 }
 
 /// A pose as it is stored. Its optimum is searched in the stack, as the evaluation does.

@@ -18,6 +18,7 @@ use std::io::{self, Read, Write};
 use serde::Serialize;
 
 use super::fleet::{Action, Begin, Fleet};
+use parfocal_base::SOFTWARE;
 use parfocal_imaging::PATCH_SIDE;
 
 /// What the environments say first.
@@ -58,7 +59,7 @@ pub fn serve(fleet: &mut Fleet, mut requests: impl Read, mut answers: impl Write
     let greeting = Greeting {
         protocol: "parfocal-environment",
         version: 1,
-        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")),
+        software: SOFTWARE,
         environments: fleet.count(),
         patches: fleet.shows().patches(),
         side: PATCH_SIDE,
