@@ -11,7 +11,7 @@ use std::time::Duration;
 use parfocal_records::accounts::{AccountError, Cost, Passphrase, Token};
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
-use parfocal_records::store::{Access, AccessLog, verify_database};
+use parfocal_records::store::{Access, AccessLog, AccountBook, verify_database};
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole, Actor};
 use parfocal_trial::action::Action;
 use parfocal_trial::role::Role;
@@ -168,6 +168,33 @@ async fn whatever_is_wrong_has_the_same_words_and_is_recorded_without_them() {
             assert!(!bytes.windows(secret.len()).any(|window| window == secret.as_bytes()), "{secret}");
         }
     }
+}
+
+#[tokio::test]
+async fn a_passphrase_that_is_replaced_or_disabled_while_it_is_checked_signs_nobody_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let accounts = trial.accounts();
+    trial.account("lead", AccountRole::Lead, "Dr Lead").await;
+    let operator = trial.account("operator", AccountRole::Operator, "Nurse Op").await.account;
+
+    let book = AccountBook::of_server(&trial.store, trial.clock.clone());
+    let reader = trial.store.reader();
+    let checked = reader.account(&operator).await.unwrap().unwrap();
+    let another = Passphrase::new("another one of hers").unwrap();
+    accounts.replace_passphrase(&operator, another, Some(&name("lead"))).await.unwrap();
+    assert!(!book.sign_in(&checked, None, "token").await.unwrap());
+    assert!(!book.sign_in(&checked, Some(&checked.hash), "token").await.unwrap());
+    assert!(reader.account(&operator).await.unwrap().unwrap() != checked, "the lead's passphrase stays");
+
+    let checked = reader.account(&operator).await.unwrap().unwrap();
+    accounts.change(&operator, &AccountChange::Disable, None).await.unwrap();
+    assert!(!book.sign_in(&checked, None, "token").await.unwrap());
+    assert_eq!(reader.sign_in("token").await.unwrap(), None);
+
+    accounts.change(&operator, &AccountChange::Enable, None).await.unwrap();
+    assert!(book.sign_in(&checked, None, "token").await.unwrap());
+    assert_eq!(reader.sign_in("token").await.unwrap().unwrap().account.account, operator);
 }
 
 #[tokio::test]

@@ -18,8 +18,7 @@ pub use throttle::Peer;
 pub use token::Token;
 
 use crate::store::{
-    AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, Reader, Store, StoreError, StoredAccount,
-    StoredSignIn,
+    AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, Reader, Store, StoreError, StoredSignIn,
 };
 use parfocal_base::clock::Clock;
 use parfocal_trial::account::{
@@ -167,41 +166,35 @@ impl Accounts {
         };
         let fits = self.fits(passphrase, found.as_ref().map(|found| &found.hash)).await?;
 
-        match found {
-            Some(StoredAccount { account, set_by_another, .. }) if fits && !account.disabled => {
-                self.throttle().succeeded(name);
-                match chosen {
-                    Some(chosen) => self.choose_passphrase(&account.account, passphrase, chosen).await?,
-                    None if set_by_another => return Err(AccountError::ChooseAnother),
-                    None => {}
-                }
+        if let Some(found) = found.as_ref().filter(|found| fits && !found.account.disabled) {
+            self.throttle().succeeded(name);
+            let chosen = match chosen {
+                Some(chosen) => Some(self.hash_of_another(chosen, passphrase).await?),
+                None if found.set_by_another => return Err(AccountError::ChooseAnother),
+                None => None,
+            };
 
-                let token = Token::random()?;
-                self.book.sign_in(&account.account, &token.sha256()).await?;
-                Ok((account, token))
-            }
-            found => {
-                let account = found.map(|found| found.account);
-                let attempt = if fits { FailedAttempt::Disabled } else { FailedAttempt::SignIn };
-                self.failed(name, account.as_ref(), attempt, peer).await?;
-                Err(AccountError::WrongPassphrase)
+            let token = Token::random()?;
+            // Hashing takes a while, and a lead may have disabled the account or replaced the passphrase meanwhile.
+            if self.book.sign_in(found, chosen.as_ref(), &token.sha256()).await? {
+                return Ok((found.account.clone(), token));
             }
         }
+
+        let account = found.map(|found| found.account);
+        let is_disabled = account.as_ref().is_some_and(|account| account.disabled);
+        let attempt = if fits && is_disabled { FailedAttempt::Disabled } else { FailedAttempt::SignIn };
+        self.failed(name, account.as_ref(), attempt, peer).await?;
+        Err(AccountError::WrongPassphrase)
     }
 
-    /// Replaces the passphrase `before` by `chosen` for the person who is signing in.
-    async fn choose_passphrase(
-        &self,
-        name: &AccountName,
-        before: &str,
-        chosen: Passphrase,
-    ) -> Result<(), AccountError> {
+    /// The hash of the passphrase `chosen`, which must not be the one `before`.
+    async fn hash_of_another(&self, chosen: Passphrase, before: &str) -> Result<PassphraseHash, AccountError> {
         if chosen.is(before) {
             let text = "the new passphrase is the same as the old one; choose another".to_owned();
             return Err(AccountError::Refused(Refusal::Invalid(text)));
         }
-        let hash = self.hash(chosen).await?;
-        Ok(self.book.replace_passphrase(name, &hash, Some(name)).await?)
+        self.hash(chosen).await
     }
 
     /// Checks the passphrase of a signed-in person again, before an action that cannot be undone.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use sqlx::sqlite::SqliteConnection;
 
-use super::reading::all_accounts;
-use super::{AccountEvent, ChangedBy, PassphraseHash};
+use super::reading::{all_accounts, stored_account};
+use super::{AccountEvent, ChangedBy, PassphraseHash, StoredAccount};
 use crate::store::insert::Insert;
 use crate::store::schema::DATABASE;
 use crate::store::values::nanoseconds;
@@ -122,36 +122,49 @@ impl AccountBook {
         hash: &PassphraseHash,
         by: ChangedBy<'_>,
     ) -> Result<(), StoreError> {
-        self.write(Some(account), &AccountEvent::PassphraseReplaced, by, async |connection, _| {
-            sqlx::query("UPDATE accounts SET memory_kib = ?, passes = ?, salt = ?, hash = ? WHERE account = ?")
-                .bind(hash.memory_kib)
-                .bind(hash.passes)
-                .bind(hex::encode(&hash.salt))
-                .bind(hex::encode(&hash.hash))
-                .bind(account.as_str())
-                .execute(&mut *connection)
-                .await?;
-            end_sign_ins(connection, account.as_str()).await
-        })
-        .await
+        self.writer.write(async |connection| self.append_passphrase(connection, account, hash, by).await).await
     }
 
-    /// Records that a browser signed in to `account`. `token_sha256` is the SHA-256 of its token.
+    /// Records that a browser signed in to the account `checked`, after replacing its passphrase by `chosen` if one is
+    /// given. `token_sha256` is the SHA-256 of the browser's token. Returns whether it did: if the account was disabled
+    /// or its passphrase replaced since `checked` was read, nothing is written.
     ///
     /// # Errors
     /// If the disk or database fails.
-    pub async fn sign_in(&self, account: &AccountName, token_sha256: &str) -> Result<(), StoreError> {
-        self.write(Some(account), &AccountEvent::SignedIn, Some(account), async |connection, wall| {
-            Insert::into("sign_ins")
-                .set("token_sha256", token_sha256)
-                .set("account", account.as_str())
-                .set("began", wall)
-                .set("used", wall)
-                .execute(connection)
+    pub async fn sign_in(
+        &self,
+        checked: &StoredAccount,
+        chosen: Option<&PassphraseHash>,
+        token_sha256: &str,
+    ) -> Result<bool, StoreError> {
+        let name = &checked.account.account;
+        let by = Some(name);
+
+        self.writer
+            .write(async |connection| {
+                let now = stored_account(&mut *connection, name).await?;
+                if now.is_none_or(|now| now.account.disabled || now.hash != checked.hash) {
+                    return Ok(false);
+                }
+
+                if let Some(chosen) = chosen {
+                    self.append_passphrase(connection, name, chosen, by).await?;
+                }
+                let event = AccountEvent::SignedIn;
+                self.append(connection, by, &event, by, async |connection, wall| {
+                    Insert::into("sign_ins")
+                        .set("token_sha256", token_sha256)
+                        .set("account", name.as_str())
+                        .set("began", wall)
+                        .set("used", wall)
+                        .execute(connection)
+                        .await?;
+                    Ok(())
+                })
                 .await?;
-            Ok(())
-        })
-        .await
+                Ok(true)
+            })
+            .await
     }
 
     /// Ends the sign-in of `account` whose token has this SHA-256.
@@ -219,6 +232,28 @@ impl AccountBook {
             self.append(connection, Some(account), event, by, apply).await.map(Ok)
         });
         checked.await?
+    }
+
+    /// Replaces the passphrase of `account`, ends its sign-ins, and records that.
+    async fn append_passphrase(
+        &self,
+        connection: &mut SqliteConnection,
+        account: &AccountName,
+        hash: &PassphraseHash,
+        by: ChangedBy<'_>,
+    ) -> Result<(), StoreError> {
+        self.append(connection, Some(account), &AccountEvent::PassphraseReplaced, by, async |connection, _| {
+            sqlx::query("UPDATE accounts SET memory_kib = ?, passes = ?, salt = ?, hash = ? WHERE account = ?")
+                .bind(hash.memory_kib)
+                .bind(hash.passes)
+                .bind(hex::encode(&hash.salt))
+                .bind(hex::encode(&hash.hash))
+                .bind(account.as_str())
+                .execute(&mut *connection)
+                .await?;
+            end_sign_ins(connection, account.as_str()).await
+        })
+        .await
     }
 
     async fn append(

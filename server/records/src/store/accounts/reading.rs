@@ -64,20 +64,7 @@ impl Reader {
     /// # Errors
     /// If the database fails or holds data that this version cannot read.
     pub async fn account(&self, name: &AccountName) -> Result<Option<StoredAccount>, StoreError> {
-        let row = sqlx::query(AssertSqlSafe(format!("{ACCOUNT} WHERE account = ?"))).bind(name.as_str());
-        let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
-
-        let bytes = |column: &str| -> Result<Vec<u8>, StoreError> {
-            let text: String = row.try_get(column)?;
-            hex::decode(text).map_err(|_| StoreError::Damaged(format!("the passphrase's {column} of account {name}")))
-        };
-        let hash = PassphraseHash {
-            memory_kib: row.try_get("memory_kib")?,
-            passes: row.try_get("passes")?,
-            salt: bytes("salt")?,
-            hash: bytes("hash")?,
-        };
-        Ok(Some(StoredAccount { account: account(&row)?, hash, set_by_another: set_by_another(&row)? }))
+        stored_account(self.pool(), name).await
     }
 
     /// The sign-in whose token has this SHA-256; `None` if there is none or it was ended. Does not check whether it has
@@ -102,6 +89,27 @@ impl Reader {
 pub(super) async fn all_accounts(database: impl SqliteExecutor<'_>) -> Result<Vec<Account>, StoreError> {
     let rows = sqlx::query("SELECT * FROM accounts ORDER BY account").fetch_all(database).await?;
     rows.iter().map(account).collect()
+}
+
+/// The account of this name, with the hash of its passphrase; `None` if there is none.
+pub(super) async fn stored_account(
+    database: impl SqliteExecutor<'_>,
+    name: &AccountName,
+) -> Result<Option<StoredAccount>, StoreError> {
+    let row = sqlx::query(AssertSqlSafe(format!("{ACCOUNT} WHERE account = ?"))).bind(name.as_str());
+    let Some(row) = row.fetch_optional(database).await? else { return Ok(None) };
+
+    let bytes = |column: &str| -> Result<Vec<u8>, StoreError> {
+        let text: String = row.try_get(column)?;
+        hex::decode(text).map_err(|_| StoreError::Damaged(format!("the passphrase's {column} of account {name}")))
+    };
+    let hash = PassphraseHash {
+        memory_kib: row.try_get("memory_kib")?,
+        passes: row.try_get("passes")?,
+        salt: bytes("salt")?,
+        hash: bytes("hash")?,
+    };
+    Ok(Some(StoredAccount { account: account(&row)?, hash, set_by_another: set_by_another(&row)? }))
 }
 
 fn set_by_another(row: &SqliteRow) -> Result<bool, StoreError> {
