@@ -126,6 +126,26 @@ async fn a_sign_in_lasts_until_it_is_ended_or_expires() {
 }
 
 #[tokio::test]
+async fn who_goes_on_working_stays_signed_in_though_the_disk_takes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let accounts = trial.accounts();
+    let operator = trial.account("operator", AccountRole::Operator, "Nurse Op").await;
+    let token = accounts.sign_in("operator", PASSPHRASE, None, PEER).await.unwrap().1;
+
+    // Nothing can be written while another program holds the right to write.
+    let pool = crate::storage::raw(folder.path()).await;
+    let mut other = pool.acquire().await.unwrap();
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut *other).await.unwrap();
+    for _ in 0..3 {
+        trial.clock.advance(Duration::from_mins(50));
+        assert_eq!(accounts.signed_in(&token).await.unwrap(), Some(operator.clone()));
+    }
+    trial.clock.advance(Duration::from_mins(61));
+    assert_eq!(accounts.signed_in(&token).await.unwrap(), None, "unused");
+}
+
+#[tokio::test]
 async fn whatever_is_wrong_has_the_same_words_and_is_recorded_without_them() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;

@@ -6,10 +6,12 @@ mod passphrase;
 mod throttle;
 mod token;
 
+use std::collections::HashMap;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use jiff::Timestamp;
 use tokio::sync::Semaphore;
 
 pub use error::AccountError;
@@ -37,6 +39,8 @@ pub struct Accounts {
     clock: Arc<dyn Clock>,
     cost: Cost,
     throttle: Arc<Mutex<Throttle>>,
+    /// Uses of sign-ins that are not on the disk yet, by the SHA-256 of the token.
+    unsaved_uses: Arc<Mutex<HashMap<String, Timestamp>>>,
     /// Only one passphrase is hashed at a time, because each takes 19 MiB and a core.
     hashing: Arc<Semaphore>,
 }
@@ -57,7 +61,7 @@ impl Accounts {
 
     fn new(book: AccountBook, clock: Arc<dyn Clock>, cost: Cost) -> Self {
         let hashing = Arc::new(Semaphore::new(1));
-        Self { book, clock, cost, throttle: Arc::default(), hashing }
+        Self { book, clock, cost, throttle: Arc::default(), unsaved_uses: Arc::default(), hashing }
     }
 
     /// The reader of the accounts' database.
@@ -222,6 +226,7 @@ impl Accounts {
         let token_sha256 = token.sha256();
         let Some(found) = self.reader().sign_in(&token_sha256).await? else { return Ok(None) };
         let StoredSignIn { account, began, used } = found;
+        let used = self.unsaved_uses().get(&token_sha256).map_or(used, |unsaved| used.max(*unsaved));
 
         // The absolute difference, so that a clock that was set back does not extend a sign-in.
         let now = self.clock.wall();
@@ -231,12 +236,14 @@ impl Accounts {
         }
 
         if since(used) > NOTED_EVERY {
-            let book = self.book.clone();
+            self.unsaved_uses().insert(token_sha256.clone(), now);
+            let accounts = self.clone();
             // Not awaited, so that a request to stop the lens does not wait for the disk, and a full disk locks nobody
             // out.
             tokio::spawn(async move {
-                if let Err(error) = book.note_use(&token_sha256).await {
-                    tracing::warn!("a sign-in's use could not be noted: {error}");
+                match accounts.book.note_use(&token_sha256).await {
+                    Ok(()) => _ = accounts.unsaved_uses().remove(&token_sha256),
+                    Err(error) => tracing::warn!("a sign-in's use could not be noted: {error}"),
                 }
             });
         }
@@ -311,8 +318,12 @@ impl Accounts {
         Ok(self.book.failed(account, &AccountEvent::Failed(attempt)).await?)
     }
 
-    fn throttle(&self) -> std::sync::MutexGuard<'_, Throttle> {
+    fn throttle(&self) -> MutexGuard<'_, Throttle> {
         self.throttle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn unsaved_uses(&self) -> MutexGuard<'_, HashMap<String, Timestamp>> {
+        self.unsaved_uses.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
