@@ -108,3 +108,18 @@ async fn what_is_no_whole_database_is_named_and_not_taken_for_the_data_folders()
     assert!(told(&output).contains("export.zip does not verify: "), "{}", told(&output));
     assert!(!told(&output).contains("data folder"), "{}", told(&output));
 }
+
+#[test]
+fn a_restore_that_fails_leaves_no_new_data_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("notes.txt");
+    std::fs::write(&text, "no database").unwrap();
+
+    let data = folder.path().join("data");
+    for wrong in [folder.path().join("missing.db"), text, folder.path().to_owned()] {
+        let output = parfocal(&["restore", wrong.to_str().unwrap()], Some(&data));
+        assert_eq!(output.status.code(), Some(1));
+        assert!(told(&output).contains(wrong.to_str().unwrap()), "{}", told(&output));
+        assert!(!data.exists(), "a server would start there with an empty database");
+    }
+}

@@ -12,7 +12,7 @@ use serde::Serialize;
 use tempfile::{NamedTempFile, PersistError, TempPath};
 
 use super::export::verify::{Check, Verdict};
-use super::lock::FolderLock;
+use super::lock::{FolderLock, LOCK};
 use super::schema::DATABASE;
 use super::verify::checks;
 use super::{Access, AccessLog, Head, Reader, StoreError};
@@ -223,8 +223,22 @@ fn put_in_place(
 /// If a server uses the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
 #[boxed]
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
+    let is_new = !folder.exists();
     DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
-    let _lock = FolderLock::of(folder)?;
+    let lock = FolderLock::of(folder)?;
+
+    let restored = restore_locked(folder, file, clock).await;
+    if is_new && restored.is_err() {
+        // A server would start with an empty database in a folder that was left here.
+        let _ = std::fs::remove_file(folder.join(LOCK));
+        let _ = std::fs::remove_dir(folder);
+    }
+    drop(lock);
+    restored
+}
+
+/// The same in a folder that this process has locked.
+async fn restore_locked(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
     let database = folder.join(DATABASE);
 
     let copy = temporary_beside(&database)?;
