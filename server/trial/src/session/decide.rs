@@ -270,6 +270,9 @@ fn pause(state: &SessionState, by: Role, reason: &str, now: Moment) -> Result<Ve
 
 fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<EventKind>, Refusal> {
     let reason = reason::needed(reason)?;
+    if state.given_reasons.get(&event) == Some(&reason) {
+        return Ok(Vec::new());
+    }
     if !state.unreasoned.contains(&event) {
         return Err(Refusal::conflict("there is no such pause, or its reason was given"));
     }

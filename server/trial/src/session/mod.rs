@@ -115,6 +115,8 @@ pub struct SessionState {
     pointed: Pointed,
     /// Numbers of the pauses without a reason, oldest first.
     unreasoned: Vec<u32>,
+    /// The reasons that were given after their pauses, by the pauses' numbers.
+    given_reasons: BTreeMap<u32, String>,
     /// Version of the consent text that the participant consented to last.
     consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
@@ -154,6 +156,7 @@ impl SessionState {
             tablet_away: false,
             pointed: Pointed { patch: PatchPlace::CENTRE, held: false },
             unreasoned: Vec::new(),
+            given_reasons: BTreeMap::new(),
             consented: None,
             answers: BTreeMap::new(),
         }
@@ -311,7 +314,10 @@ impl SessionState {
             EventKind::PatchCentred { .. } => self.pointed.patch = PatchPlace::CENTRE,
             EventKind::FocusHeld { .. } => self.pointed.held = true,
             EventKind::FocusReleased { .. } => self.pointed.held = false,
-            EventKind::ReasonGiven { about, .. } => self.unreasoned.retain(|number| number != about),
+            EventKind::ReasonGiven { about, reason } => {
+                self.unreasoned.retain(|number| number != about);
+                self.given_reasons.insert(*about, reason.clone());
+            }
             EventKind::TabletAway { .. } => self.tablet_away = true,
             EventKind::TabletBack => self.tablet_away = false,
             EventKind::Resumed => {

@@ -206,7 +206,8 @@ fn the_reason_for_a_pause_can_be_given_once_and_afterwards() {
     assert!(matches!(run.act(Role::Operator, &give(number, " ")), Err(Refusal::Invalid(_))));
     assert!(matches!(run.act(Role::Surgeon, &give(number, "bleeding")), Err(Refusal::NotAllowed(_))));
     assert_eq!(run.act(Role::Operator, &give(number, "bleeding")), Ok(1));
-    assert!(matches!(run.act(Role::Operator, &give(number, "bleeding")), Err(Refusal::Conflict(_))));
+    assert_eq!(run.act(Role::Operator, &give(number, " bleeding")), Ok(0), "sent again after a lost reply");
+    assert!(matches!(run.act(Role::Operator, &give(number, "smoke")), Err(Refusal::Conflict(_))));
     assert!(matches!(run.act(Role::Operator, &give(1, "bleeding")), Err(Refusal::Conflict(_))));
 }
 
