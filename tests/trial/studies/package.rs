@@ -335,9 +335,10 @@ async fn a_withdrawn_session_is_left_out_and_named() {
     let data = folder.path().join("data");
     std::fs::create_dir_all(&data).unwrap();
     let mut trial = opened(&data).await;
-    let kept = whole(&mut trial, "S-02", "leeds").await;
+    let first = whole(&mut trial, "S-02", "leeds").await;
     let withdrawn = whole(&mut trial, "S-03", "leeds").await;
     change(&trial, Change::Withdraw { session: withdrawn }).await.unwrap();
+    let second = whole(&mut trial, "S-04", "leeds").await;
     trial.store.close().await;
 
     let out = folder.path().join("package");
@@ -345,9 +346,12 @@ async fn a_withdrawn_session_is_left_out_and_named() {
     let package = json(&out, "datapackage.json");
     assert_eq!(package["parfocal"]["left_out"][0]["session"], withdrawn.to_string());
     assert_eq!(package["parfocal"]["left_out"][0]["reason"], "the participant withdrew");
-    let sessions: Vec<String> =
-        rows(&out, "sessions").into_iter().map(|mut row| row.remove("session").unwrap()).collect();
-    assert_eq!(sessions, [kept.to_string()]);
+    let sessions = |table: &str| -> Vec<String> {
+        rows(&out, table).into_iter().map(|mut row| row.remove("session").unwrap()).collect()
+    };
+    let kept = BTreeSet::from([first.to_string(), second.to_string()]);
+    assert_eq!(sessions("sessions").into_iter().collect::<BTreeSet<_>>(), kept);
+    assert_eq!(sessions("withdrawals"), [withdrawn.to_string()], "both exports tell of it, and the package once");
     assert!(!out.join("allocation.csv").exists(), "a blinded package tells no policy");
     assert!(
         refused(&["export", "--study", "nothing", "--data-dir", text(&data), "--out", text(&out)])

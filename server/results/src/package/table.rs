@@ -8,8 +8,9 @@ const SITE: Column = means("Site of the study that recorded it; numbers such as 
 
 const SESSION: Column = means("Session's random id").column("session", Type::String);
 
-/// Tables whose rows may belong to several sessions of a site; each row is joined once.
-const SHARED: [&str; 5] = ["runs", "devices", "studies", "study_events", "weights"];
+/// Tables whose rows several exports of a site have, because they are not about the exported session alone; each row is
+/// joined once. A withdrawal is of a session that has no export.
+const SHARED: [&str; 6] = ["runs", "devices", "withdrawals", "studies", "study_events", "weights"];
 
 /// Tables with a row for each frame, joined only as Parquet. The exports have them as CSV.
 const LONG: [&str; 2] = ["telemetry", "policy_steps"];
@@ -55,11 +56,8 @@ impl JoinedTable {
         let own: Vec<_> = own.map(|(column, place)| (*column, Origin::Cell(place))).collect();
         columns.extend(own);
 
-        let mut key = vec![SITE.name];
-        if !shared {
-            key.push(SESSION.name);
-        }
-        key.extend(table.key.iter().filter(|name| **name != SESSION.name));
+        let own_key = table.key.iter().filter(|name| !before.contains(*name)).copied();
+        let key = before.iter().copied().chain(own_key).collect();
 
         Self { table, columns, key, shared, long: LONG.contains(&table.name) }
     }
@@ -85,4 +83,20 @@ pub fn label(column: &Column) -> String {
     let words: Vec<&str> = column.description.split_whitespace().collect();
     let description = words.join(" ");
     if column.unit.is_empty() { description } else { format!("{description} ({})", column.unit) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_withdrawal_names_the_withdrawn_session_and_a_comment_the_exported_one() {
+        let session = |name: &str| {
+            let table = joined_tables().find(|table| table.table.name == name).unwrap();
+            let origin = table.columns.iter().find(|(column, _)| column.name == "session").unwrap().1;
+            (origin, table.key)
+        };
+        assert_eq!(session("withdrawals"), (Origin::Cell(0), vec!["site", "session"]));
+        assert_eq!(session("comments"), (Origin::Session, vec!["site", "session", "key"]));
+    }
 }
