@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use parfocal_records::store::export::ExportError;
+
 /// Why no package was made: a sentence that names the file or folder, and says what is wrong.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
@@ -43,5 +45,11 @@ impl PackageError {
     pub(super) fn unwritable<E: Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
         let path = path.into();
         move |error| Self(format!("cannot write {}: {error}", path.display()))
+    }
+}
+
+impl From<ExportError> for PackageError {
+    fn from(error: ExportError) -> Self {
+        Self(error.to_string())
     }
 }

@@ -15,8 +15,8 @@ use super::parquet::ParquetFile;
 use super::source::{LeftOut, PackageSource, SESSIONS, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, playable, r, redcap, spss};
-use parfocal_base::files::{files_below, folder_of, is_new_or_empty, put_folder, sync_folder_of, write_through};
-use parfocal_records::store::export::{ExportFiles, SUMS};
+use parfocal_base::files::{files_below, write_through};
+use parfocal_records::store::export::{ExportFiles, NewFolder, SUMS};
 use parfocal_trial::voice::MediaType;
 
 /// Summary of the written package.
@@ -64,19 +64,10 @@ pub fn write(
 
     let first = sources.first().ok_or_else(|| PackageError::empty(out))?;
     agree(sources)?;
-    check_new(out)?;
 
-    let parent = folder_of(out);
-    fs::create_dir_all(parent).map_err(PackageError::unwritable(parent))?;
-    let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
-    let temporary = temporary.map_err(PackageError::unwritable(parent))?;
-
-    fill(sources, sessions, left_out, temporary.path(), progress)?;
-
-    put_folder(temporary.path(), out).map_err(PackageError::unwritable(out))?;
-    // It is at its place, and there is nothing to remove.
-    let _ = temporary.keep();
-    sync_folder_of(out);
+    let folder = NewFolder::beside(out)?;
+    fill(sources, sessions, left_out, folder.path(), progress)?;
+    folder.finish()?;
 
     let sites: BTreeSet<&String> = sources.iter().map(|source| &source.site).collect();
     Ok(Summary {
@@ -87,11 +78,6 @@ pub fn write(
         left_out: left_out.to_vec(),
         unblinded: !first.blinded,
     })
-}
-
-fn check_new(out: &Path) -> Result<(), PackageError> {
-    let is_free = is_new_or_empty(out).map_err(PackageError::unwritable(out))?;
-    if is_free { Ok(()) } else { Err(PackageError::of(out, "exists and is not empty; choose a new folder")) }
 }
 
 fn fill(

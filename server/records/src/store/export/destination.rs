@@ -97,6 +97,9 @@ pub struct NewFolder {
 
 impl NewFolder {
     /// Begins the folder that becomes `out`, which must be new or empty.
+    ///
+    /// # Errors
+    /// If `out` has files, or the temporary folder cannot be made.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
         check_new(out)?;
@@ -104,6 +107,11 @@ impl NewFolder {
         std::fs::create_dir_all(parent).map_err(unwritable)?;
         let temporary = tempfile::Builder::new().prefix(".parfocal-export-").tempdir_in(parent).map_err(unwritable)?;
         Ok(Self { out: out.to_owned(), temporary, file: None })
+    }
+
+    /// Where the folder is until it is complete.
+    pub fn path(&self) -> &Path {
+        self.temporary.path()
     }
 
     fn begin(&mut self, name: &str) -> io::Result<()> {
@@ -124,7 +132,11 @@ impl NewFolder {
         file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
     }
 
-    fn finish(self) -> Result<(), ExportError> {
+    /// Moves the complete folder to its place.
+    ///
+    /// # Errors
+    /// If it cannot be renamed. It is removed then.
+    pub fn finish(self) -> Result<(), ExportError> {
         sync_folder_of(&self.temporary.path().join("any"));
         let unwritable = |error| ExportError::Unwritable { path: self.out.clone(), error };
         put_folder(self.temporary.path(), &self.out).map_err(unwritable)?;
