@@ -357,6 +357,19 @@ async fn a_withdrawn_session_is_left_out_and_named() {
         refused(&["export", "--study", "nothing", "--data-dir", text(&data), "--out", text(&out)])
             .contains("there is no study 'nothing'")
     );
+
+    // An export for which there is no place is refused at once, and not recorded.
+    let recorded = async || {
+        let pool = crate::storage::raw(&data).await;
+        let exports = sqlx::query_scalar("SELECT count(*) FROM accesses WHERE kind = 'exported'");
+        let exports: i64 = exports.fetch_one(&pool).await.unwrap();
+        pool.close().await;
+        exports
+    };
+    assert_eq!(recorded().await, 2);
+    let said = refused(&["export", "--study", STUDY, "--data-dir", text(&data), "--out", text(&out)]);
+    assert!(said.contains("package exists and is not empty"), "{said}");
+    assert_eq!(recorded().await, 2);
 }
 
 #[tokio::test]

@@ -19,7 +19,7 @@ use parfocal_base::files::{files_below, folder_of};
 use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
 use parfocal_recording::room;
-use parfocal_records::store::export::Export;
+use parfocal_records::store::export::{Export, check_new};
 use parfocal_records::store::{AccessLog, Reader};
 use parfocal_trial::study::places::Enrolled;
 use parfocal_trial::study::stage::Stage;
@@ -68,6 +68,8 @@ pub async fn export_study(
     progress: ProgressCallback,
 ) -> Result<ExportedStudy, StudyExportError> {
     let (sessions, left_out) = sessions_of(access_log.reader(), study, unblinded).await?;
+    // An export that cannot be written is not recorded.
+    check_new(out)?;
     let exported = sessions.clone();
     let making =
         Making { access_log: access_log.clone(), sessions, left_out, unblinded, out: out.to_owned(), progress };

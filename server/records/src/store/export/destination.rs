@@ -83,6 +83,9 @@ impl Destination {
 }
 
 /// Checks that `out` is new or empty.
+///
+/// # Errors
+/// If it is not, or it cannot be read.
 pub fn check_new(out: &Path) -> Result<(), ExportError> {
     let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
     if is_new_or_empty(out).map_err(unwritable)? { Ok(()) } else { Err(ExportError::Exists(out.to_owned())) }

@@ -24,7 +24,7 @@ pub(super) use self::description::{
     AccessRow, ActorRow, ChainRow, ChainSaltRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, PolicyStepRow,
     RunRow, StudyEventRow, TelemetryRow, VoicePieceRow, WeightsRow, WithdrawalRow,
 };
-pub use self::destination::{NewFolder, ZipStream};
+pub use self::destination::{NewFolder, ZipStream, check_new};
 pub use self::error::ExportError;
 pub use self::folder::Folder;
 pub use self::table::{Cell, Meaning, Row, means, table};
@@ -194,7 +194,7 @@ pub async fn export(
     unblinded: bool,
 ) -> Result<Summary, ExportError> {
     // An export that cannot be written is not recorded.
-    destination::check_new(out)?;
+    check_new(out)?;
     Export::prepare(access_log, session, unblinded).await?.into_folder(out).await
 }
 
