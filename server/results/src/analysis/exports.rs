@@ -17,25 +17,11 @@ use crate::package::{LeftOut, PackageError, exports_of, left_out};
 use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_records::store::LensMotion;
 use parfocal_records::store::export::ExportFiles;
+use parfocal_records::store::export::verify::Outline;
 use parfocal_trial::phase::SessionStatus;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::CommentContent;
-
-/// What the analysis needs of `study.toml`.
-#[derive(Debug, Deserialize)]
-struct Definition {
-    name: String,
-    title: String,
-    analysis: String,
-    protocols: Vec<Named>,
-    sites: Vec<Named>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Named {
-    name: String,
-}
 
 /// What the analysis needs of `session.json`, which has the tables of an export.
 #[derive(Debug, Deserialize)]
@@ -149,7 +135,7 @@ struct ExportedSession {
 pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
     let folders = exports_of(folder)?;
     let first = folders.first().ok_or_else(|| PackageError::empty(folder))?;
-    let definition: Definition = toml_of(first, "study.toml")?;
+    let definition = ExportFiles::of(first).outline().map_err(PackageError::unreadable(first))?;
 
     let mut sessions = Vec::new();
     let mut protocols: BTreeMap<String, Protocol> = BTreeMap::new();
@@ -370,7 +356,7 @@ struct Databases {
 }
 
 impl Databases {
-    fn of(sessions: &[ExportedSession], definition: &Definition) -> Self {
+    fn of(sessions: &[ExportedSession], definition: &Outline) -> Self {
         let mut sites: Vec<(String, Vec<String>)> = Vec::new();
         for site in definition.sites.iter().map(|site| &site.name) {
             for session in sessions.iter().filter(|session| session.place().site == *site) {
@@ -458,17 +444,9 @@ fn protocol_records(
     ProtocolRecords { protocol, sessions }
 }
 
-fn text_of(folder: &Path, file: &str) -> Result<String, AnalysisError> {
-    Ok(ExportFiles::of(folder).text(file).map_err(PackageError::unreadable(folder))?)
-}
-
-fn toml_of<T: serde::de::DeserializeOwned>(folder: &Path, file: &str) -> Result<T, AnalysisError> {
-    let unreadable = |error: toml::de::Error| PackageError::unreadable(folder.join(file))(error.message());
-    Ok(toml::from_str(&text_of(folder, file)?).map_err(unreadable)?)
-}
-
 fn protocol_of(folder: &Path) -> Result<Protocol, AnalysisError> {
     const FILE: &str = "protocol.toml";
-    let protocol = Protocol::parse_kept(&text_of(folder, FILE)?, FILE);
+    let text = ExportFiles::of(folder).text(FILE).map_err(PackageError::unreadable(folder))?;
+    let protocol = Protocol::parse_kept(&text, FILE);
     Ok(protocol.map_err(PackageError::unreadable(folder.join(FILE)))?)
 }

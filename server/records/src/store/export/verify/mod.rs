@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 
 pub use files::ExportFiles;
 use files::is_long;
+pub use study::Outline;
 pub use verdict::Verdict;
 
 use crate::store::Head;

@@ -10,23 +10,44 @@ use parfocal_trial::allocation::Seed;
 use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::lists::{List, commitment, in_words};
 
-/// The parts of a definition that can be checked without the other protocols of the study.
-#[derive(Deserialize)]
-struct Outline {
-    name: String,
-    protocols: Vec<OutlineProtocol>,
-    sites: Vec<OutlineSite>,
+/// The parts of a definition that can be read without the other protocols of the study.
+#[derive(Debug, Deserialize)]
+pub struct Outline {
+    /// Name of the study.
+    pub name: String,
+    /// Title of the study.
+    pub title: String,
+    /// The planned analysis.
+    pub analysis: String,
+    /// The protocols, in order.
+    pub protocols: Vec<OutlineProtocol>,
+    /// The sites, in order.
+    pub sites: Vec<OutlineSite>,
 }
 
-#[derive(Deserialize)]
-struct OutlineProtocol {
-    name: String,
+/// A protocol of a definition.
+#[derive(Debug, Deserialize)]
+pub struct OutlineProtocol {
+    /// Name of the protocol.
+    pub name: String,
     sha256: String,
 }
 
-#[derive(Deserialize)]
-struct OutlineSite {
-    name: String,
+/// A site of a definition.
+#[derive(Debug, Deserialize)]
+pub struct OutlineSite {
+    /// Name of the site.
+    pub name: String,
+}
+
+impl ExportFiles {
+    /// The definition of the study in the export.
+    ///
+    /// # Errors
+    /// If it cannot be read. The text names the file.
+    pub fn outline(&self) -> Result<Outline, String> {
+        toml::from_str(&self.text("study.toml")?).map_err(|error| format!("study.toml: {}", error.message()))
+    }
 }
 
 /// The session's place in its study.
@@ -71,7 +92,7 @@ fn check_definition(export: &ExportFiles, study: &str, place: &EnrolledPlace) ->
         return Err("study.toml is not the definition that the study was planned with".to_owned());
     }
 
-    let outline: Outline = toml::from_str(&definition).map_err(|error| format!("study.toml: {}", error.message()))?;
+    let outline = export.outline()?;
     if outline.name != study || export.cells("studies.csv", "study")? != [study] {
         return Err("study.toml, studies.csv and study_sessions.csv name different studies".to_owned());
     }
