@@ -12,7 +12,7 @@ use parfocal_dashboard::doctor::{Finding, Verdict, calibration, database, lens, 
 use parfocal_devices::camera::calibration::read;
 use parfocal_devices::lens::open;
 use parfocal_imaging::SENSOR_SIZE;
-use parfocal_records::store::database_state;
+use parfocal_records::store::look_at_database;
 
 /// Arguments of `parfocal doctor`.
 #[derive(Debug, clap::Args)]
@@ -38,7 +38,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let data = &arguments.data_dir;
     let mut findings = machine(data, &SystemClock);
-    findings.extend(database(data, wait_for(database_state(data))?));
+    findings.extend(database(data, wait_for(look_at_database(data))?));
     if let Some(spec) = &arguments.lens {
         super::interrupt::let_lenses_go_first()?;
         let asked = open(spec, Arc::new(SystemClock)).and_then(|mut opened| opened.info());

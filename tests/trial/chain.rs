@@ -5,12 +5,11 @@ use std::process::Command;
 
 use parfocal_base::clock::Clock;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::DatabaseState;
 use parfocal_records::store::backup::{BackupError, Relation, backup, restore};
 use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::{Check, Verdict, verify};
 use parfocal_records::store::{
-    Access, DeviceEvent, Head, MIGRATOR, Reader, Store, StoreError, database_state, verify_database,
+    Access, DeviceEvent, Head, MIGRATOR, Reader, Store, StoreError, look_at_database, verify_database,
 };
 use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
@@ -454,7 +453,7 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
 
     let whole = std::fs::read(&file).unwrap();
     assert!(whole.len() > 40 * PAGE);
-    assert_eq!(database_state(folder.path()).await, DatabaseState::Whole(whole.len() as u64));
+    assert_eq!(look_at_database(folder.path()).await.unwrap(), whole.len() as u64);
 
     for page in 0..whole.len() / PAGE {
         let mut damaged = whole.clone();
@@ -464,8 +463,8 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
             Ok(checks) => assert!(said(&checks, "database").unwrap_err().contains("damaged"), "{page}: {checks:?}"),
             Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{page}: {error}"),
         }
-        let state = database_state(folder.path()).await;
-        assert!(matches!(state, DatabaseState::Damaged(_)), "{page}: {state:?}");
+        let found = look_at_database(folder.path()).await;
+        assert!(matches!(found, Err(StoreError::Damaged(_))), "{page}: {found:?}");
     }
 }
 
@@ -488,7 +487,7 @@ async fn a_column_whose_name_is_not_text_is_refused_at_every_opening() {
     ] {
         assert!(matches!(refused, Err(StoreError::Damaged(_))), "{refused:?}");
     }
-    assert!(matches!(database_state(folder.path()).await, DatabaseState::Damaged(_)));
+    assert!(matches!(look_at_database(folder.path()).await, Err(StoreError::Damaged(_))));
 }
 
 fn position(bytes: &[u8], part: &[u8]) -> usize {
@@ -498,19 +497,19 @@ fn position(bytes: &[u8], part: &[u8]) -> usize {
 #[tokio::test]
 async fn a_database_is_looked_at_whatever_its_version() {
     let folder = tempfile::tempdir().unwrap();
-    assert_eq!(database_state(folder.path()).await, DatabaseState::Missing);
+    assert!(matches!(look_at_database(folder.path()).await, Err(StoreError::Missing(_))));
     a_database(folder.path()).await;
 
     let pool = crate::storage::raw(folder.path()).await;
     let version = "INSERT INTO _sqlx_migrations SELECT 9000, description, installed_on, success, checksum, \
                    execution_time FROM _sqlx_migrations LIMIT 1";
     sqlx::query(version).execute(&pool).await.unwrap();
-    assert_eq!(database_state(folder.path()).await, DatabaseState::Newer);
+    assert!(matches!(look_at_database(folder.path()).await, Err(StoreError::Newer { .. })));
 
     sqlx::query("DELETE FROM _sqlx_migrations WHERE version = 9000").execute(&pool).await.unwrap();
     MIGRATOR.undo(&pool, 0).await.unwrap();
     pool.close().await;
-    assert!(matches!(database_state(folder.path()).await, DatabaseState::Whole(_)));
+    look_at_database(folder.path()).await.unwrap();
 }
 
 #[tokio::test]

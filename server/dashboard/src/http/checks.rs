@@ -17,7 +17,7 @@ use super::error::Error;
 use super::roles::Operator;
 use super::{App, AppState};
 use crate::doctor::{self, Finding};
-use parfocal_records::store::database_state;
+use parfocal_records::store::look_at_database;
 
 /// Results of all checks.
 #[derive(Debug, Serialize, ToSchema)]
@@ -37,7 +37,7 @@ struct Checks {
 async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;
     let folder = app.store.folder().to_owned();
-    let database = doctor::database(&folder, database_state(&folder).await);
+    let database = doctor::database(&folder, look_at_database(&folder).await);
     let clock = Arc::clone(&app.clock);
     let machine = spawn_blocking(move || {
         let _look = look;

@@ -64,5 +64,5 @@ pub use sessions::{NewSession, StoredSession};
 pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
 pub use voice::{KeptVoice, PieceKept, StoredPiece, VoicePiece, VoiceRecording};
-pub use whole::{DatabaseState, database_state};
+pub use whole::look_at_database;
 pub use writes::{Counts, WriteTimes, Writes};

@@ -5,21 +5,6 @@ use std::path::Path;
 use super::schema::DATABASE;
 use super::{Reader, StoreError};
 
-/// State of the database in a data folder.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum DatabaseState {
-    /// There is no database.
-    Missing,
-    /// SQLite finds nothing wrong. Holds the size in bytes.
-    Whole(u64),
-    /// SQLite finds it damaged. Holds what is wrong.
-    Damaged(String),
-    /// It was made by a newer version of parfocal.
-    Newer,
-    /// It cannot be read. Holds the reason.
-    Unreadable(String),
-}
-
 /// How thoroughly a file is checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Thoroughness {
@@ -29,20 +14,13 @@ pub(super) enum Thoroughness {
     Full,
 }
 
-/// Looks at the database of the data folder `folder`, whether or not a server has it open. Reads all of it once.
-pub async fn database_state(folder: &Path) -> DatabaseState {
-    match look(&folder.join(DATABASE)).await {
-        Ok(bytes) => DatabaseState::Whole(bytes),
-        Err(StoreError::Missing(_)) => DatabaseState::Missing,
-        Err(StoreError::Damaged(detail)) => DatabaseState::Damaged(detail),
-        Err(StoreError::Newer { .. }) => DatabaseState::Newer,
-        Err(error) => DatabaseState::Unreadable(error.to_string()),
-    }
-}
-
-/// How many bytes the database `file` has, or an error if it is damaged or a newer version made it.
-async fn look(file: &Path) -> Result<u64, StoreError> {
-    let snapshot = Reader::open_snapshot_unchecked(file).await?;
+/// Looks at the database of the data folder `folder`, whether or not a server has it open. Reads all of it once. Returns
+/// its size in bytes if SQLite finds nothing wrong.
+///
+/// # Errors
+/// If there is no database, it is damaged, a newer version made it, or it cannot be read.
+pub async fn look_at_database(folder: &Path) -> Result<u64, StoreError> {
+    let snapshot = Reader::open_snapshot_unchecked(&folder.join(DATABASE)).await?;
     let found = size_if_whole(&snapshot).await;
     snapshot.close().await;
     found
