@@ -146,16 +146,11 @@ struct Choices {
 #[utoipa::path(get, path = "/api/operator/choices", tag = "operator", responses((status = 200, body = Choices)))]
 async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
     Ok(Json(Choices {
-        participants: codes(&app).await?,
+        participants: app.store.reader().participants().await?,
         protocols: app.library.summaries(),
         studies: OpenStudy::all(app.conductor.studies()).await?,
         policies: app.registry.entries(),
     }))
-}
-
-async fn codes(app: &App) -> Result<Vec<String>, Error> {
-    let participants = app.store.reader().participants().await?;
-    Ok(participants.into_iter().map(|participant| participant.code).collect())
 }
 
 /// Puts a policy in charge of the focus, or sets the focal power by hand. While a session is under way only the latter,
@@ -214,7 +209,7 @@ async fn add_participant(
     JsonBody(new): JsonBody<NewParticipant>,
 ) -> Result<Json<Vec<String>>, Error> {
     app.conductor.add_participant(Role::Operator, &new.code).await?;
-    codes(&app).await.map(Json)
+    Ok(Json(app.store.reader().participants().await?))
 }
 
 /// A session to prepare.

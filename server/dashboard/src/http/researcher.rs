@@ -224,7 +224,6 @@ async fn session_page(
     })?;
 
     let participants = app.store.reader().participants().await?;
-    let participants = participants.into_iter().map(|participant| participant.code).collect();
     let chain = chain_words(&app).await;
     let person = person.map(|person| person.account);
     SessionPage::new(nonce, person, chain, detail, participants).render().map(Html).map_err(|_| Error::Internal)

@@ -12,7 +12,7 @@ use sqlx::{AssertSqlSafe, Connection as _, Row, migrate::Migrate};
 use super::motion::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::values::{moment, parsed, stamp, status};
-use super::{Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
+use super::{PathPoint, RunClocks, SessionLine, Stamp, StoreError};
 use parfocal_base::FocalPower;
 use parfocal_base::ids::{SegmentId, SessionId};
 
@@ -148,25 +148,12 @@ impl Reader {
         self.pool.close().await;
     }
 
-    /// The participants, by code.
+    /// The codes of the participants, in order.
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn participants(&self) -> Result<Vec<Participant>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT code, wall, (SELECT count(*) FROM sessions WHERE participant = code AND NOT practice) AS sessions
-             FROM participants ORDER BY code",
-        )
-        .fetch_all(&self.pool)
-        .await?;
-
-        let participant = |row: &SqliteRow| {
-            let code = row.try_get("code")?;
-            let sessions = row.try_get("sessions")?;
-            Ok(Participant { code, added: parsed(row, "wall")?, sessions })
-        };
-
-        rows.iter().map(participant).collect()
+    pub async fn participants(&self) -> Result<Vec<String>, StoreError> {
+        Ok(sqlx::query_scalar("SELECT code FROM participants ORDER BY code").fetch_all(&self.pool).await?)
     }
 
     /// The sessions, newest first. Practice sessions are included only if `practice` is true.

@@ -107,18 +107,6 @@ impl DeviceReport {
     }
 }
 
-/// A participant.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct Participant {
-    /// Code.
-    pub code: String,
-    /// When it was added, by the server's wall clock.
-    #[schema(value_type = String)]
-    pub added: Timestamp,
-    /// Sessions, practice excluded.
-    pub sessions: i64,
-}
-
 /// A session in a list. Says nothing of policies.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 #[allow(clippy::struct_excessive_bools, reason = "facts that the list shows each by itself")]

@@ -122,7 +122,7 @@ impl Shared {
 
     async fn check_participant(&self, code: &str) -> Result<(), ConductError> {
         let known = self.store.reader().participants().await?;
-        if known.iter().any(|participant| participant.code == code) {
+        if known.iter().any(|known| known == code) {
             return Ok(());
         }
         let code: String = code.chars().take(40).collect();

@@ -71,8 +71,7 @@ impl Shared {
         let session = course.session();
         let known = self.store.reader().participants().await?;
         let current = latest.participant(session).unwrap_or(&course.made.participant);
-        let codes = known.iter().map(|participant| participant.code.as_str());
-        correction::check_participant(current, &old, &new, codes)?;
+        correction::check_participant(current, &old, &new, known.iter().map(String::as_str))?;
 
         Ok(DecidedCorrection {
             subject: Subject::Session,
