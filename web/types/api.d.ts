@@ -2627,7 +2627,7 @@ export interface components {
             corrected_participant?: string | null;
             /** @description When the session was made, by the server's wall clock. */
             created: string;
-            /** @description Whether it was unblinded while it was under way. */
+            /** @description Whether it was unblinded in an emergency: while it was under way, or while its study was blinded. */
             emergency: boolean;
             /**
              * Format: int64
@@ -3283,7 +3283,7 @@ export interface components {
         Unblinding: {
             /** @description When, by the server's wall clock. */
             at: string;
-            /** @description Whether the session was still under way. */
+            /** @description Whether it was an emergency: the session was under way, or its study was blinded. */
             emergency: boolean;
             /** @description The policy of each setting, in order. */
             policies: string[];

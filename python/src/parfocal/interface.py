@@ -1229,7 +1229,8 @@ class SessionDetail(TypedDict):
     """When the session was made, by the server's wall clock."""
 
     emergency: bool
-    """Whether it was unblinded while it was under way."""
+    """Whether it was unblinded in an emergency: while it was under way, or while its study was
+    blinded."""
 
     finished_settings: int
     """Number of settings inspected to the end."""
@@ -1311,7 +1312,8 @@ class SessionLine(TypedDict):
     """When the session was made, by the server's wall clock."""
 
     emergency: bool
-    """Whether it was unblinded while it was under way."""
+    """Whether it was unblinded in an emergency: while it was under way, or while its study was
+    blinded."""
 
     finished_settings: int
     """Number of settings inspected to the end."""
@@ -1971,7 +1973,7 @@ class Unblinding(TypedDict):
     """When, by the server's wall clock."""
 
     emergency: bool
-    """Whether the session was still under way."""
+    """Whether it was an emergency: the session was under way, or its study was blinded."""
 
     policies: builtins.list[str]
     """The policy of each setting, in order."""

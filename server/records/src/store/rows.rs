@@ -136,7 +136,7 @@ pub struct SessionLine {
     pub comments: i64,
     /// Whether it was unblinded.
     pub unblinded: bool,
-    /// Whether it was unblinded while it was under way.
+    /// Whether it was unblinded in an emergency: while it was under way, or while its study was blinded.
     pub emergency: bool,
     /// Whether the participant withdrew: its data stay out of exports.
     pub withdrawn: bool,

@@ -116,7 +116,7 @@ pub struct Unblinding {
     pub at: Timestamp,
     /// Reason for the unblinding.
     pub reason: String,
-    /// Whether the session was still under way.
+    /// Whether it was an emergency: the session was under way, or its study was blinded.
     pub emergency: bool,
     /// The policy of each setting, in order.
     #[schema(value_type = Vec<String>)]

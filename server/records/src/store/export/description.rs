@@ -406,8 +406,10 @@ table! {
             "Reason given for the event; empty if none was given or it was erased, and for an unblinding, whose \
              reason may name a policy and is only in allocation.json",
         ).sealed(),
-        emergency: Option<bool> =
-            means("Whether the session was still under way at its unblinding; empty for other events").open(),
+        emergency: Option<bool> = means(
+            "Whether the unblinding was an emergency: the session was under way, or its study was blinded; empty for \
+             other events",
+        ).open(),
         about: Option<u32> = means(
             "Number of the event whose reason this is; empty for other events than reason-given",
         ).open(),
