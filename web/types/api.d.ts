@@ -6387,7 +6387,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The session is under way, its participant withdrew, what a surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile */
+            /** @description The session is under way, its participant withdrew, its study is locked, what a surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile */
             409: {
                 headers: {
                     [name: string]: unknown;

@@ -99,6 +99,21 @@ pub fn check(by: Role, ended: bool, reason: &str) -> Result<String, Refusal> {
     reason::needed(reason)
 }
 
+/// Checks whether `change` is possible in a session whose study was `locked` or not. A note stays possible: it changes
+/// no result.
+///
+/// # Errors
+/// If the study was locked, and `change` is of an answer or of the participant.
+pub fn check_lock(change: &FieldChange, locked: bool) -> Result<(), Refusal> {
+    match change {
+        FieldChange::Participant { .. } | FieldChange::Value { .. } if locked => Err(Refusal::conflict(
+            "the session's study is locked: its answers and its participant can no longer be corrected; you can still \
+             add a note",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Checks whether the session's participant may be corrected from `old` to `new`. `current` is the present code;
 /// `known` are the codes of all participants.
 ///

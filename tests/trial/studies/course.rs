@@ -333,3 +333,25 @@ async fn a_session_under_the_wrong_code_counts_for_the_right_surgeon_once_it_is_
     let checks = parfocal_records::store::verify_database(folder.path(), None).await.unwrap();
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }
+
+#[tokio::test]
+async fn what_counts_in_a_locked_study_is_corrected_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, "S-02", "leeds").await;
+    change(&trial, Change::Close).await.unwrap();
+    change(&trial, Change::Lock { despite_outstanding: true }).await.unwrap();
+
+    let correct = async |change| {
+        let correction = NewCorrection { change, reason: "the surgeon said so on the phone".to_owned() };
+        trial.conductor.correct(Role::Researcher, session, correction).await
+    };
+    let code = FieldChange::Participant { old: "S-02".to_owned(), new: "S-03".to_owned() };
+    let refused = correct(code).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("is locked")), "{refused}");
+
+    // A note beside a comment, such as a transcript, changes no result.
+    let (_, comment) = trial.store.reader().comments(session).await.unwrap().remove(0);
+    let note = FieldChange::Note { record: comment.key, old: String::new(), new: "of the monitor".to_owned() };
+    correct(note).await.unwrap();
+}

@@ -22,8 +22,8 @@ use parfocal_trial::erasure::NewErasure;
     request_body = NewCorrection, responses(
     (status = 204, description = "Recorded"),
     (status = 404, description = "No such session or record"),
-    (status = 409, description = "The session is under way, its participant withdrew, what a surgeon wrote cannot be \
-                                  corrected, or somebody has corrected the same meanwhile"),
+    (status = 409, description = "The session is under way, its participant withdrew, its study is locked, what a \
+                                  surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile"),
     (status = 422, description = "The correction does not fit the record, or no reason was given")))]
 async fn correct(
     by: Researcher,

@@ -24,8 +24,8 @@ impl Conductor {
     /// Corrects a record of session `session`. The correction is on disk when this returns; the original stays.
     ///
     /// # Errors
-    /// If `by` is not the researcher, the session is under way or withdrawn, the correction is invalid or was made in
-    /// the meantime, or the disk failed.
+    /// If `by` is not the researcher, the session is under way or withdrawn, its study is locked, the correction is
+    /// invalid or was made in the meantime, or the disk failed.
     pub async fn correct(
         &self,
         by: impl Into<Actor>,
@@ -43,6 +43,7 @@ impl Shared {
         let _pen = self.pen.lock().await;
         let course = self.load(session).await?;
         let reason = correction::check(by.role, course.state.ended(), &new.reason)?;
+        correction::check_lock(&new.change, course.study_locked.is_some())?;
         // The participant can be corrected even after a withdrawal, because it says who has withdrawn.
         if !matches!(new.change, FieldChange::Participant { .. }) {
             permission::check_reading(course.state.withdrawn())?;

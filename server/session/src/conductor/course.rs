@@ -48,7 +48,7 @@ pub(crate) struct Course {
     /// The session's study; `None` outside studies.
     pub study: Option<String>,
     /// When its study was locked; `None` if it was not, or outside studies.
-    study_locked: Option<Timestamp>,
+    pub study_locked: Option<Timestamp>,
     /// All its events. Those that are not on disk yet come last.
     pub events: Vec<Event>,
     /// When each event happened, by the server's clocks over its restarts.
