@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use parfocal_base::PolicyName;
 use parfocal_base::files::is_systems_own;
-use parfocal_trial::protocol::{Protocol, ProtocolError};
+use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::Definition;
 
 /// Protocols that ship, by file name.
@@ -41,17 +41,6 @@ pub struct ProtocolSummary {
     pub segment_seconds: u64,
 }
 
-/// Why the protocols could not be read. The message names the file or folder.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct LibraryError(String);
-
-impl From<ProtocolError> for LibraryError {
-    fn from(error: ProtocolError) -> Self {
-        Self(error.to_string())
-    }
-}
-
 impl Library {
     /// The text of a study's definition to start from, for a study that `lead` unblinds; `None` if no protocol is for
     /// studies.
@@ -64,10 +53,10 @@ impl Library {
     ///
     /// # Errors
     /// If the folder cannot be read, or a protocol in it is malformed. The error names file, line and key.
-    pub fn load(folder: Option<&Path>, known: &[PolicyName]) -> Result<Self, LibraryError> {
+    pub fn load(folder: Option<&Path>, known: &[PolicyName]) -> Result<Self, String> {
         let mut protocols = BTreeMap::new();
         for (file, source) in SHIPPED {
-            let protocol = Protocol::parse(source, file, known)?;
+            let protocol = parse(source, file, known)?;
             protocols.insert(protocol.name.clone(), protocol);
         }
 
@@ -111,10 +100,14 @@ impl ProtocolSummary {
     }
 }
 
-fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, Protocol>, LibraryError> {
+fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Protocol, String> {
+    Protocol::parse(source, file, known).map_err(|error| error.to_string())
+}
+
+fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, Protocol>, String> {
     let unreadable = |path: &Path| {
         let path = path.display().to_string();
-        move |error: std::io::Error| LibraryError(format!("cannot read the protocols in {path}: {error}"))
+        move |error: std::io::Error| format!("cannot read the protocols in {path}: {error}")
     };
 
     let mut files = Vec::new();
@@ -130,13 +123,13 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
     let mut protocols = BTreeMap::new();
     for path in files {
         let source = std::fs::read_to_string(&path).map_err(unreadable(&path))?;
-        let protocol = Protocol::parse(&source, &path.display().to_string(), known)?;
+        let protocol = parse(&source, &path.display().to_string(), known)?;
         if protocols.contains_key(&protocol.name) {
-            return Err(LibraryError(format!(
+            return Err(format!(
                 "{} and another file of its folder both hold a protocol called '{}'; rename one",
                 path.display(),
                 protocol.name
-            )));
+            ));
         }
         protocols.insert(protocol.name.clone(), protocol);
     }
@@ -176,11 +169,11 @@ mod tests {
     fn a_malformed_file_and_a_name_used_twice_are_errors_that_name_the_file() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.toml"), "name = 3\n").unwrap();
-        let said = Library::load(Some(folder.path()), &known()).unwrap_err().to_string();
+        let said = Library::load(Some(folder.path()), &known()).unwrap_err();
         assert!(said.contains("a.toml, line 1: key 'name'"), "{said}");
         std::fs::write(folder.path().join("a.toml"), SHIPPED[0].1).unwrap();
         std::fs::write(folder.path().join("b.toml"), SHIPPED[0].1).unwrap();
-        let said = Library::load(Some(folder.path()), &known()).unwrap_err().to_string();
+        let said = Library::load(Some(folder.path()), &known()).unwrap_err();
         assert!(said.contains("b.toml") && said.contains("'paper'"), "{said}");
     }
 }

@@ -34,7 +34,7 @@ use utoipa::ToSchema;
 pub(crate) use course::{Course, RunClock, outstanding};
 pub(crate) use erasures::words_left;
 pub use error::ConductError;
-pub use library::{Library, LibraryError, ProtocolSummary};
+pub use library::{Library, ProtocolSummary};
 pub use studies::Studies;
 pub(crate) use studies::{outstanding_sessions, plan_concerns};
 

@@ -11,18 +11,7 @@ use parfocal_base::PatchPlace;
 use parfocal_devices::camera::FrameImage;
 use parfocal_imaging::{CELL, Calibration, PATCH_SIDE, PatchArea, Reconstructor};
 use parfocal_pipeline::control::{Eye, HoldReason};
-use parfocal_recording::{FrameRow, PatchRow, Recording, RecordingError};
-
-/// Why a policy could not be stepped over the whole recording.
-#[derive(Debug, thiserror::Error)]
-pub enum SteppingError {
-    /// A frame cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// What a frame shows, or what the policy makes of it, cannot be used; says which frame, and why.
-    #[error("{0}")]
-    Frame(String),
-}
+use parfocal_recording::{FrameRow, PatchRow, Recording};
 
 /// A policy's step on one frame. Focal powers are normalised to 0..=1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,7 +38,8 @@ pub struct Step {
     pub recorded_optimal: Option<f64>,
 }
 
-/// Steps a policy over a recording, frame by frame.
+/// Steps a policy over a recording, frame by frame. A frame that cannot be read, or of which the policy makes nothing
+/// that can be used, gives an error in words.
 pub struct Stepping<'a> {
     recording: &'a Recording,
     policy: Box<dyn Policy>,
@@ -65,22 +55,19 @@ impl<'a> Stepping<'a> {
         Self { recording, policy, eye, jumps: None, next: 0 }
     }
 
-    fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, SteppingError> {
-        let image = FrameImage::Mosaic(Arc::new(self.recording.frame(frame)?));
+    fn step(&mut self, frame: usize, row: FrameRow) -> Result<Step, String> {
+        let mosaic = self.recording.frame(frame).map_err(|error| error.to_string())?;
+        let image = FrameImage::Mosaic(Arc::new(mosaic));
         let patch = self.patch(frame, &image, row.patch)?;
         let view = self.eye.look(&image, patch, self.policy.field_of_view());
 
         let focal_power = self.exposed_at(frame, row);
         let decision = self.policy.step(&Observation { view: &view, focal_power });
         let target = decision.target;
-        let target = FocalPower::new(target).map_err(|_| {
-            SteppingError::Frame(match self.policy.fault() {
-                // A policy in another process.
-                Some(fault) => format!("at frame {frame} the policy gave no focal power: {fault}"),
-                None => {
-                    format!("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1")
-                }
-            })
+        let target = FocalPower::new(target).map_err(|_| match self.policy.fault() {
+            // A policy in another process.
+            Some(fault) => format!("at frame {frame} the policy gave no focal power: {fault}"),
+            None => format!("at frame {frame} the policy returned {target}, which is not a focal power from 0 to 1"),
         })?;
 
         Ok(Step {
@@ -98,10 +85,8 @@ impl<'a> Stepping<'a> {
     }
 
     /// The patch where the control loop had it. Where it jumped, the policy forgets what it saw, as it did then.
-    fn patch(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, SteppingError> {
-        let no_patch = |reason: HoldReason| {
-            SteppingError::Frame(format!("frame {frame} holds nothing to focus on: {}", reason.message))
-        };
+    fn patch(&mut self, frame: usize, image: &FrameImage, patch: PatchRow) -> Result<PatchArea, String> {
+        let no_patch = |reason: HoldReason| format!("frame {frame} holds nothing to focus on: {}", reason.message);
         let central = self.eye.find(image, PatchPlace::CENTRE, None).map_err(no_patch)?;
         if self.jumps.replace(patch.jumps).is_some_and(|jumps| jumps != patch.jumps) {
             self.policy.forget();
@@ -115,9 +100,9 @@ impl<'a> Stepping<'a> {
         let (x, y) = patch.corner;
         match (within(x, width), within(y, height)) {
             (Some(x), Some(y)) => Ok(PatchArea { x, y, ..central }),
-            _ => Err(SteppingError::Frame(format!(
+            _ => Err(format!(
                 "frame {frame} has its patch at {x}, {y}, outside the picture; the columns patch_x and patch_y are damaged"
-            ))),
+            )),
         }
     }
 
@@ -131,7 +116,7 @@ impl<'a> Stepping<'a> {
 }
 
 impl Iterator for Stepping<'_> {
-    type Item = Result<Step, SteppingError>;
+    type Item = Result<Step, String>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let frame = self.next;
