@@ -13,26 +13,39 @@ use parfocal_base::PolicyName;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
 
-/// Facts besides the session's own state that an action depends on. Only unblinding needs any of them.
+/// Facts besides the session's own state that an action depends on. Only unblinding needs all of them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Circumstances {
     /// Sessions that share the session's seed, including the session itself; none if the action is not unblinding.
     pub set: Option<BalancedSet>,
     /// What may still arrive for the session and would not count after unblinding; none if there is nothing.
     pub outstanding: Option<Outstanding>,
-    /// The session's study, if it belongs to one that is not unblinded yet.
+    /// The session's study, if it belongs to one that is not unblinded yet; none if the action needs no circumstances.
     pub study: Option<BlindedStudy>,
 }
 
-/// A blinded study in which a single session is to be unblinded.
+/// A blinded study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BlindedStudy {
     /// Name of the study.
     pub name: StudyName,
     /// Policies that the study compares.
     pub policies: Vec<PolicyName>,
-    /// Whether a person signed for the emergency.
+    /// Whether a person signed for the emergency in which a single session is to be unblinded.
     pub signed: bool,
+    /// Whether one of its sessions was unblinded in an emergency, so that somebody knows an order.
+    pub order_known: bool,
+}
+
+impl BlindedStudy {
+    /// Checks that `words`, a "reason" or a "note" as `what` says, name no policy once somebody knows an order, because
+    /// blinded exports show them.
+    ///
+    /// # Errors
+    /// If they name a policy of the study, and one of its sessions was unblinded.
+    pub fn check_words(&self, what: &str, words: &str) -> Result<(), Refusal> {
+        if self.order_known { check_names_no_policy(what, words, &self.policies) } else { Ok(()) }
+    }
 }
 
 impl Circumstances {
@@ -58,6 +71,12 @@ impl Circumstances {
             self.check_unblinding(session, *despite_outstanding)?;
         }
 
+        if let Action::GiveReason { reason, .. } = action
+            && let Some(study) = &self.study
+        {
+            study.check_words("reason", reason)?;
+        }
+
         // In a study, unblinding a single session is always an emergency, even after the session's end.
         for event in &mut events {
             if let EventKind::Unblinded { emergency, .. } = event {
@@ -75,7 +94,7 @@ impl Circumstances {
                 study.name
             )));
         }
-        check_names_no_policy(reason, &study.policies)
+        check_names_no_policy("reason", reason, &study.policies)
     }
 
     fn check_unblinding(&self, session: SessionId, despite_outstanding: bool) -> Result<(), Refusal> {

@@ -4,7 +4,10 @@ use parfocal_records::store::export::export;
 use parfocal_records::store::export::verify::verify;
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
+use parfocal_trial::correction::{FieldChange, NewCorrection};
+use parfocal_trial::erasure::{Erasable, NewErasure};
 use parfocal_trial::event::EventKind;
+use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use serde_json::Value;
 
@@ -61,6 +64,71 @@ async fn nobody_who_knows_a_policy_names_it_where_every_export_shows_it() {
     let naming = close("setting 2 was mgm-hill-climber").await.unwrap_err().to_string();
     assert!(naming.contains("the reason names the policy 'mgm-hill-climber'"), "{naming}");
     close("an adverse event").await.unwrap();
+}
+
+#[tokio::test]
+async fn notes_and_reasons_name_no_policy_while_a_session_alone_is_unblinded() {
+    const NAMING: &str = "setting 2 was MGM-hill-climber";
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+
+    let session = prepare(&trial, PARTICIPANT, "leeds").await.unwrap();
+    trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+    let mut spoken = trial.comment("");
+    spoken.said = CommentContent::Voice;
+    trial.conductor.comment(spoken.clone()).await.unwrap();
+    for _ in 0..2 {
+        trial.whole_setting().await;
+    }
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+
+    let reader = trial.store.reader();
+    let comments = reader.comments(session).await.unwrap();
+    let written = comments.into_iter().map(|(_, comment)| comment.key).find(|key| *key != spoken.key).unwrap();
+    let correct = async |record, old: &str, new: &str, reason: &str| {
+        let change = FieldChange::Note { record, old: old.to_owned(), new: new.to_owned() };
+        let correction = NewCorrection { change, reason: reason.to_owned() };
+        trial.conductor.correct(Role::Researcher, session, correction).await
+    };
+    let erase = async |reason: &str| {
+        let record = written.to_string();
+        let erasure = NewErasure { subject: Erasable::Comment, record, reason: reason.to_owned() };
+        trial.conductor.erase(Role::Researcher, session, erasure).await
+    };
+    correct(written, "", &format!("it seems that {NAMING}"), "a guess, nobody knows").await.unwrap();
+
+    // It is another session's order that somebody knows now. It tells something of this one's.
+    let other = prepare(&trial, "S-02", "leeds").await.unwrap();
+    trial.conductor.act(Role::Operator, other, Action::Start).await.unwrap();
+    trial.conductor.act(Role::Operator, other, Action::Pause { reason: String::new() }).await.unwrap();
+    trial.conductor.act(Role::Operator, other, Action::Abort { reason: "bleeding".to_owned() }).await.unwrap();
+    emergency(&trial, other, "an adverse event").await.unwrap();
+    let event = trial.operator_view().reason_wanted.unwrap().event;
+    let explain = async |reason: &str| {
+        let action = Action::GiveReason { event, reason: reason.to_owned() };
+        trial.conductor.act(Role::Operator, other, action).await
+    };
+
+    let old = format!("it seems that {NAMING}");
+    let refused = [
+        correct(written, &old, NAMING, "it is known").await,
+        correct(written, &old, "known by now", NAMING).await,
+        erase(NAMING).await,
+        explain(NAMING).await,
+    ];
+    for refused in refused {
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("names the policy 'mgm-hill-climber', and every export shows"), "{refused}");
+    }
+
+    correct(spoken.key, "", &format!("I think that {NAMING}"), "transcribed").await.unwrap();
+    correct(written, &old, "known by now", "it is known").await.unwrap();
+    explain("bleeding").await.unwrap();
+    trial.conductor.dismiss(Role::Operator, other).unwrap();
+    erase("names a patient").await.unwrap();
+
+    to_the_end(&trial).await;
+    correct(spoken.key, &format!("I think that {NAMING}"), NAMING, NAMING).await.unwrap();
 }
 
 #[tokio::test]

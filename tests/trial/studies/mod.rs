@@ -37,6 +37,7 @@ policies = ["mgm-hill-climber", "mlr-hill-climber"]
 repeats = 1
 order = "balanced"
 segment_seconds = 60
+voice = true
 "#;
 
 /// The protocol, installed.

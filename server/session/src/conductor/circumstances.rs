@@ -1,4 +1,4 @@
-//! Gathers from the database what the rules of unblinding need to know.
+//! Gathers from the database what the rules of blinding need to know.
 
 use super::course::{Course, outstanding};
 use super::{ConductError, Pen, Shared};
@@ -25,8 +25,7 @@ impl Subject {
 }
 
 impl Shared {
-    /// The circumstances that the rules need for `action`; only unblinding needs any. `signature` is given for an
-    /// emergency unblinding.
+    /// The circumstances that the rules need for `action`. `signature` is given for an emergency unblinding.
     pub(super) async fn circumstances(
         &self,
         pen: &mut Pen,
@@ -34,8 +33,13 @@ impl Shared {
         action: &Action,
         signature: Option<&Signature>,
     ) -> Result<Circumstances, ConductError> {
-        if !matches!(action, Action::Unblind { .. }) {
-            return Ok(Circumstances::default());
+        match action {
+            Action::Unblind { .. } => {}
+            Action::GiveReason { .. } => {
+                let study = self.blinded_study(subject.session, false).await?;
+                return Ok(Circumstances { study, ..Circumstances::default() });
+            }
+            _ => return Ok(Circumstances::default()),
         }
 
         // The database must know whether the session in memory has ended, because it may belong to the same set.
@@ -48,6 +52,14 @@ impl Shared {
         Ok(Circumstances { set: Some(set), outstanding, study })
     }
 
+    /// Checks that `words` about `session`, a "reason" or a "note" as `what` says, tell no policy in a blinded export.
+    pub(super) async fn check_words(&self, session: SessionId, what: &str, words: &str) -> Result<(), ConductError> {
+        match self.blinded_study(session, false).await? {
+            Some(study) => Ok(study.check_words(what, words)?),
+            None => Ok(()),
+        }
+    }
+
     /// The study of `session`, if it belongs to one that is still blinded.
     async fn blinded_study(&self, session: SessionId, signed: bool) -> Result<Option<BlindedStudy>, ConductError> {
         let reader = self.store.reader();
@@ -58,6 +70,7 @@ impl Shared {
         }
 
         let policies = study.definition.protocols.iter().flat_map(|protocol| protocol.policies.clone()).collect();
-        Ok(Some(BlindedStudy { name: study.definition.name, policies, signed }))
+        let order_known = study.sessions.iter().any(|session| session.unblinded);
+        Ok(Some(BlindedStudy { name: study.definition.name, policies, signed, order_known }))
     }
 }

@@ -10,6 +10,7 @@ use parfocal_trial::correction::{self, Corrected, Field, FieldChange, NewCorrect
 use parfocal_trial::permission;
 use parfocal_trial::question::AnswerValue;
 use parfocal_trial::refusal::Refusal;
+use parfocal_trial::remark::CommentContent;
 
 /// A correction that was decided on, as it is stored.
 struct DecidedCorrection {
@@ -25,7 +26,7 @@ impl Conductor {
     ///
     /// # Errors
     /// If `by` is not the researcher, the session is under way or withdrawn, its study is locked, the correction is
-    /// invalid or was made in the meantime, or the disk failed.
+    /// invalid or was made in the meantime, its words would tell a policy in a blinded export, or the disk failed.
     pub async fn correct(
         &self,
         by: impl Into<Actor>,
@@ -48,6 +49,8 @@ impl Shared {
         if !matches!(new.change, FieldChange::Participant { .. }) {
             permission::check_reading(course.state.withdrawn())?;
         }
+
+        self.check_words(session, "reason", &reason).await?;
 
         let latest = LatestCorrections::of(&self.store.reader().corrections(session).await?);
         let DecidedCorrection { subject, record, field, old, new } = match new.change {
@@ -127,25 +130,31 @@ impl Shared {
         old: &str,
         new: &str,
     ) -> Result<DecidedCorrection, ConductError> {
-        let subject = self.subject_of(course.session(), record).await?;
+        let (subject, spoken) = self.subject_of(course.session(), record).await?;
         let old = old.trim();
         let new = new.trim();
         correction::check_note(latest.note(subject, &record).unwrap_or_default(), old, new)?;
+        // A note on a recording is its transcript. What a surgeon said is never refused.
+        if !spoken {
+            self.check_words(course.session(), "note", new).await?;
+        }
 
         let record = record.to_string();
         Ok(DecidedCorrection { subject, record, field: Field::Note, old: old.to_owned(), new: new.to_owned() })
     }
 
-    /// Whether the record with this key is an answer or a comment of `session`.
-    async fn subject_of(&self, session: SessionId, record: IdempotencyKey) -> Result<Subject, ConductError> {
+    /// Whether the record with this key is an answer or a comment of `session`, and whether it was spoken.
+    async fn subject_of(&self, session: SessionId, record: IdempotencyKey) -> Result<(Subject, bool), ConductError> {
         let reader = self.store.reader();
         let is_answer = |(_, answer): &(i64, Answer)| answer.key == record;
         if reader.answers(session).await?.iter().any(is_answer) {
-            return Ok(Subject::Answer);
+            return Ok((Subject::Answer, false));
         }
+
         let comments = reader.comments(session).await?;
-        let is_comment = comments.iter().any(|(_, comment)| comment.key == record);
-        if is_comment { Ok(Subject::Comment) } else { Err(no_such_record()) }
+        let comment = comments.into_iter().map(|(_, comment)| comment).find(|comment| comment.key == record);
+        let comment = comment.ok_or_else(no_such_record)?;
+        Ok((Subject::Comment, comment.said == CommentContent::Voice))
     }
 }
 

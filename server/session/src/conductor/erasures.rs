@@ -78,6 +78,7 @@ impl Shared {
         if self.store.reader().session(session).await?.is_none() {
             return Err(ConductError::no_session());
         }
+        self.check_words(session, "reason", &reason).await?;
         Ok(reason)
     }
 

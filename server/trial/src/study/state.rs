@@ -122,7 +122,7 @@ impl StudyState {
     ) -> Result<(), Refusal> {
         check_way(way)?;
         if circumstances.sessions.iter().any(|session| session.unblinded) {
-            check_names_no_policy(&signature.reason, policies(circumstances.definition))?;
+            check_names_no_policy("reason", &signature.reason, policies(circumstances.definition))?;
         }
 
         match change {
@@ -216,7 +216,7 @@ impl StudyState {
                 definition.may_unblind.join("; ")
             )));
         }
-        check_names_no_policy(&signature.reason, policies(definition))
+        check_names_no_policy("reason", &signature.reason, policies(definition))
     }
 
     fn check_withdrawal(&self, session: SessionId, circumstances: StudyCircumstances<'_>) -> Result<(), Refusal> {
@@ -265,18 +265,19 @@ fn policies(definition: &Definition) -> impl Iterator<Item = &PolicyName> {
     definition.protocols.iter().flat_map(|protocol| &protocol.policies)
 }
 
-/// Checks that the reason for an unblinding, or for a change after one, names none of `policies`, because every export
-/// shows the reason.
+/// Checks that `words`, a "reason" or a "note" as `what` says, name none of `policies`, because every export shows
+/// them: the reason for an unblinding, and what is written after one.
 ///
 /// # Errors
-/// If the reason names one of the policies.
+/// If they name one of the policies.
 pub fn check_names_no_policy<'a>(
-    reason: &str,
+    what: &str,
+    words: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
 ) -> Result<(), Refusal> {
-    match named_policy(reason, policies) {
+    match named_policy(words, policies) {
         Some(policy) => Err(Refusal::Invalid(format!(
-            "the reason names the policy '{policy}', and every export shows the reason; remove the name"
+            "the {what} names the policy '{policy}', and every export shows the {what}; remove the name"
         ))),
         None => Ok(()),
     }
