@@ -88,6 +88,46 @@ fn a_policy_is_followed() {
     assert_eq!(fixture.script.seen(), [0.5, 0.6], "each frame is attributed to where the lens was");
 }
 
+#[test]
+fn where_a_session_has_left_the_lens_is_known_as_its_place_until_something_else_has_moved_it() {
+    // A third of the way is left after the next frame, and a hundredth after three.
+    let lens = FakeLens::at(power(0.5)).slow(Duration::from_millis(10), Duration::from_millis(30));
+    let mut fixture = Fixture::with_lens(PATIENT, lens);
+    let hold = Command::Drive { drive: Drive::Hold { at: None }, segment: None };
+    let segment = Some(SegmentId(Uuid::from_u128(1)));
+    let left = |fixture: &mut Fixture, frames: usize| {
+        let told = (0..frames).map(|_| {
+            fixture.step();
+            fixture.stepper.left_by_session()
+        });
+        told.collect::<Vec<bool>>()
+    };
+
+    fixture.stepper.obey(drive("scripted", None));
+    assert_eq!(left(&mut fixture, 5), [false; 5], "a policy outside sessions");
+    fixture.stepper.obey(drive("scripted", segment));
+    assert_eq!(left(&mut fixture, 2), [true; 2]);
+    fixture.stepper.obey(hold.clone());
+    assert_eq!(left(&mut fixture, 2), [true; 2]);
+
+    fixture.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.2)), segment: None });
+    assert_eq!(left(&mut fixture, 4), [true, true, false, false], "until it has arrived");
+
+    fixture.stepper.obey(drive("scripted", segment));
+    assert_eq!(left(&mut fixture, 5), [true; 5]);
+    fixture.stepper.obey(hold);
+    fixture.script.set(Deed::GoTo(0.9));
+    let seen = fixture.script.seen().len();
+    fixture.stepper.obey(drive("scripted", None));
+    assert_eq!(fixture.lens.position(), power(0.5), "a policy begins in the middle, not at that place");
+    assert_eq!(left(&mut fixture, 4).last(), Some(&false));
+    assert_eq!(fixture.script.seen().get(seen), Some(&0.5));
+
+    let back = Drive::Hold { at: Some(power(0.8)) };
+    fixture.stepper.obey(Command::Drive { drive: back, segment });
+    assert_eq!(left(&mut fixture, 4), [true; 4], "sent back after a restart to where the session's policy had it");
+}
+
 /// A policy that stays where it is, and records how many wider patches it got with each frame.
 struct Spectator {
     field_of_view: FieldOfView,

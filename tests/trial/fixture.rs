@@ -269,6 +269,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         },
         policy: None,
         focal_power: FocalPower::MIDDLE,
+        left_by_session: false,
         held: None,
         held_for: std::time::Duration::ZERO,
         message: None,

@@ -40,7 +40,10 @@ class Frame:
 
     @property
     def focal_power(self) -> float | None:
-        """Focal power, 0..1, at which it was exposed; None for surgeons and while a session is under way."""
+        """Focal power, 0..1, at which it was exposed.
+
+        None for surgeons, while a session is under way, and while the lens stands where a session has left it.
+        """
         measured = self.header.get("measured")
         return None if measured is None else float(measured)
 

@@ -116,7 +116,8 @@ pub fn check_while_on_screen(action: &Action) -> Result<(), Refusal> {
 
 /// Whether `role` may see the focal power on the live view, and everything else there that distinguishes policies:
 /// which policy runs, its focus metric, its belief, and how long its steps take. The surgeon never may. The others may
-/// not until the session is closed, because they can talk to the surgeon.
+/// not until the session is closed, because they can talk to the surgeon. Where the session has left the lens stays
+/// hidden even then; the control loop says for how long.
 pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None
 }

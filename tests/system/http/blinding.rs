@@ -1,11 +1,13 @@
 //! Blinding: reads every byte that the surgeon's browser gets in a whole session.
 
 use std::collections::{BTreeSet, HashSet};
+use std::sync::Arc;
 
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
 use super::live::{Heard, Page};
+use super::recordings::{abort, begin, post, start};
 use crate::support::{Server, client};
 
 /// Words that would reveal a policy, or how one works.
@@ -219,6 +221,44 @@ async fn during_a_session_the_operator_sees_nothing_that_distinguishes_policies(
         }
         assert_eq!(state["lens"]["working"], true, "that the lens works is the operator's business");
     }
+}
+
+#[tokio::test]
+async fn where_a_session_has_left_the_lens_is_hidden_until_something_else_has_moved_it() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let mut page = Page::open(&server, "operator").await;
+    page.until(|told| told["type"] == "session").await;
+    page.watch_until(|header| header["measured"].is_number()).await;
+
+    let session = begin(&server, "moving").await;
+    let view: Value = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().json().await.unwrap();
+    let tap = json!({"session": session, "action": "acknowledge", "segment": view["segment"]});
+    let tapped = server.post_as("surgeon", "/api/surgeon/actions").json(&tap).send().await.unwrap();
+    assert!(tapped.status().is_success());
+    page.until(|told| told["view"]["phase"] == "inspecting").await;
+    page.watch(10).await;
+    abort(&server, &session).await;
+    post(&server, "/api/operator/dismissals", json!({ "session": session })).await;
+    page.until(|told| told["type"] == "session" && told["view"].is_null()).await;
+
+    page.heard.clear();
+    page.watch(5).await;
+    page.until(|told| told["type"] == "status").await;
+    for heard in &page.heard {
+        let told = match heard {
+            Heard::Frame(header) => header.clone(),
+            Heard::Text(text) => serde_json::from_str(text).unwrap(),
+        };
+        for telling in ["asked", "measured", "metric", "focal_power", "latency_p50_micros", "lock"] {
+            assert!(told[telling].is_null(), "{telling} in {told}");
+        }
+    }
+
+    let (status, said) = post(&server, "/api/operator/focus", json!({"policy": "fixed"})).await;
+    assert_eq!(status, StatusCode::NO_CONTENT, "{said}");
+    let first = page.watch_until(|header| header["measured"].is_number()).await;
+    assert_eq!(first.header["measured"], 0.5, "a policy begins in the middle, not at the place that is hidden");
+    page.until(|told| told["policy"] == "fixed" && told["focal_power"] == 0.5).await;
 }
 
 /// `heard` in small letters, without the names of headers that every response has.

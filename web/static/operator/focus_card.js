@@ -19,10 +19,13 @@ const orders = new Orders(send);
 /** @type {Stream.OperatorStatus | null} */
 let status = null;
 let dragging = false;
+/** Whether the slider shows where the lens is. */
+let isPlaced = false;
 
 /**
  * Draws the policy and the focal power of the loop's status. During a session both are hidden. While it is paused, and
- * after an abort, the operator can still focus by hand.
+ * after an abort, the operator can still focus by hand. After a session the focal power stays hidden until somebody has
+ * chosen what focuses.
  *
  * @param {Stream.OperatorStatus} next
  * @param {Api.OperatorView | null} session
@@ -30,20 +33,23 @@ let dragging = false;
 export function drawFocus(next, session) {
   status = next;
   const { focal_power: power } = next;
-  // When a session is closed, the first status with a focal power arrives only after the message about it.
-  const untold = session !== null || power === null;
-  const wasUntold = policies.value === UNTOLD;
-  const mayFocus = !untold || session?.may_focus_by_hand === true;
+  const mayFocus = session === null || session.may_focus_by_hand;
   byId("focus-controls", HTMLFieldSetElement).disabled = !mayFocus;
-  byId("focus-card").classList.toggle("wanted", untold && mayFocus);
-  policies.disabled = untold;
-  byId("traces-hidden").hidden = !untold;
-  if (untold && mayFocus) {
-    drawByHand(session?.by_hand ?? null);
+  byId("focus-card").classList.toggle("wanted", session !== null && mayFocus);
+  policies.disabled = session !== null;
+  byId("traces-hidden").hidden = session === null && power !== null;
+  const until = session === null ? "until you choose what focuses" : "while a session runs";
+  setText(byId("traces-hidden"), `Focal path and timing are hidden ${until}.`);
+  if (!mayFocus) {
+    drawUntold();
     return;
   }
-  if (untold) {
-    drawUntold();
+  if (session !== null) {
+    drawByHand(session.by_hand ?? null);
+    return;
+  }
+  if (power === null) {
+    drawLeft(next);
     return;
   }
 
@@ -51,7 +57,8 @@ export function drawFocus(next, session) {
   setText(byId("focus-now"), `focal power ${text}`);
   if (dragging || orders.busy) return;
   policies.value = next.policy ?? BY_HAND;
-  if (next.policy === null && !wasUntold) return;
+  if (next.policy === null && isPlaced) return;
+  isPlaced = true;
   slider.value = String(power);
   setText(byId("focal-power-value"), text);
 }
@@ -62,6 +69,7 @@ export function drawFocus(next, session) {
  * @param {number | null} byHand
  */
 function drawByHand(byHand) {
+  isPlaced = false;
   setText(byId("focus-now"), "Move the slider to focus by hand.");
   if (dragging || orders.busy) return;
   policies.value = UNTOLD;
@@ -69,8 +77,23 @@ function drawByHand(byHand) {
   setText(byId("focal-power-value"), byHand === null ? "" : byHand.toFixed(3));
 }
 
+/**
+ * After a session the page does not show where its last policy left the lens.
+ *
+ * @param {Stream.OperatorStatus} next
+ */
+function drawLeft(next) {
+  isPlaced = false;
+  setText(byId("focus-now"), "Choose what focuses.");
+  if (dragging || orders.busy) return;
+  policies.value = next.policy ?? BY_HAND;
+  slider.value = String(MIDDLE);
+  setText(byId("focal-power-value"), "");
+}
+
 /** Clears the values from before the session, which would look like present ones. */
 function drawUntold() {
+  isPlaced = false;
   setText(byId("focus-now"), "The session controls the focus until you close it.");
   policies.value = UNTOLD;
   slider.value = String(MIDDLE);

@@ -52,7 +52,7 @@ pub enum Drive {
     Policy {
         /// Name of the policy.
         name: PolicyName,
-        /// Focal power to begin at; `None` for where the lens is.
+        /// Focal power to begin at; `None` for where the lens is, or for the middle while nobody may see where it is.
         start: Option<FocalPower>,
     },
     /// Nothing: no policy is asked, and the lens holds still (a paused session).
@@ -109,6 +109,9 @@ pub struct ControlledFrame {
     pub record: StepRecord,
     /// The policy's belief, if it has one.
     pub belief: Option<Arc<[f32]>>,
+    /// Whether the lens stands where a session's policy has left it. Until something else has moved it, nobody may see
+    /// where it stands.
+    pub left_by_session: bool,
 }
 
 /// The loop's state, published a few times a second and at every important change. Each role gets only a part of it.
@@ -126,6 +129,8 @@ pub struct ControlStatus {
     pub policy: Option<PolicyName>,
     /// The last focal power that the lens accepted.
     pub focal_power: FocalPower,
+    /// Whether the lens stands where a session's policy has left it, so that nobody may see where.
+    pub left_by_session: bool,
     /// Why the lens is held; `None` if it is not.
     pub held: Option<Hold>,
     /// How long the lens has been held without a break because of the policy, or without a break for other causes. If

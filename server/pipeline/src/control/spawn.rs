@@ -273,6 +273,7 @@ impl Worker {
             lens: self.stepper.lens_health(),
             policy: self.stepper.policy().cloned(),
             focal_power: self.stepper.focal_power(),
+            left_by_session: self.stepper.left_by_session(),
             held,
             held_for: self.held_since.map_or(Duration::ZERO, |(_, since)| now.since(since)),
             message: reason.map(|reason| reason.message.clone()),

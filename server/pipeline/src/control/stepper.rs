@@ -33,6 +33,9 @@ pub struct Stepper {
     /// Whether a frame was exposed after the lens had reached the policy's start. Until then the policy is not asked.
     placed: bool,
     segment: Option<SegmentId>,
+    /// Whether the lens stands where a session's policy has left it. That tells the policy, and an aborted session and
+    /// the one that takes its place have the same order.
+    left_by_session: bool,
     /// Where people have chosen to look.
     aim: Aim,
     /// Carries the patch along with the tissue, while it does.
@@ -67,6 +70,7 @@ impl Stepper {
             drive: Drive::Manual(start),
             placed: false,
             segment: None,
+            left_by_session: false,
             aim: Aim::default(),
             tracker: None,
             following: Following::Screen,
@@ -165,17 +169,38 @@ impl Stepper {
         self.wanted = match &drive {
             Drive::Manual(power) => *power,
             Drive::Hold { at } => at.unwrap_or(self.asked),
-            Drive::Policy { start, .. } => start.unwrap_or(self.asked),
+            Drive::Policy { start: Some(start), .. } => *start,
+            // Its path would begin at the place that nobody may see.
+            Drive::Policy { .. } if self.left_by_session && self.segment.is_none() => FocalPower::MIDDLE,
+            Drive::Policy { .. } => self.asked,
         };
         let policy = match &drive {
             Drive::Policy { name, .. } => Some(name.clone()),
             Drive::Manual(_) | Drive::Hold { .. } => None,
         };
 
+        self.left_by_session |= match &drive {
+            Drive::Policy { .. } => self.segment.is_some(),
+            // After a restart, a session sends the lens back to where its policy had it.
+            Drive::Hold { at } => at.is_some(),
+            Drive::Manual(_) => false,
+        };
         self.step_hold = None;
         self.placed = false;
         self.drive = drive;
         self.pilot.engage(policy);
+    }
+
+    /// Notes whether the lens has left the place where a session's policy left it, when `frame` was exposed.
+    fn notice_departure(&mut self, frame: &Frame) {
+        let moved_by_others = match self.drive {
+            Drive::Manual(_) => true,
+            Drive::Policy { .. } => self.segment.is_none(),
+            Drive::Hold { .. } => false,
+        };
+        if moved_by_others && self.asked == self.wanted && self.attribution.settled(frame.middle()) {
+            self.left_by_session = false;
+        }
     }
 
     /// Takes one step on `frame`.
@@ -190,6 +215,7 @@ impl Stepper {
         let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;
         let patch = self.follow(&frame.image, patch)?;
         self.notice_jump(patch);
+        self.notice_departure(&frame);
 
         let asks = self.asks_policy(&frame);
         let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
@@ -215,8 +241,16 @@ impl Stepper {
             patch: (column(patch.x), column(patch.y)),
         };
 
-        let belief = advice.and_then(|advice| advice.belief);
-        Ok(ControlledFrame { frame, patch, content_area, aim: self.aim, jumps: self.jumps, record, belief })
+        Ok(ControlledFrame {
+            frame,
+            patch,
+            content_area,
+            aim: self.aim,
+            jumps: self.jumps,
+            record,
+            belief: advice.and_then(|advice| advice.belief),
+            left_by_session: self.left_by_session,
+        })
     }
 
     /// Called while no frames come. Repeats the command to the lens, so that the slider works without a camera, and a
@@ -315,6 +349,11 @@ impl Stepper {
     /// The last focal power that the lens accepted.
     pub const fn focal_power(&self) -> FocalPower {
         self.asked
+    }
+
+    /// Whether the lens stands where a session's policy has left it.
+    pub const fn left_by_session(&self) -> bool {
+        self.left_by_session
     }
 
     /// What people can point at.

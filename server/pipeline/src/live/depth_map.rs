@@ -296,6 +296,7 @@ mod tests {
                 patch: (112, 48),
             },
             belief: None,
+            left_by_session: false,
         }
     }
 

@@ -41,7 +41,7 @@ impl FrameEncoder {
     /// # Errors
     /// If the picture cannot be encoded.
     pub(super) fn encode(&mut self, controlled: ControlledFrame) -> Result<EncodedFrame, JpegError> {
-        let ControlledFrame { frame, patch, content_area, aim, record, belief, .. } = controlled;
+        let ControlledFrame { frame, patch, content_area, aim, record, belief, left_by_session, .. } = controlled;
 
         let (width, height, jpeg) = match (&frame.image, &self.picture) {
             (FrameImage::Rgb(rgb), _) => (rgb.width, rgb.height, self.encoder.encode(rgb)?),
@@ -69,6 +69,7 @@ impl FrameEncoder {
                 metric: record.metric,
                 held: record.held,
                 belief,
+                left_by_session,
             },
         })
     }

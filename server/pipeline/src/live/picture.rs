@@ -49,6 +49,8 @@ pub struct Insight {
     pub held: Option<Hold>,
     /// The policy's belief, if it has one.
     pub belief: Option<Arc<[f32]>>,
+    /// Whether the lens stood where a session's policy had left it, so that nobody may see where.
+    pub left_by_session: bool,
 }
 
 /// One frame, made once for all viewers.

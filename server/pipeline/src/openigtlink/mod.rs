@@ -197,7 +197,8 @@ impl FramePublisher {
         let age = SignedDuration::try_from(now.since(frame.frame.exposed_at)).unwrap_or_default();
         let at = source.clock.wall().checked_sub(age).unwrap_or_default();
         let number = frame.frame.number as u32;
-        let focal_power = frame.record.measured.filter(|_| !(source.blinded)()).map(f64::from);
+        let hidden = frame.left_by_session || (source.blinded)();
+        let focal_power = frame.record.measured.filter(|_| !hidden).map(f64::from);
 
         match &frame.frame.image {
             FrameImage::Rgb(picture) => FrameMessages::new(picture, 1.0, at, number, focal_power),

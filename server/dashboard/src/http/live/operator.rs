@@ -35,7 +35,8 @@ pub(super) struct OperatorFrame {
     picture: SurgeonFrame,
     /// Why the lens was held, if it was; while a session is under way, never a reason that lies with the policy.
     held: Option<Hold>,
-    /// What the loop did with the frame; every field is null while a session is under way.
+    /// What the loop did with the frame; every field is null while a session is under way, and while the lens stands
+    /// where one has left it.
     #[serde(flatten)]
     seen: RevealingValues,
 }
@@ -76,7 +77,7 @@ pub(super) struct OperatorStatus {
     lens: LensHealth,
     /// Policy in charge, if there is one and it may be told.
     policy: Option<PolicyName>,
-    /// Last focal power asked for; not while a session is under way.
+    /// Last focal power asked for; not while a session is under way, nor while the lens stands where one has left it.
     focal_power: Option<FocalPower>,
     /// Why the lens is being held, if it is; while a session is under way, see [`told_in_session`].
     held: Option<Hold>,
@@ -114,22 +115,24 @@ impl OperatorStatus {
             Some(hold) if blinded => told_in_session(hold, status.held_for, status.message.as_ref()),
             held => (held, status.message.clone()),
         };
+        // After a session, what its last policy has left hides for as long as the lens stands there.
+        let hidden = blinded || status.left_by_session;
 
         Self {
             camera: status.camera.clone(),
             camera_offer: status.camera_offer.clone(),
             lens: status.lens.clone(),
             policy: status.policy.clone().filter(|_| !blinded),
-            focal_power: (!blinded).then_some(status.focal_power),
+            focal_power: (!hidden).then_some(status.focal_power),
             held,
             message,
             steps_per_second: status.steps_per_second,
             steps: status.steps,
             telemetry_dropped: status.telemetry_dropped,
-            latency_p50_micros: (!blinded).then_some(status.latency_p50_micros),
-            latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
+            latency_p50_micros: (!hidden).then_some(status.latency_p50_micros),
+            latency_p99_micros: (!hidden).then_some(status.latency_p99_micros),
             priority: Priority { standing: status.priority, message: status.priority.words() },
-            lock: (!blinded).then_some(status.lock),
+            lock: (!hidden).then_some(status.lock),
             following: (!blinded).then_some(status.following),
             certificate_until,
             tablet,
@@ -164,7 +167,7 @@ impl Audience for ForOperator {
     fn header(frame: &EncodedFrame, journey: Journey, depths: Option<Arc<DepthMap>>, app: &App) -> OperatorFrame {
         // Ask only once: a session may begin between two questions.
         let blinded = app.blinded();
-        let (journey, seen) = if blinded {
+        let (journey, seen) = if blinded || frame.insight.left_by_session {
             (coarse(journey), RevealingValues::default())
         } else {
             (journey, RevealingValues::new(&frame.insight, depths))
