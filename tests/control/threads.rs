@@ -163,6 +163,29 @@ fn a_slow_start_after_a_long_pause_is_not_a_long_hold() {
 }
 
 #[test]
+fn when_a_status_comes_does_not_depend_on_what_the_policy_does() {
+    let mut stage = Stage::new(16);
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.policy.is_some() && record.held.is_none());
+    stage.status_until(|status| status.policy.is_some());
+
+    let mut times = Vec::new();
+    while times.len() < 5 {
+        for (deed, slow) in [(Deed::Hang, true), (Deed::GoTo(0.7), false)] {
+            stage.script.set(deed);
+            while (stage.shoot().record.held == Some(Hold::PolicySlow)) != slow {
+                times.push(stage.handle.status.borrow().at);
+            }
+            times.push(stage.handle.status.borrow().at);
+        }
+        times.dedup();
+    }
+
+    let apart = times.windows(2).map(|pair| pair[1].since(pair[0]));
+    assert!(apart.clone().all(|apart| apart >= Duration::from_millis(200)), "{:?}", apart.collect::<Vec<_>>());
+}
+
+#[test]
 fn a_hanging_policy_does_not_keep_the_loop_from_ending() {
     let stage = Stage::new(16);
     stage.script.set(Deed::Hang);

@@ -226,7 +226,8 @@ impl Worker {
         }
     }
 
-    /// Publishes the status if it is due, or if something changed that people must see at once.
+    /// Publishes the status if it is due, or if something changed that people must see at once. What the policy does is
+    /// not among that: when statuses come would tell which one runs.
     fn publish(&mut self, publisher: &watch::Sender<Arc<ControlStatus>>) {
         let now = self.clock.now();
         let reason = self.hold_reason();
@@ -237,12 +238,11 @@ impl Worker {
 
         let changed = {
             let last = publisher.borrow();
-            let reason = self.hold_reason();
-            last.held != reason.map(|reason| reason.hold)
-                || last.message.as_ref() != reason.map(|reason| &reason.message)
+            let reason = self.hold_reason().filter(|reason| !reason.hold.caused_by_policy());
+            last.held.filter(|held| !held.caused_by_policy()) != reason.map(|reason| reason.hold)
+                || reason.is_some_and(|reason| last.message.as_ref() != Some(&reason.message))
                 || last.policy.as_ref() != self.stepper.policy()
                 || last.geometry != self.stepper.geometry()
-                || last.lock != self.lock.told()
                 || last.following != self.stepper.following()
         };
         if !changed && now.since(self.published_at) < STATUS_INTERVAL {
