@@ -159,6 +159,7 @@ impl From<ConductError> for Error {
             ConductError::Invalid(text) => Self::Invalid(text),
             ConductError::Storage(text) => Self::Storage(text),
             ConductError::Said(kind, message) => Self::Said(kind, message),
+            ConductError::Damaged(text) => Self::Unreadable(text),
             unreadable @ ConductError::Unreadable { .. } => Self::Unreadable(unreadable.to_string()),
         }
     }

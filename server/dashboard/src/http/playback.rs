@@ -15,20 +15,8 @@ use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::{Circle, Size};
 use parfocal_records::store::Access;
-use parfocal_session::playback::{PlaceSpectrum, PlaybackError, SessionRecordings};
+use parfocal_session::playback::{PlaceSpectrum, SessionRecordings};
 use parfocal_trial::role::Role;
-
-impl From<PlaybackError> for Error {
-    fn from(error: PlaybackError) -> Self {
-        match error {
-            PlaybackError::Session(error) => error.into(),
-            PlaybackError::NotFound(text) => Self::NotFound(text),
-            PlaybackError::Place(bad) => Self::Invalid(bad.to_string()),
-            PlaybackError::Unreadable(text) => Self::Unreadable(text),
-            PlaybackError::Ending => Self::Unreadable(error.to_string()),
-        }
-    }
-}
 
 /// The recordings of an unblinded session, with the times of their frames. Each access is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/recordings", tag = "researcher",

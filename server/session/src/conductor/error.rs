@@ -26,6 +26,9 @@ pub enum ConductError {
     /// The disk or database failed; nothing was acknowledged.
     #[error("could not be saved: {0}")]
     Storage(String),
+    /// A recording cannot be read; the text says why.
+    #[error("{0}")]
+    Damaged(String),
     /// The session's protocol is of another version or is damaged.
     #[error(
         "session {session} was made with a protocol that this version cannot read ({reason}); \
@@ -40,6 +43,11 @@ pub enum ConductError {
 }
 
 impl ConductError {
+    /// The server ends before it has an answer.
+    pub(crate) fn ending() -> Self {
+        Self::Damaged("the server is ending".to_owned())
+    }
+
     pub(crate) fn no_session() -> Self {
         Self::Said(RefusalKind::Unknown, Message::new("refused-no-session"))
     }

@@ -2,12 +2,10 @@
 //! over any recording. The page gets nothing else from a recording. The focal power comes with the timeline, under its
 //! rules.
 
-mod error;
 mod player;
 mod projector;
 mod spectrum;
 pub mod stepping;
 
-pub use error::PlaybackError;
 pub use player::{Player, RecordingCourse, SessionRecordings};
 pub use spectrum::{BandLevel, PlaceSpectrum};

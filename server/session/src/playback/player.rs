@@ -9,9 +9,9 @@ use serde::Serialize;
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
-use super::error::PlaybackError;
 use super::projector::Projector;
 use super::spectrum::PlaceSpectrum;
+use crate::conductor::ConductError;
 use crate::reports::{Played, Reports};
 use parfocal_base::ids::SessionId;
 use parfocal_imaging::{Circle, Size};
@@ -68,14 +68,14 @@ impl Player {
     ///
     /// # Errors
     /// If `by` may not play them (yet), there is no such session, or the database failed.
-    pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, PlaybackError> {
+    pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, ConductError> {
         let played = self.0.reports.to_play(by, session).await?;
         let folder = self.0.folder.clone();
         let found = spawn_blocking(move || {
             of_session(&folder, &session.to_string()).map(|found| session_recordings(found, &played))
         });
 
-        let found = found.await.map_err(|_| PlaybackError::Ending)?;
+        let found = found.await.map_err(|_| ConductError::ending())?;
         Ok(found.unwrap_or_else(|error| SessionRecordings {
             recordings: Vec::new(),
             problems: vec![format!("The recordings could not be listed: {error}.")],
@@ -94,7 +94,7 @@ impl Player {
         name: &str,
         number: usize,
         size: Size,
-    ) -> Result<Bytes, PlaybackError> {
+    ) -> Result<Bytes, ConductError> {
         let folder = self.folder(by, session, name).await?;
         self.0.projector.ask(folder, move |open| open.picture(number, size)).await
     }
@@ -110,24 +110,24 @@ impl Player {
         name: &str,
         number: usize,
         circle: Circle,
-    ) -> Result<PlaceSpectrum, PlaybackError> {
+    ) -> Result<PlaceSpectrum, ConductError> {
         let folder = self.folder(by, session, name).await?;
         self.0.projector.ask(folder, move |open| open.spectrum(number, circle)).await
     }
 
     /// The folder of recording `name` of `session`, if `by` may play it.
-    async fn folder(&self, by: Role, session: SessionId, name: &str) -> Result<PathBuf, PlaybackError> {
+    async fn folder(&self, by: Role, session: SessionId, name: &str) -> Result<PathBuf, ConductError> {
         self.check(by, session).await?;
 
         let recordings = self.0.folder.clone();
         let named = name.to_owned();
         let folder = spawn_blocking(move || belonging(&recordings, &named, &session.to_string())).await;
-        folder.map_err(|_| PlaybackError::Ending)?.ok_or_else(|| {
-            PlaybackError::NotFound(format!("the session has no recording {name} in the folder {FOLDER} any more"))
+        folder.map_err(|_| ConductError::ending())?.ok_or_else(|| {
+            ConductError::NotFound(format!("the session has no recording {name} in the folder {FOLDER} any more"))
         })
     }
 
-    async fn check(&self, by: Role, session: SessionId) -> Result<(), PlaybackError> {
+    async fn check(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
         let known = by == Role::Researcher && self.playable().contains(&session);
         if known {
             // The participant may have withdrawn since, even while the recording is playing.

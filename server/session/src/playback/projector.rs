@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot};
 
-use super::error::PlaybackError;
 use super::spectrum::PlaceSpectrum;
+use crate::conductor::ConductError;
 use parfocal_base::priority;
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{
@@ -44,16 +44,16 @@ impl Projector {
     pub async fn ask<T: Send + 'static>(
         &self,
         folder: PathBuf,
-        look: impl Fn(&mut Open) -> Result<T, PlaybackError> + Send + 'static,
-    ) -> Result<T, PlaybackError> {
+        look: impl Fn(&mut Open) -> Result<T, ConductError> + Send + 'static,
+    ) -> Result<T, ConductError> {
         let (reply, found) = oneshot::channel();
         let job: Job = Box::new(move |open| {
             if !reply.is_closed() {
                 let _ = reply.send(look_into(open, &folder, look));
             }
         });
-        self.jobs.send(job).await.map_err(|_| PlaybackError::Ending)?;
-        found.await.map_err(|_| PlaybackError::Ending)?
+        self.jobs.send(job).await.map_err(|_| ConductError::ending())?;
+        found.await.map_err(|_| ConductError::ending())?
     }
 }
 
@@ -75,8 +75,8 @@ pub(super) struct Open {
 fn look_into<T>(
     open: &mut Vec<Open>,
     folder: &Path,
-    look: impl Fn(&mut Open) -> Result<T, PlaybackError>,
-) -> Result<T, PlaybackError> {
+    look: impl Fn(&mut Open) -> Result<T, ConductError>,
+) -> Result<T, ConductError> {
     let place = open.iter().position(|open| open.recording.folder() == folder);
     let mut found = match place {
         Some(place) => open.remove(place),
@@ -84,7 +84,7 @@ fn look_into<T>(
     };
 
     let mut seen = look(&mut found);
-    if matches!(seen, Err(PlaybackError::NotFound(_))) {
+    if matches!(seen, Err(ConductError::NotFound(_))) {
         // The recording may have grown since it was opened.
         found = Open::new(folder)?;
         seen = look(&mut found);
@@ -97,7 +97,7 @@ fn look_into<T>(
 }
 
 impl Open {
-    fn new(folder: &Path) -> Result<Self, PlaybackError> {
+    fn new(folder: &Path) -> Result<Self, ConductError> {
         let recording = AnyRecording::open(folder).map_err(unreadable)?;
         let mosaics = match &recording {
             AnyRecording::Mosaic(recording) => Some(MosaicDeveloper::new(recording)?),
@@ -107,20 +107,21 @@ impl Open {
     }
 
     /// Frame `number`, from 0, as a JPEG; a mosaic developed at `size`.
-    pub fn picture(&mut self, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
+    pub fn picture(&mut self, number: usize, size: Size) -> Result<Bytes, ConductError> {
         match (&self.recording, &mut self.mosaics) {
             (AnyRecording::View(recording), _) => recording.picture(number).map(Bytes::from).map_err(unreadable),
             (AnyRecording::Mosaic(recording), Some(mosaics)) => mosaics.picture(recording, number, size),
-            (AnyRecording::Mosaic(_), None) => Err(PlaybackError::Ending),
+            (AnyRecording::Mosaic(_), None) => Err(ConductError::ending()),
         }
     }
 
     /// The spectrum of frame `number`, from 0, within `circle`.
-    pub fn spectrum(&mut self, number: usize, circle: Circle) -> Result<PlaceSpectrum, PlaybackError> {
+    pub fn spectrum(&mut self, number: usize, circle: Circle) -> Result<PlaceSpectrum, ConductError> {
         let (AnyRecording::Mosaic(recording), Some(mosaics)) = (&self.recording, &mut self.mosaics) else {
-            return Err(PlaybackError::NotFound("a recording of the view has no spectra, only colours".to_owned()));
+            return Err(ConductError::NotFound("a recording of the view has no spectra, only colours".to_owned()));
         };
-        let mut sum = SpectrumSum::new(&mosaics.calibration, circle, recording.size())?;
+        let sum = SpectrumSum::new(&mosaics.calibration, circle, recording.size());
+        let mut sum = sum.map_err(|bad| ConductError::Invalid(bad.to_string()))?;
         sum.add(read(&mut mosaics.latest, recording, number)?);
         Ok(PlaceSpectrum::new(&mosaics.calibration, &sum.spectrum()))
     }
@@ -139,20 +140,20 @@ struct MosaicDeveloper {
 }
 
 impl MosaicDeveloper {
-    fn new(recording: &Recording) -> Result<Self, PlaybackError> {
+    fn new(recording: &Recording) -> Result<Self, ConductError> {
         let calibration = calibration::read(&recording.calibration())
-            .map_err(|error| PlaybackError::Unreadable(format!("the recording's calibration: {error}")))?;
-        let encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY)
-            .map_err(|error| PlaybackError::Unreadable(error.to_string()))?;
+            .map_err(|error| ConductError::Damaged(format!("the recording's calibration: {error}")))?;
+        let encoder =
+            JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY).map_err(|error| ConductError::Damaged(error.to_string()))?;
 
         let developer = Developer::new(&calibration);
         Ok(Self { calibration, developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default(), latest: None })
     }
 
-    fn picture(&mut self, recording: &Recording, number: usize, size: Size) -> Result<Bytes, PlaybackError> {
+    fn picture(&mut self, recording: &Recording, number: usize, size: Size) -> Result<Bytes, ConductError> {
         let mosaic = read(&mut self.latest, recording, number)?;
         self.developer.develop(mosaic, size, &mut self.rgb, &mut self.gray);
-        self.encoder.encode(&self.rgb).map_err(|error| PlaybackError::Unreadable(error.to_string()))
+        self.encoder.encode(&self.rgb).map_err(|error| ConductError::Damaged(error.to_string()))
     }
 }
 
@@ -161,7 +162,7 @@ fn read<'a>(
     latest: &'a mut Option<(usize, MosaicFrame)>,
     recording: &Recording,
     number: usize,
-) -> Result<&'a MosaicFrame, PlaybackError> {
+) -> Result<&'a MosaicFrame, ConductError> {
     let kept = latest.take().filter(|(kept, _)| *kept == number);
     let frame = match kept {
         Some(frame) => frame,
@@ -170,9 +171,9 @@ fn read<'a>(
     Ok(&latest.insert(frame).1)
 }
 
-fn unreadable(error: RecordingError) -> PlaybackError {
+fn unreadable(error: RecordingError) -> ConductError {
     match error {
-        RecordingError::NoFrame { .. } | RecordingError::NoRecording(_) => PlaybackError::NotFound(error.to_string()),
-        error => PlaybackError::Unreadable(error.to_string()),
+        RecordingError::NoFrame { .. } | RecordingError::NoRecording(_) => ConductError::NotFound(error.to_string()),
+        error => ConductError::Damaged(error.to_string()),
     }
 }
