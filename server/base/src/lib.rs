@@ -5,13 +5,14 @@
 //! name a policy or a focal power without the cameras, the lenses and the networks behind it.
 //!
 //! The tools are the two clocks ([`clock`]), files written whole ([`files`]), device options ([`options`]), messages on
-//! standard error ([`notices`]), thread priorities ([`priority`]), the one SVG writer ([`plot`]) and the statistics that
-//! evaluations and studies share ([`statistics`]).
+//! standard error ([`notices`]), panics as errors ([`guarded()`]), thread priorities ([`priority`]), the one SVG writer
+//! ([`plot`]) and the statistics that evaluations and studies share ([`statistics`]).
 
 mod blur_rate;
 pub mod clock;
 pub mod files;
 mod focal_power;
+mod guarded;
 pub mod ids;
 pub mod notices;
 pub mod options;
@@ -29,6 +30,7 @@ pub mod step;
 pub use async_recursion::async_recursion as boxed;
 pub use blur_rate::BlurRate;
 pub use focal_power::{FocalPower, IN_FOCUS, OutOfRange};
+pub use guarded::guarded;
 pub use patch_place::PatchPlace;
 pub use policy_name::PolicyName;
 

@@ -75,6 +75,11 @@ impl RecordingError {
         Self::Failed(format!("{path}: {damage}; restore it from a copy, or leave these frames out"))
     }
 
+    /// The error of a thread that panicked with `message`.
+    pub fn panicked(message: &str) -> Self {
+        Self::Failed(format!("the program failed: {message}"))
+    }
+
     /// The error for a codec that failed, which is an error of the program.
     pub(crate) fn codec(problem: impl Display) -> Self {
         Self::Failed(format!("the recording's codec failed: {problem}"))

@@ -16,7 +16,7 @@ use super::header::Ended;
 use super::writing::Writer;
 use parfocal_base::FocalPower;
 use parfocal_base::clock::Moment;
-use parfocal_base::priority;
+use parfocal_base::{guarded, priority};
 use parfocal_imaging::MosaicFrame;
 
 /// Frames that may wait to be compressed: a third of a second at 25 a second. The camera reuses their memory.
@@ -197,7 +197,8 @@ impl Compressor {
                 Err(_) => return,
             };
 
-            let compressed = self.compress(&shot);
+            let compressed = guarded(|| self.compress(&shot));
+            let compressed = compressed.unwrap_or_else(|panic| Err(RecordingError::panicked(&panic)));
             let last = compressed.is_err();
             if self.compressed.send(compressed).is_err() || last {
                 return;
@@ -226,8 +227,17 @@ struct Storer {
 }
 
 impl Storer {
-    fn run(mut self) {
+    fn run(self) {
         priority::lower();
+        let progress = Arc::clone(&self.progress);
+        // Otherwise the recording would seem to go on.
+        if let Err(panic) = guarded(|| self.record()) {
+            let problem = RecordingError::panicked(&panic).to_string();
+            progress.lock().unwrap_or_else(PoisonError::into_inner).ended = Some(Ended::Failed(problem));
+        }
+    }
+
+    fn record(mut self) {
         let ended = loop {
             match self.compressed.recv() {
                 Ok(Ok((row, frame))) => {

@@ -18,7 +18,6 @@ pub use eye::Eye;
 pub(crate) use eye::cells;
 pub use lock::{FocusLock, LockWatch};
 pub use pilot::HoldReason;
-pub(crate) use runner::guarded;
 pub use runner::keep_policies_quiet;
 pub use slot::LatestSlot;
 pub use spawn::{ControlLoop, LoopSettings, Rig};

@@ -1,8 +1,6 @@
 //! A thread that runs one instance of a policy, so that an instance that hangs or panics stops nothing else.
 
-use std::any::Any;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
@@ -15,6 +13,7 @@ use parfocal_autofocus::{FieldOfView, Observation, Policy, PolicyError, Registry
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::guarded;
 use parfocal_base::priority::{self, ThreadRole};
 use parfocal_imaging::View;
 
@@ -204,15 +203,4 @@ pub fn keep_policies_quiet() {
             usual(panic);
         }
     }));
-}
-
-/// Runs `risky` and turns a panic into an error with its message.
-pub fn guarded<T>(risky: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(risky)).map_err(|payload| message(&*payload))
-}
-
-fn message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("no message").to_owned()
 }

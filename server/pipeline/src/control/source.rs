@@ -9,7 +9,7 @@ use std::{io, thread};
 use arc_swap::ArcSwap;
 
 use super::LatestSlot;
-use super::runner::guarded;
+use parfocal_base::guarded;
 use parfocal_base::priority::{self, ThreadRole};
 use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame, LEAST_FPS};
 

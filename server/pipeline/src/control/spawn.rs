@@ -11,7 +11,6 @@ use tokio::sync::{mpsc, watch};
 use super::eye::Eye;
 use super::lock::LockWatch;
 use super::pilot::HoldReason;
-use super::runner::guarded;
 use super::source::FrameSource;
 use super::stepper::Stepper;
 use super::tap::Tap;
@@ -19,6 +18,7 @@ use super::window::LatencyWindow;
 use super::{Command, ControlHandle, ControlStatus, ControlledFrame, LatestSlot};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::guarded;
 use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
@@ -170,11 +170,8 @@ impl Worker {
         self.priority = priority::raise(ThreadRole::Loop);
         while !stop.load(Ordering::Relaxed) {
             let frame = self.source.frames.take(TICK);
-            while let Ok(command) = commands.try_recv() {
-                self.stepper.obey(command);
-            }
-            // The last line of defence: if a frame causes a panic, the loop continues with the next one.
-            if let Err(panic) = guarded(|| self.turn(frame, publisher)) {
+            // The last line of defence: if a frame or a command causes a panic, the loop continues with the next one.
+            if let Err(panic) = guarded(|| self.turn(frame, &mut commands, publisher)) {
                 tracing::error!(panic, "a step of the control loop failed");
             }
         }
@@ -188,7 +185,15 @@ impl Worker {
         }
     }
 
-    fn turn(&mut self, frame: Option<Frame>, publisher: &watch::Sender<Arc<ControlStatus>>) {
+    fn turn(
+        &mut self,
+        frame: Option<Frame>,
+        commands: &mut mpsc::UnboundedReceiver<Command>,
+        publisher: &watch::Sender<Arc<ControlStatus>>,
+    ) {
+        while let Ok(command) = commands.try_recv() {
+            self.stepper.obey(command);
+        }
         match frame {
             Some(frame) => self.step(frame),
             None => self.wait_on(),

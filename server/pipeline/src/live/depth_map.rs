@@ -9,12 +9,12 @@ use serde::Serialize;
 use tokio::sync::watch;
 
 use super::frame_thread::{FrameSlot, FrameThread};
-use crate::control::{ControlledFrame, Eye, cells, guarded};
+use crate::control::{ControlledFrame, Eye, cells};
 use parfocal_autofocus::belief::{SURE, Sides};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Policy, PolicyError, Registry};
 use parfocal_base::clock::Moment;
-use parfocal_base::{FocalPower, PolicyName};
+use parfocal_base::{FocalPower, PolicyName, guarded};
 use parfocal_imaging::{ContentArea, PATCH_SIDE, PatchArea};
 
 /// The policy whose belief is asked at each place.

@@ -7,8 +7,9 @@ use std::time::Duration;
 use super::frame_encoder::FrameEncoder;
 use super::frame_thread::{FrameSlot, FrameThread};
 use super::publisher::Publisher;
-use crate::control::{ControlledFrame, guarded};
+use crate::control::ControlledFrame;
 use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::guarded;
 use parfocal_imaging::{Developer, Size};
 
 /// Longest wait for a frame before checking whether more will come.

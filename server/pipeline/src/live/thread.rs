@@ -13,9 +13,10 @@ use super::frame_encoder::FrameEncoder;
 use super::larger_size::LargerSize;
 use super::publisher::Publisher;
 use super::{Counts, LiveHandle};
-use crate::control::{Command, ControlHandle, ControlledFrame, Eye, guarded};
+use crate::control::{Command, ControlHandle, ControlledFrame, Eye};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::Clock;
+use parfocal_base::guarded;
 use parfocal_imaging::{Developer, Size, content_area};
 
 /// Frames from one search for the content area to the next. The area moves slowly, as the eyepiece slips in a hand.

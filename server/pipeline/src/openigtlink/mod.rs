@@ -23,6 +23,7 @@ use self::frame_messages::FrameMessages;
 use crate::control::{ControlStatus, ControlledFrame};
 use crate::live::LiveHandle;
 use parfocal_base::clock::Clock;
+use parfocal_base::guarded;
 use parfocal_base::priority;
 use parfocal_base::step::Hold;
 use parfocal_devices::camera::FrameImage;
@@ -177,9 +178,12 @@ impl FramePublisher {
                 }
 
                 let frame = frames.borrow_and_update().clone();
-                if let Some(frame) = frame {
-                    let messages = self.messages_of(&frame, source, &mut rgb, &mut gray);
+                let Some(frame) = frame else { continue };
+                // One bad picture must not end the thread: its clients would get no more.
+                if let Ok(messages) = guarded(|| self.messages_of(&frame, source, &mut rgb, &mut gray)) {
                     self.messages.send_replace(Some(Arc::new(messages)));
+                } else {
+                    tracing::error!("OpenIGTLink: a picture could not be made; continuing with the next");
                 }
             }
             self.messages.send_replace(None);

@@ -8,7 +8,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::spectrum::PlaceSpectrum;
 use crate::conductor::ConductError;
-use parfocal_base::priority;
+use parfocal_base::{guarded, priority};
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{
     Calibration, Circle, Developer, GrayImage, JpegEncoder, MosaicFrame, RgbImage, Size, SpectrumSum,
@@ -49,7 +49,7 @@ impl Projector {
         let (reply, found) = oneshot::channel();
         let job: Job = Box::new(move |open| {
             if !reply.is_closed() {
-                let _ = reply.send(look_into(open, &folder, look));
+                let _ = reply.send(guarded(|| look_into(open, &folder, look)).unwrap_or_else(|_| Err(failed())));
             }
         });
         self.jobs.send(job).await.map_err(|_| ConductError::ending())?;
@@ -171,9 +171,48 @@ fn read<'a>(
     Ok(&latest.insert(frame).1)
 }
 
+/// After a panic. The recording that was looked into is closed, so it is opened anew for the next look.
+fn failed() -> ConductError {
+    ConductError::Damaged("the program failed at this frame; the server's log says how".to_owned())
+}
+
 fn unreadable(error: RecordingError) -> ConductError {
     match error {
         RecordingError::NoFrame { .. } | RecordingError::NoRecording(_) => ConductError::NotFound(error.to_string()),
         error => ConductError::Damaged(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use parfocal_recording::{Ended, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewWriter};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_look_that_panics_is_an_error_and_the_next_one_is_answered() {
+        let temporary = tempfile::tempdir().unwrap();
+        let folder = temporary.path().join("view");
+        let header = ViewHeader {
+            format: VIEW_FORMAT.to_owned(),
+            version: VIEW_VERSION,
+            software: "a test".to_owned(),
+            started: "2026-03-01T12:00:00Z".parse().unwrap(),
+            camera: "a test's".to_owned(),
+            session: None,
+            run: None,
+            monotonic_ns: None,
+            ended: None,
+        };
+        let jpeg = [0xFF, 0xD8, 0xFF, 0xD9];
+        let mut writer = ViewWriter::create(&folder, header).unwrap();
+        writer.add(1, 0, (1, 1), &jpeg).unwrap();
+        writer.finish(Ended::Stopped).unwrap();
+
+        let projector = Projector::start().unwrap();
+        let failed = projector.ask(folder.clone(), |_| -> Result<(), _> { panic!("as the test asked") }).await;
+        assert!(matches!(failed, Err(ConductError::Damaged(_))), "{failed:?}");
+        let seen = projector.ask(folder, |open| open.picture(0, Size::Cell)).await;
+        assert_eq!(seen.unwrap(), Bytes::copy_from_slice(&jpeg));
     }
 }

@@ -9,7 +9,7 @@ use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
 use parfocal_base::clock::Moment;
-use parfocal_base::priority;
+use parfocal_base::{guarded, priority};
 use parfocal_pipeline::live::Follower;
 use parfocal_recording::{Ended, RecordingError, RecordingProgress, Room, ViewWriter, room};
 
@@ -33,9 +33,14 @@ impl ViewRecorder {
 
         let runtime = Handle::current();
         let worker = Worker { writer, follower, start, progress: Arc::clone(&progress), stop: Arc::clone(&stop) };
+        let told = Arc::clone(&progress);
         let thread = std::thread::Builder::new().name("recording-view".into()).spawn(move || {
             priority::lower();
-            runtime.block_on(worker.run());
+            // Otherwise the recording would seem to go on.
+            if let Err(panic) = guarded(|| runtime.block_on(worker.run())) {
+                let problem = RecordingError::panicked(&panic).to_string();
+                told.lock().unwrap_or_else(PoisonError::into_inner).ended = Some(Ended::Failed(problem));
+            }
         });
 
         let thread = thread.map_err(|error| RecordingError::unwritable(&folder, 0, &error))?;

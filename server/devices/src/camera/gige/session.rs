@@ -11,6 +11,7 @@ use super::shared::{Shared, words};
 use super::timestamps::Timestamps;
 use crate::camera::pool::MosaicPool;
 use crate::camera::{Frame, FrameImage, Setting};
+use parfocal_base::guarded;
 use parfocal_imaging::MosaicFrame;
 
 /// The thread checks for requests at least this often.
@@ -31,7 +32,7 @@ pub fn run(shared: &Shared, setup: &Setup, device: Option<Device>, size: (usize,
     let mut connected = device;
 
     while !shared.stopping() {
-        let trouble = match connected.take().map_or_else(|| Device::open(setup), Ok) {
+        let attempt = || match connected.take().map_or_else(|| Device::open(setup), Ok) {
             Ok(device) if (device.width, device.height) != size => format!(
                 "the camera's picture is {}x{}, but the server was started for {}x{}: start it again while the camera \
                  is on, or give width and height",
@@ -43,6 +44,7 @@ pub fn run(shared: &Shared, setup: &Setup, device: Option<Device>, size: (usize,
             }
             Err(error) => error.to_string(),
         };
+        let trouble = guarded(attempt).unwrap_or_else(|panic| format!("its driver failed: {panic}"));
 
         shared.controls.offer(Vec::new());
         shared.set_condition(Err(trouble.into()));

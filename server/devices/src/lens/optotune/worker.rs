@@ -1,7 +1,6 @@
 //! The thread that talks to the driver: connects, sends commands, takes readings between them, and reconnects.
 
 use std::convert::Infallible;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,6 +12,7 @@ use super::port::{Address, Port};
 use super::shared::{Device, Shared};
 use crate::lens::LensError;
 use parfocal_base::clock::Moment;
+use parfocal_base::guarded;
 
 /// Wait before the first attempt to reconnect. It doubles up to [`BACKOFF_MOST`].
 const BACKOFF_FIRST: Duration = Duration::from_millis(50);
@@ -49,7 +49,7 @@ pub fn run(shared: &Shared, address: &Address, settings: &DriverSettings) {
     loop {
         let mut link = None;
         let attempt = || attend(shared, &located(address, &mut found)?, settings, &mut link, &mut backoff);
-        match catch_unwind(AssertUnwindSafe(attempt)) {
+        match guarded(attempt) {
             Ok(Err(trouble)) => shared.lost(trouble),
             Err(_) => shared.lost(LensError::Gone("its driver failed".into())),
         }
@@ -110,7 +110,7 @@ fn let_go(shared: &Shared, path: Option<&Path>, settings: &DriverSettings, link:
 }
 
 fn close(mut link: Link) -> Result<(), String> {
-    match catch_unwind(AssertUnwindSafe(|| link.close())) {
+    match guarded(|| link.close()) {
         Ok(told) => told.map_err(|error| error.to_string()),
         Err(_) => Err("its driver failed".to_owned()),
     }
