@@ -235,8 +235,8 @@ impl<'a> Session<'a> {
 const fn steps(seen: Option<u64>, now: u64) -> u64 {
     match seen {
         Some(seen) if now > seen => now - seen,
-        // The number rolled over, unless that would be an absurd gap.
-        Some(seen) if seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
+        // The number rolled over, unless that would be an absurd gap. Some cameras do not leave out 0.
+        Some(seen) if now > 0 && seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
         _ => 1,
     }
 }
@@ -252,6 +252,7 @@ mod tests {
         assert_eq!(steps(Some(17), 20), 3);
         assert_eq!(steps(Some(65_535), 1), 1);
         assert_eq!(steps(Some(65_534), 2), 3);
+        assert_eq!(steps(Some(65_535), 0), 1, "a camera that counts from 0");
         assert_eq!(steps(Some(5000), 1), 1, "the camera restarted");
         assert_eq!(steps(Some(1 << 40), 3), 1);
     }
