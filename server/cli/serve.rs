@@ -105,9 +105,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut seeded = seeded(arguments)?;
     let mut given = given::look(arguments, &clock, seeded.random()).await?;
     let navigation = given.navigation.take();
-    let Given {
-        folder, keys, certificates, calibration, developer, library, rig, lens_info, dynamics, listener, ..
-    } = given;
+    let Given { folder, keys, certificates, calibration, developer, library, rig, dynamics, listener, .. } = given;
     let address = listener.local_addr()?;
 
     let registry = rig.registry.clone();
@@ -181,7 +179,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         registry,
         keys: keys.clone(),
         address: address.clone(),
-        equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
+        equipment: Equipment::new(Arc::clone(&calibration), mosaics),
         tablets: OpenTablets::default(),
         tablet_trials: TabletTrials::default(),
         metrics: http::Metrics::default(),

@@ -140,12 +140,14 @@ struct LensState {
     failure: Option<LensError>,
     panics: bool,
     dynamics: LensDynamics,
+    serial: &'static str,
 }
 
 impl FakeLens {
     pub fn at(focal_power: FocalPower) -> Self {
         let dynamics = LensDynamics { delay: Duration::ZERO, settling: Duration::ZERO };
-        Self(Arc::new(Mutex::new(LensState { at: focal_power, failure: None, panics: false, dynamics })))
+        let state = LensState { at: focal_power, failure: None, panics: false, dynamics, serial: "A" };
+        Self(Arc::new(Mutex::new(state)))
     }
 
     pub fn slow(self, delay: Duration, settling: Duration) -> Self {
@@ -157,8 +159,29 @@ impl FakeLens {
         self.0.lock().unwrap().failure = failure;
     }
 
+    /// From now on it is another lens, with this serial number.
+    pub fn swap(&self, serial: &'static str) {
+        self.0.lock().unwrap().serial = serial;
+    }
+
     pub fn panic(&self, panics: bool) {
         self.0.lock().unwrap().panics = panics;
+    }
+
+    fn described(&self) -> Result<LensInfo, LensError> {
+        let state = self.0.lock().unwrap();
+        state.failure.clone().map_or(Ok(()), Err)?;
+        Ok(LensInfo {
+            driver: "fake".into(),
+            firmware: "none".into(),
+            serial: state.serial.into(),
+            min_dioptre: 0.0,
+            max_dioptre: 1.0,
+            temperature_celsius: None,
+            mode: "focal power".into(),
+            status: Vec::new(),
+            line_errors: 0,
+        })
     }
 
     /// The last focal power that the lens accepted.
@@ -185,19 +208,20 @@ impl Lens for FakeLens {
     }
 
     fn health(&self) -> LensHealth {
-        let working = self.0.lock().unwrap().failure.is_none();
+        let info = self.described().ok();
         LensHealth {
             name: "fake lens".into(),
             simulated: true,
-            working,
+            working: info.is_some(),
             caution: false,
             message: "as the test says".into(),
             line_errors: 0,
+            info,
         }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {
-        Err(LensError::Gone("there is none".into()))
+        self.described()
     }
 
     fn dynamics(&self) -> LensDynamics {

@@ -9,7 +9,7 @@ use parfocal_base::clock::{Clock, ManualClock};
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::{Hold, StepRecord};
 use parfocal_base::{PatchPlace, PolicyName};
-use parfocal_devices::lens::{LensDynamics, LensError};
+use parfocal_devices::lens::{LensError, MeasuredDynamics};
 use parfocal_imaging::{ContentArea, Reconstructor};
 use parfocal_pipeline::control::{Aim, Command, Drive, Eye, Following, Stepper};
 use proptest::prelude::*;
@@ -67,6 +67,16 @@ impl Fixture {
         while self.step_after(pace).held.is_some() {
             std::thread::yield_now();
         }
+    }
+
+    /// Sends the lens to `target`. Returns where it was at 5.47 ms after the command, the middle of an exposure.
+    fn way_to(&mut self, target: f64) -> f64 {
+        self.stepper.obey(Command::Drive { drive: Drive::Manual(power(target)), segment: None });
+        self.clock.advance(Duration::from_micros(15_470));
+        self.number += 1;
+        let mut late = frame(self.number, self.clock.now());
+        late.exposure = FRAME;
+        self.stepper.step(late).unwrap().record.measured.unwrap().get()
     }
 
     fn message(&self) -> &str {
@@ -536,8 +546,7 @@ fn a_long_exposure_is_attributed_to_its_middle() {
 #[test]
 fn measured_dynamics_replace_the_drivers_and_stand_in_the_telemetry() {
     let mut fixture = Fixture::new(PATIENT);
-    let dynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
-    fixture.stepper = fixture.stepper.moving(dynamics);
+    fixture.stepper = fixture.stepper.moving(measured());
     fixture.script.set(Deed::GoTo(0.9));
     fixture.stepper.obey(drive("scripted", None));
     assert_eq!(fixture.step().measured, Some(power(0.5)), "exposed before the first command");
@@ -547,6 +556,48 @@ fn measured_dynamics_replace_the_drivers_and_stand_in_the_telemetry() {
     let record = fixture.stepper.step(late).unwrap().record;
     assert!((record.measured.unwrap().get() - 0.7).abs() < 1e-3, "{record:?}");
     assert!((fixture.script.seen()[1] - 0.7).abs() < 1e-3);
+}
+
+/// What was measured on lens A: a delay of 2 ms, then 15 ms of settling.
+fn measured() -> MeasuredDynamics {
+    MeasuredDynamics {
+        driver: "fake".into(),
+        serial: "A".into(),
+        date: "2026-03-01T10:00:00Z".into(),
+        delay_ms: 2.0,
+        settling_ms: 15.0,
+        hysteresis: 0.0,
+    }
+}
+
+#[test]
+fn another_lens_moves_as_its_driver_assumes_and_is_told_until_the_measured_one_is_back() {
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper = fixture.stepper.moving(measured());
+    assert!((fixture.way_to(0.9) - 0.7).abs() < 1e-3, "half of the way from 0.5");
+    assert!(!fixture.stepper.lens_health().caution);
+
+    let mut replug = |serial: &'static str| {
+        fixture.lens.fail(Some(LensError::Gone("unplugged".into())));
+        fixture.step();
+        fixture.lens.swap(serial);
+        fixture.lens.fail(None);
+        for _ in 0..3 {
+            fixture.step();
+        }
+        let health = fixture.stepper.lens_health();
+        (health.caution, health.message.to_string(), fixture.way_to(0.1), fixture.way_to(0.9))
+    };
+
+    let (caution, message, down, up) = replug("B");
+    assert!(caution && message.contains("lens B") && message.contains("lens A"), "{message}");
+    assert!((down - 0.1).abs() < 1e-3 && (up - 0.9).abs() < 1e-3, "it moves at once: {down}, {up}");
+
+    let (caution, message, ..) = replug("A");
+    assert_eq!((caution, message.as_str()), (false, "as the test says"));
+    fixture.step();
+    fixture.step();
+    assert!((fixture.way_to(0.5) - 0.7).abs() < 1e-3, "half of the way from 0.9");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! The Optotune driver without faults.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use parfocal_base::FocalPower;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_devices::lens::emulator::Model;
-use parfocal_devices::lens::{LensInfo, Optics};
+use parfocal_devices::lens::{self, LensInfo, Optics};
 
 use super::{emulator, last_command, open, power, quick, refused, until};
 
@@ -41,6 +42,25 @@ fn says_what_it_is_and_goes_where_it_is_sent() {
 fn a_unit_that_is_not_emulated_is_taken_for_real() {
     let emulator = emulator(Model { serial: *b"AREA0042", ..quick() });
     assert!(!open(&emulator, "").unwrap().health().simulated);
+}
+
+/// The flat cable of the lens leads to another one: the driver's port stays.
+#[test]
+fn health_says_which_lens_is_there_now() {
+    let mut first = emulator(Model { serial: *b"AREA0042", ..quick() });
+    let second = emulator(Model { serial: *b"AREA0043", ..quick() });
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("port");
+    std::os::unix::fs::symlink(first.path(), &port).unwrap();
+    let lens = lens::open(&format!("optotune:{}", port.display()), Arc::new(SystemClock)).unwrap();
+    let serial = || lens.health().info.map(|info| info.serial);
+    assert_eq!(serial().as_deref(), Some("AREA0042"));
+
+    first.unplug();
+    until("the loss is noticed", || serial().is_none());
+    std::fs::remove_file(&port).unwrap();
+    std::os::unix::fs::symlink(second.path(), &port).unwrap();
+    until("the other lens is there", || serial().as_deref() == Some("AREA0043"));
 }
 
 #[test]

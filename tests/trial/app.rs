@@ -63,7 +63,7 @@ pub fn app(trial: &Trial, folder: &Path, address: ServerAddress, shutdown: watch
         registry,
         keys: Keys::load_or_create(folder).unwrap(),
         address,
-        equipment: Equipment::new(None, calibration, None),
+        equipment: Equipment::new(calibration, None),
         tablets: OpenTablets::default(),
         tablet_trials: TabletTrials::default(),
         metrics: Metrics::default(),

@@ -266,6 +266,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
             caution: false,
             message: "none".into(),
             line_errors: 0,
+            info: None,
         },
         policy: None,
         focal_power: FocalPower::MIDDLE,

@@ -18,7 +18,7 @@ use parfocal_base::files::is_new_or_empty;
 use parfocal_dashboard::http::keys::Keys;
 use parfocal_dashboard::tls::Certificates;
 use parfocal_devices::camera::{self, CameraSettings, calibration};
-use parfocal_devices::lens::{self, Lens, LensDynamics, LensInfo, MeasuredDynamics, Optics};
+use parfocal_devices::lens::{self, LensHealth, MeasuredDynamics, Optics};
 use parfocal_imaging::{Calibration, Developer};
 use parfocal_pipeline::control::Rig;
 use parfocal_records::store::LockedFolder;
@@ -40,10 +40,8 @@ pub(super) struct Given {
     pub library: Library,
     /// Camera, lens and policies.
     pub rig: Rig,
-    /// The lens's description of itself, if it gave one.
-    pub lens_info: Option<LensInfo>,
-    /// How the lens moves, if that was measured.
-    pub dynamics: Option<LensDynamics>,
+    /// How a lens moves, if that was measured.
+    pub dynamics: Option<MeasuredDynamics>,
     /// The port. Early visitors wait in its queue.
     pub listener: TcpListener,
     /// The port of OpenIGTLink, if it is on.
@@ -82,8 +80,8 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
     let registry = registry(arguments, clock, &mut problems);
     let library = problems.keep(protocols(arguments.protocols.as_deref(), &registry));
 
-    let measured = arguments.lens_dynamics.as_deref().and_then(|path| problems.keep(measured(path)));
-    let mut lens = problems.keep(lens::open_or_await(&arguments.lens, Arc::clone(clock)));
+    let dynamics = arguments.lens_dynamics.as_deref().and_then(|path| problems.keep(measured(path)));
+    let lens = problems.keep(lens::open_or_await(&arguments.lens, Arc::clone(clock)));
     let optics = lens.as_ref().map_or_else(|| stand_in(clock), |lens| Ok(lens.optics()))?;
     let settings = CameraSettings { fps: arguments.fps.into(), seed, optics, clock: Arc::clone(clock) };
     let camera = problems.keep(camera::open_or_await(&arguments.camera, settings));
@@ -96,12 +94,9 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
         problems.keep(calibration::check_camera(calibration, camera.mosaic_size()));
     }
 
-    // Ask before the control loop takes the lens; nobody asks it again.
-    let lens_info = lens.as_deref_mut().and_then(described);
-    let dynamics = match (measured, &lens) {
-        (Some(measured), Some(_)) => problems.keep(dynamics(arguments, &measured, lens_info.as_ref())),
-        _ => None,
-    };
+    if let (Some(path), Some(measured), Some(lens)) = (&arguments.lens_dynamics, &dynamics, &lens) {
+        problems.keep(check_lens(path, measured, &lens.health()));
+    }
 
     // After everything that only reads: a server that cannot start leaves the port alone.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error));
@@ -127,7 +122,6 @@ pub(super) async fn look(arguments: &Arguments, clock: &Arc<dyn Clock>, seed: u6
             calibration,
             developer,
             library: library?,
-            lens_info,
             dynamics,
             listener: listener?,
             navigation: navigation?,
@@ -169,11 +163,6 @@ fn certificates(arguments: &Arguments, locked: bool, clock: &Arc<dyn Clock>) -> 
     }
 }
 
-/// The lens's description of itself, if it gives one.
-fn described(lens: &mut (dyn Lens + 'static)) -> Option<LensInfo> {
-    lens.info().inspect_err(|error| tracing::warn!(%error, "the lens did not describe itself")).ok()
-}
-
 /// Optics for a camera whose lens could not be opened, so that the camera's own problems are found too.
 fn stand_in(clock: &Arc<dyn Clock>) -> Result<Arc<dyn Optics>, Failure> {
     Ok(lens::open("simulated", Arc::clone(clock))?.optics())
@@ -186,22 +175,18 @@ fn measured(path: &Path) -> Result<MeasuredDynamics, Failure> {
     Ok(MeasuredDynamics::from_toml(&text).map_err(named)?)
 }
 
-/// The dynamics that were `measured`, which must have been on this lens.
-fn dynamics(
-    arguments: &Arguments,
-    measured: &MeasuredDynamics,
-    info: Option<&LensInfo>,
-) -> Result<LensDynamics, Failure> {
-    let file = arguments.lens_dynamics.as_deref().map_or_else(String::new, |path| path.display().to_string());
-    let Some(info) = info else {
-        let problem = "the lens does not answer, so nobody knows whether they belong to it";
-        bail!("lens dynamics {file}: {problem}; switch the lens on, or leave out --lens-dynamics");
-    };
-    if measured.serial != info.serial {
-        let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
-        bail!("lens dynamics {file}: {problem}; measure it with `parfocal lens measure`");
+/// Checks that the dynamics in the file `path` were `measured` on the lens of this health. One that is not there yet may
+/// be that lens.
+fn check_lens(path: &Path, measured: &MeasuredDynamics, health: &LensHealth) -> Result<(), Failure> {
+    match &health.info {
+        Some(info) if info.serial != measured.serial => bail!(
+            "lens dynamics {}: they belong to the lens {}, but this one is {}; measure it with `parfocal lens measure`",
+            path.display(),
+            measured.serial,
+            info.serial
+        ),
+        _ => Ok(()),
     }
-    Ok(measured.dynamics())
 }
 
 fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {

@@ -1,5 +1,9 @@
 //! The operator's report on whether everything is ready for a trial.
 
+use std::sync::Arc;
+
+use parfocal_base::clock::SystemClock;
+use parfocal_devices::lens::emulator::{Emulator, Model};
 use serde_json::{Value, json};
 
 use super::live::Page;
@@ -50,6 +54,47 @@ async fn the_operator_sees_the_checks_of_machine_devices_and_tablet() {
     drop(page);
     until("the tablet has left", || async {
         about(&findings(&server).await, "tablet")["found"] == "No surgeon's page is open."
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_lens_that_was_cold_at_the_start_is_well_once_it_is_warm() {
+    let emulator = Emulator::start(Model { serial: *b"AREA0042", ..Model::default() }, Arc::new(SystemClock)).unwrap();
+    emulator.set_temperature(12.0);
+    let lens = format!("optotune:{}", emulator.path().display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--lens", &lens]);
+    assert_eq!(about(&findings(&server).await, "lens")["verdict"], "advice");
+
+    emulator.set_temperature(25.0);
+    until("the lens is well", || async { about(&findings(&server).await, "lens")["verdict"] == "well" }).await;
+    let found = findings(&server).await;
+    assert!(about(&found, "lens")["found"].as_str().unwrap().contains("serial number AREA0042: 5.0 to 10.0 dpt"));
+}
+
+/// The dynamics may be those of a lens that is switched on only after the server.
+#[tokio::test]
+async fn the_server_waits_for_the_lens_that_was_measured_and_warns_of_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let dynamics = folder.path().join("dynamics.toml");
+    let measured = "driver = \"Optotune Lens Driver 4\"\nserial = \"AREA0042\"\ndate = \"2026-03-01T10:00:00Z\"\n\
+                    delay_ms = 3.0\nsettling_ms = 20.0\nhysteresis = 0.01\n";
+    std::fs::write(&dynamics, measured).unwrap();
+
+    let model = Model { serial: *b"AREA0043", ..Model::default() };
+    let mut emulator = Emulator::start(model, Arc::new(SystemClock)).unwrap();
+    emulator.unplug();
+    let lens = format!("optotune:{}", emulator.path().display());
+    let dynamics = dynamics.to_str().unwrap();
+    let options = ["--bind", "127.0.0.1:0", "--fps", "10", "--lens", &lens, "--lens-dynamics", dynamics];
+    let server = Server::with(&options);
+    assert_eq!(about(&findings(&server).await, "lens")["verdict"], "wrong", "it is not there");
+
+    emulator.plug_in().unwrap();
+    until("the other lens is told", || async {
+        let found = findings(&server).await;
+        let lens = about(&found, "lens");
+        lens["verdict"] == "advice" && lens["found"].as_str().unwrap().contains("was measured on lens AREA0042")
     })
     .await;
 }

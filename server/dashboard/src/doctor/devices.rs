@@ -24,8 +24,8 @@ pub fn camera_in_use(health: &CameraHealth) -> Finding {
     Finding::well(CAMERA, found)
 }
 
-/// Checks the lens. `info` is what it reported about itself when the server started, if it did.
-pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
+/// Checks the lens.
+pub fn lens_in_use(health: &LensHealth) -> Finding {
     let found = named(&health.name, &health.message);
     if !health.working {
         return Finding::wrong(LENS, found, "Check its cable and power. The server looks for it by itself.");
@@ -36,7 +36,7 @@ pub fn lens_in_use(health: &LensHealth, info: Option<&LensInfo>) -> Finding {
     if health.simulated {
         return Finding::advice(LENS, found, "For real glass, start the server with --lens optotune:auto.");
     }
-    match info {
+    match &health.info {
         Some(info) => described(info),
         None => Finding::well(LENS, found),
     }
@@ -78,7 +78,7 @@ mod tests {
 
     fn lens_health(working: bool, caution: bool, simulated: bool) -> LensHealth {
         let message = "as it should".into();
-        LensHealth { name: "a lens".into(), simulated, working, caution, message, line_errors: 0 }
+        LensHealth { name: "a lens".into(), simulated, working, caution, message, line_errors: 0, info: None }
     }
 
     fn camera_health(working: bool, lost: u64) -> CameraHealth {
@@ -88,10 +88,10 @@ mod tests {
 
     #[test]
     fn an_absent_device_is_wrong_and_a_simulated_one_is_reported() {
-        assert_eq!(lens_in_use(&lens_health(false, false, false), None).verdict, Verdict::Wrong);
-        assert_eq!(lens_in_use(&lens_health(true, true, false), None).verdict, Verdict::Advice);
-        assert_eq!(lens_in_use(&lens_health(true, false, true), None).verdict, Verdict::Advice);
-        assert_eq!(lens_in_use(&lens_health(true, false, false), None).verdict, Verdict::Well);
+        assert_eq!(lens_in_use(&lens_health(false, false, false)).verdict, Verdict::Wrong);
+        assert_eq!(lens_in_use(&lens_health(true, true, false)).verdict, Verdict::Advice);
+        assert_eq!(lens_in_use(&lens_health(true, false, true)).verdict, Verdict::Advice);
+        assert_eq!(lens_in_use(&lens_health(true, false, false)).verdict, Verdict::Well);
 
         assert_eq!(camera_in_use(&camera_health(false, 0)).verdict, Verdict::Wrong);
         assert_eq!(camera_in_use(&camera_health(true, 3)).verdict, Verdict::Advice);

@@ -55,12 +55,12 @@ async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>
 
 fn devices(app: &App) -> Vec<Finding> {
     let status = Arc::clone(&app.control.status.borrow());
-    let Equipment { lens, calibration, mosaics, .. } = &app.equipment;
+    let Equipment { calibration, mosaics, .. } = &app.equipment;
     let today = app.clock.wall().to_zoned(TimeZone::system()).date();
 
     let mut findings = vec![
         doctor::camera_in_use(&status.camera),
-        doctor::lens_in_use(&status.lens, lens.as_ref()),
+        doctor::lens_in_use(&status.lens),
         doctor::calibration(calibration, *mosaics, status.camera.simulated, today),
     ];
     findings.extend(doctor::tablets(&app.tablets.open()));

@@ -4,13 +4,10 @@ use std::sync::Arc;
 
 use tokio::sync::Mutex;
 
-use parfocal_devices::lens::LensInfo;
 use parfocal_imaging::Calibration;
 
 /// What the server learned about its devices when it started.
 pub struct Equipment {
-    /// What the lens reported about itself, if it did.
-    pub lens: Option<LensInfo>,
     /// The sensor's calibration.
     pub calibration: Arc<Calibration>,
     /// Width and height of the camera's mosaics, samples; `None` for a camera that delivers colour pictures.
@@ -22,8 +19,8 @@ pub struct Equipment {
 }
 
 impl Equipment {
-    /// A lens, a calibration and a camera as they were at the start.
-    pub fn new(lens: Option<LensInfo>, calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
-        Self { lens, calibration, mosaics, look: Arc::default(), spectra: Mutex::default() }
+    /// A calibration and a camera as they were at the start.
+    pub fn new(calibration: Arc<Calibration>, mosaics: Option<(usize, usize)>) -> Self {
+        Self { calibration, mosaics, look: Arc::default(), spectra: Mutex::default() }
     }
 }

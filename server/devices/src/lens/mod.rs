@@ -71,7 +71,7 @@ pub trait Optics: Send + Sync {
 }
 
 /// A lens's state, for people.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LensHealth {
     /// Name for people, for example `simulated lens`.
     pub name: Arc<str>,
@@ -85,6 +85,9 @@ pub struct LensHealth {
     pub message: Arc<str>,
     /// Errors on the serial line since the lens was opened: damaged, late or missing replies, and noise.
     pub line_errors: u64,
+    /// What the device last said about itself; `None` while it is away. Pages get the message instead.
+    #[serde(skip)]
+    pub info: Option<LensInfo>,
 }
 
 /// A lens's description of itself (`parfocal lens info --json`; see docs/scripting.md).

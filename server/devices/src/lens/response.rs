@@ -57,11 +57,6 @@ impl Response {
         moves.push_back(Move { starts, from, to });
     }
 
-    /// Dead time and settling time.
-    pub const fn dynamics(&self) -> LensDynamics {
-        self.dynamics
-    }
-
     fn position(&self, of: &Move, at: Moment) -> f64 {
         let tau = self.dynamics.settling.as_secs_f64() / 20_f64.ln();
         let remaining = if tau > 0.0 { (-at.since(of.starts).as_secs_f64() / tau).exp() } else { 0.0 };

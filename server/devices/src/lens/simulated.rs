@@ -99,6 +99,23 @@ impl SimulatedLens {
             SimulatedFault::Gone => Some(LensError::Gone("unplugged (simulated fault)".into())),
         }
     }
+
+    fn described(&self) -> Result<LensInfo, LensError> {
+        match self.failure() {
+            Some(failure @ LensError::Gone(_)) => Err(failure),
+            failure => Ok(LensInfo {
+                driver: "simulated".into(),
+                firmware: env!("CARGO_PKG_VERSION").into(),
+                serial: "none".into(),
+                min_dioptre: DIOPTRES.0,
+                max_dioptre: DIOPTRES.1,
+                temperature_celsius: None,
+                mode: "focal power".into(),
+                status: failure.iter().map(ToString::to_string).collect(),
+                line_errors: 0,
+            }),
+        }
+    }
 }
 
 impl Lens for SimulatedLens {
@@ -129,24 +146,19 @@ impl Lens for SimulatedLens {
 
         let name = self.name.clone();
         let working = failure.is_none();
-        LensHealth { name, simulated: true, working, caution: false, message: message.into(), line_errors: 0 }
+        LensHealth {
+            name,
+            simulated: true,
+            working,
+            caution: false,
+            message: message.into(),
+            line_errors: 0,
+            info: self.described().ok(),
+        }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {
-        match self.failure() {
-            Some(failure @ LensError::Gone(_)) => Err(failure),
-            failure => Ok(LensInfo {
-                driver: "simulated".into(),
-                firmware: env!("CARGO_PKG_VERSION").into(),
-                serial: "none".into(),
-                min_dioptre: DIOPTRES.0,
-                max_dioptre: DIOPTRES.1,
-                temperature_celsius: None,
-                mode: "focal power".into(),
-                status: failure.iter().map(ToString::to_string).collect(),
-                line_errors: 0,
-            }),
-        }
+        self.described()
     }
 
     fn dynamics(&self) -> LensDynamics {

@@ -36,11 +36,11 @@ impl Attribution {
         }
     }
 
-    /// Records that the lens was lost, and goes to its destination again from `now`. Where it stood meanwhile is
-    /// unknown, so it counts as arrived only when it would have come from the farther end.
-    pub fn regained(&mut self, now: Moment) {
+    /// Records that the lens was lost, and that it, or another one, goes to its destination from `now` with `dynamics`.
+    /// Where it stood meanwhile is unknown, so it counts as arrived only when it would have come from the farther end.
+    pub fn regained(&mut self, now: Moment, dynamics: LensDynamics) {
         let farther = if self.destination < FocalPower::MIDDLE { FocalPower::MAX } else { FocalPower::MIN };
-        self.way = Response::new(self.way.dynamics(), 0.0, farther);
+        self.way = Response::new(dynamics, 0.0, farther);
         self.way.command(now, self.destination);
     }
 
@@ -91,7 +91,7 @@ mod tests {
         let dynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
         let mut lens = Attribution::new(dynamics, power(0.5));
         lens.commanded(millis(100), power(0.7));
-        lens.regained(millis(500));
+        lens.regained(millis(500), dynamics);
         lens.commanded(millis(500), power(0.7));
         // After 18 ms, 20^(-18/15) = 0.027 of the whole way from the far end is left, more than an eighth of a step.
         assert!(!lens.settled(millis(520)), "{:?}", lens.focal_power(millis(520)));

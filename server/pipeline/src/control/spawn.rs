@@ -23,7 +23,7 @@ use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
 use parfocal_devices::camera::{Camera, Controls, Frame, LEAST_FPS};
-use parfocal_devices::lens::{Lens, LensDynamics};
+use parfocal_devices::lens::{Lens, MeasuredDynamics};
 use parfocal_imaging::Reconstructor;
 
 /// Longest wait for a frame before the loop looks for commands.
@@ -50,14 +50,14 @@ pub struct Rig {
 }
 
 /// How the loop runs.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct LoopSettings {
     /// Time between two frames. It is also the longest wait for a policy's answer.
     pub frame_period: Duration,
     /// Capacity of the telemetry channel, in records. Further records are dropped.
     pub telemetry_capacity: usize,
-    /// The measured dynamics of the lens; `None` to use those that its driver assumes.
-    pub dynamics: Option<LensDynamics>,
+    /// The measured dynamics of a lens; `None` to use those that its driver assumes. They are not used for another lens.
+    pub dynamics: Option<MeasuredDynamics>,
 }
 
 /// The running loop. Dropping it ends the loop and its camera, and waits for both. The lens is released first. A camera
@@ -76,9 +76,10 @@ impl ControlLoop {
     /// If the system has no thread left.
     pub fn spawn(settings: LoopSettings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
         let Rig { camera, lens, reconstructor, registry, clock } = rig;
-        let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
-        let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period)
-            .moving(dynamics);
+        let mut stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period);
+        if let Some(measured) = settings.dynamics {
+            stepper = stepper.moving(measured);
+        }
 
         let controls = camera.controls();
         let source = FrameSource::start(camera)?;

@@ -18,7 +18,7 @@ use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
 use parfocal_base::{FocalPower, PatchPlace};
 use parfocal_devices::camera::{Frame, FrameImage};
-use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth};
+use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth, MeasuredDynamics};
 use parfocal_imaging::{PatchArea, place_of};
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation that runs faster than
@@ -28,6 +28,8 @@ pub struct Stepper {
     lens: Box<dyn Lens>,
     eye: Eye,
     pilot: Pilot,
+    /// The dynamics that were measured, for the lens of that serial number alone.
+    measured: Option<MeasuredDynamics>,
     attribution: Attribution,
     drive: Drive,
     /// Whether a frame was exposed after the lens had reached the policy's start. Until then the policy is not asked.
@@ -62,6 +64,7 @@ impl Stepper {
     pub fn new(lens: Box<dyn Lens>, eye: Eye, registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let start = lens.measured().unwrap_or(FocalPower::MIDDLE);
         Self {
+            measured: None,
             attribution: Attribution::new(lens.dynamics(), start),
             pilot: Pilot::new(registry, clock.clone(), patience),
             clock,
@@ -84,11 +87,22 @@ impl Stepper {
         }
     }
 
-    /// Uses `dynamics`, the measured dynamics of the lens, instead of those that its driver assumes.
+    /// Uses the dynamics that were `measured` instead of those that the driver assumes, unless another lens than the
+    /// measured one is there.
     #[must_use]
-    pub fn moving(mut self, dynamics: LensDynamics) -> Self {
-        self.attribution = Attribution::new(dynamics, self.asked);
+    pub fn moving(mut self, measured: MeasuredDynamics) -> Self {
+        self.measured = Some(measured);
+        self.attribution = Attribution::new(self.dynamics(), self.asked);
         self
+    }
+
+    /// How the lens that is there moves. One that is away may be the measured one.
+    fn dynamics(&self) -> LensDynamics {
+        let serial = self.lens.health().info.map(|info| info.serial);
+        let is_measured =
+            |measured: &&MeasuredDynamics| serial.as_ref().is_none_or(|serial| *serial == measured.serial);
+        let measured = self.measured.as_ref().filter(is_measured);
+        measured.map_or_else(|| self.lens.dynamics(), MeasuredDynamics::dynamics)
     }
 
     /// Carries out `command`. Drive and segment change together, between two frames.
@@ -334,16 +348,26 @@ impl Stepper {
     }
 
     /// The lens may have moved meanwhile, and the tissue has. So the policy is asked only when the lens has arrived,
-    /// and compares nothing with what it saw before.
+    /// and compares nothing with what it saw before. It may also be another lens.
     fn regain_lens(&mut self) {
-        self.attribution.regained(self.clock.now());
+        self.attribution.regained(self.clock.now(), self.dynamics());
         self.placed = false;
         self.forget();
     }
 
-    /// The lens's health.
+    /// The lens's health. It warns of a lens other than the one that was measured.
     pub fn lens_health(&self) -> LensHealth {
-        self.lens.health()
+        let mut health = self.lens.health();
+        let Some((measured, info)) = self.measured.as_ref().zip(health.info.as_ref()) else { return health };
+
+        if measured.serial != info.serial {
+            health.message = Arc::from(format!(
+                "{}; this is lens {}, and how it moves was measured on lens {}: typical values are used",
+                health.message, info.serial, measured.serial
+            ));
+            health.caution = true;
+        }
+        health
     }
 
     /// The last focal power that the lens accepted.

@@ -163,6 +163,20 @@ impl OptotuneLens {
             Err(error) => Err(error),
         }
     }
+
+    fn described(&self, device: &Device) -> LensInfo {
+        LensInfo {
+            driver: "Optotune Lens Driver 4".into(),
+            firmware: device.firmware.clone(),
+            serial: device.serial.clone(),
+            min_dioptre: device.range.min_dioptre(),
+            max_dioptre: device.range.max_dioptre(),
+            temperature_celsius: Some(device.temperature),
+            mode: status::mode_name(device.mode).into(),
+            status: device.status.words(),
+            line_errors: self.shared.line_errors(),
+        }
+    }
 }
 
 impl Drop for OptotuneLens {
@@ -204,22 +218,13 @@ impl Lens for OptotuneLens {
             caution,
             message,
             line_errors: self.shared.line_errors(),
+            info: state.device.as_ref().ok().map(|device| self.described(device)),
         }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {
         let device = self.shared.refresh(ANSWER)?;
-        Ok(LensInfo {
-            driver: "Optotune Lens Driver 4".into(),
-            firmware: device.firmware,
-            serial: device.serial,
-            min_dioptre: device.range.min_dioptre(),
-            max_dioptre: device.range.max_dioptre(),
-            temperature_celsius: Some(device.temperature),
-            mode: status::mode_name(device.mode).into(),
-            status: device.status.words(),
-            line_errors: self.shared.line_errors(),
-        })
+        Ok(self.described(&device))
     }
 
     fn dynamics(&self) -> LensDynamics {
