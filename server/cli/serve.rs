@@ -190,8 +190,9 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let linked = link(arguments, navigation, &app, control.status.clone(), developer)?;
     let server = tokio::spawn(http::run(listener, app, settings));
 
-    let announcement =
-        announcement(&address, &keys, &control.status.borrow(), &calibration, linked, std::io::stdout().is_terminal());
+    // A copy: the loop waits for whoever holds its status.
+    let status = Arc::clone(&control.status.borrow());
+    let announcement = announcement(&address, &keys, &status, &calibration, linked, std::io::stdout().is_terminal());
 
     // The server serves whether or not anyone reads the announcement.
     let _ = std::io::stdout().write_all(announcement.as_bytes());

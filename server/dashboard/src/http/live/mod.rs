@@ -269,7 +269,9 @@ impl<A: Audience> PageConnection<A> {
     }
 
     fn status(&mut self) -> Option<Message> {
-        let status = A::status(&self.statuses.borrow_and_update(), &self.app);
+        // A copy: the loop waits for whoever holds its status.
+        let status = Arc::clone(&self.statuses.borrow_and_update());
+        let status = A::status(&status, &self.app);
         if self.sent_status.as_ref() == Some(&status) {
             return None;
         }
