@@ -124,6 +124,19 @@ async fn a_protocol_records_mosaics_from_a_sessions_start_to_its_end() {
 }
 
 #[tokio::test]
+async fn a_recording_that_is_ending_as_the_server_ends_is_stored_to_its_end() {
+    let mut server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    until(&server, |status| status["frames"].as_u64() >= Some(3)).await;
+    abort(&server, &session).await;
+    assert!(server.end(Signal::TERM));
+
+    let recording = Recording::open(&recordings(&server).join(&session)).unwrap();
+    assert_eq!(recording.header().ended, Some(Ended::Stopped));
+    assert!(recording.rows().len() >= 3 && recording.check().is_empty());
+}
+
+#[tokio::test]
 async fn a_protocol_keeps_the_view_as_it_was_sent() {
     let server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = begin(&server, "viewed").await;

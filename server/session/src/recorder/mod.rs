@@ -101,17 +101,34 @@ impl Recordings {
     /// # Errors
     /// If a recording is already under way, the camera has no mosaics, or the disk has no room.
     pub async fn start(&self) -> Result<(), StartError> {
-        let _pen = self.0.pen.lock().await;
-        if self.0.state().active.is_some() {
-            return Err(StartError::UnderWay);
-        }
-        self.begin(Record::Mosaic, None).await
+        let begun = self.to_the_end(|this| async move {
+            if this.0.state().active.is_some() {
+                return Err(StartError::UnderWay);
+            }
+            this.begin(Record::Mosaic, None).await
+        });
+        begun.await.unwrap_or_else(|| Err(ending()))
     }
 
     /// Ends the recording under way, if one is, and stores what was recorded.
     pub async fn stop(&self) {
-        let _pen = self.0.pen.lock().await;
-        self.end().await;
+        self.to_the_end(|this| async move { this.end().await }).await;
+    }
+
+    /// Does `work` while nothing else begins or ends a recording, even if the caller is dropped, as a handler is when its
+    /// browser disconnects, and [`Recordings::run`] when the server ends. `None` if it failed.
+    async fn to_the_end<T, F>(&self, work: impl FnOnce(Self) -> F) -> Option<T>
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let shared = Arc::clone(&self.0);
+        let work = work(self.clone());
+        let done = tokio::spawn(async move {
+            let _pen = shared.pen.lock().await;
+            work.await
+        });
+        done.await.ok()
     }
 
     /// The state of recording, for the operator's page.
@@ -162,39 +179,44 @@ impl Recordings {
 
         match wanted {
             Some((session, what)) if followed != Some(session) => {
-                let _pen = self.0.pen.lock().await;
-                self.0.state().followed = Some(session);
-                self.end().await;
-                if let Err(error) = self.begin(what, Some(session)).await {
-                    tracing::error!(%error, "a session is not being recorded");
-                    let text = format!("This session is not being recorded. {error}");
-                    self.0.state().notice = Some(Notice { text, warns: true });
-                }
+                let begun = self.to_the_end(move |this| async move {
+                    this.0.state().followed = Some(session);
+                    this.end().await;
+                    if let Err(error) = this.begin(what, Some(session)).await {
+                        tracing::error!(%error, "a session is not being recorded");
+                        let text = format!("This session is not being recorded. {error}");
+                        this.0.state().notice = Some(Notice { text, warns: true });
+                    }
+                });
+                begun.await;
             }
             None if followed.is_some() => {
-                let _pen = self.0.pen.lock().await;
-                self.0.state().followed = None;
-                if self.0.state().active.as_ref().is_some_and(|active| active.by_protocol) {
-                    self.end().await;
-                }
+                let ended = self.to_the_end(|this| async move {
+                    this.0.state().followed = None;
+                    if this.0.state().active.as_ref().is_some_and(|active| active.by_protocol) {
+                        this.end().await;
+                    }
+                });
+                ended.await;
             }
             _ => {}
         }
     }
 
     async fn notice_the_end(&self) {
-        let _pen = self.0.pen.lock().await;
-        let ended = self.0.state().active.as_ref().is_some_and(|active| active.what.progress().ended.is_some());
-        if ended {
-            self.end().await;
-        }
+        let noticed = self.to_the_end(|this| async move {
+            let ended = this.0.state().active.as_ref().is_some_and(|active| active.what.progress().ended.is_some());
+            if ended {
+                this.end().await;
+            }
+        });
+        noticed.await;
     }
 
     /// Begins to record. The caller must hold the pen, and no recording may be under way.
     async fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
         let shared = Arc::clone(&self.0);
-        let stopped = |_| StartError::Failed("the server is ending".to_owned());
-        spawn_blocking(move || shared.begin(what, session)).await.map_err(stopped)?
+        spawn_blocking(move || shared.begin(what, session)).await.unwrap_or_else(|_| Err(ending()))
     }
 
     /// Ends the recording under way, if there is one. The caller must hold the pen.
@@ -252,6 +274,11 @@ impl Recordings {
             self.0.state().frame_bytes = Some(bytes as u64);
         }
     }
+}
+
+/// Why nothing begins any more.
+fn ending() -> StartError {
+    StartError::Failed("the server is ending".to_owned())
 }
 
 impl Shared {
