@@ -4,6 +4,8 @@
 #[path = "../../../benches/stream/link.rs"]
 mod link;
 
+use std::fs;
+use std::process::Command;
 use std::time::Duration;
 
 use serde_json::json;
@@ -11,7 +13,7 @@ use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::live::Page;
-use crate::support::{BRAIN, Server};
+use crate::support::{BRAIN, DARK, Server};
 
 /// Few frames, because the camera shares the machine with other tests.
 fn server() -> Server {
@@ -110,6 +112,34 @@ async fn a_slow_link_keeps_the_small_pictures_that_it_carries() {
         slow.drawn(&frame).await;
         assert_eq!(frame.header["per_cell"], 1);
     }
+}
+
+/// The camera plays a recording, whose frames are away for a while.
+#[tokio::test]
+async fn a_camera_that_was_away_is_not_taken_for_a_slow_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("recording");
+    let mut record = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    record.args(["recording", "record", "--camera", DARK, "--fps", "10", "--seconds", "0.5", "--out"]);
+    assert!(record.arg(&recording).output().unwrap().status.success());
+
+    let camera = format!("recording:{}", recording.display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", &camera, "--fps", "10"]);
+    let mut page = Page::open(&server, "surgeon").await;
+    page.say(json!({"type": "screen", "width": 1000})).await;
+    page.watch_until(|header| header["per_cell"] == 2).await;
+
+    let frames = recording.join("mosaic/c/0/0/0");
+    let away = folder.path().join("frames");
+    fs::rename(&frames, &away).unwrap();
+    page.until(|told| told["notice"] == "camera-failed").await;
+    // Beats are five seconds apart, more than twice as long as a page waits for a picture.
+    page.until(|told| told["type"] == "beat").await;
+    page.until(|told| told["type"] == "beat").await;
+
+    fs::rename(&away, &frames).unwrap();
+    let frame = page.frame().await;
+    assert_eq!((&frame.header["per_cell"], &frame.header["reduced"]), (&json!(2), &json!(false)));
 }
 
 /// At 1 Mbit/s, 300 ms away there and back, one picture under way at a time gives two or three a second, and half of

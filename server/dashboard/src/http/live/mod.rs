@@ -158,7 +158,7 @@ impl<A: Audience> PageConnection<A> {
         statuses.mark_changed();
 
         Self {
-            pictures: Pictures::new(&app.live, A::LEADS, &app.clock),
+            pictures: Pictures::new(&app.live, A::LEADS, &app.clock, app.control.status.clone()),
             heartbeat: Heartbeat::new(app.clock.now()),
             pass,
             over: Box::pin(over(AppState::clone(&app), pass, token)),

@@ -4,12 +4,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 
 use super::link::{self, Link};
 use super::pace::Pace;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::Size;
+use parfocal_pipeline::control::ControlStatus;
 use parfocal_pipeline::live::{EncodedFrame, LiveHandle, Picture, Viewer};
 use parfocal_trial::tablet::PictureSize;
 
@@ -24,6 +26,8 @@ struct InFlight {
 /// The pictures of one page.
 pub(super) struct Pictures {
     clock: Arc<dyn Clock>,
+    /// The control loop's status.
+    status: watch::Receiver<Arc<ControlStatus>>,
     /// Looks away while the page is hidden.
     viewer: Viewer,
     link: Link,
@@ -43,10 +47,16 @@ pub(super) struct Pictures {
 
 impl Pictures {
     /// The pictures of a page about which nothing is known yet. If it `leads`, recordings of the view follow its size.
-    pub(super) fn new(live: &LiveHandle, leads: bool, clock: &Arc<dyn Clock>) -> Self {
+    pub(super) fn new(
+        live: &LiveHandle,
+        leads: bool,
+        clock: &Arc<dyn Clock>,
+        status: watch::Receiver<Arc<ControlStatus>>,
+    ) -> Self {
         let now = clock.now();
         Self {
             clock: Arc::clone(clock),
+            status,
             viewer: live.viewer(Size::Cell, leads),
             link: Link::new(live.largest(), now),
             pace: Pace::new(now),
@@ -78,8 +88,13 @@ impl Pictures {
                 frame
             }
             () = sleep_until(self.due), if may_miss => {
-                self.link.missed(self.clock.now());
-                self.follow_link();
+                // While the camera delivers none, pictures of no size come, and the link is not to blame.
+                let camera_works = self.status.borrow().camera.working;
+                if camera_works {
+                    self.link.missed(self.clock.now());
+                    self.follow_link();
+                }
+                self.due = Instant::now() + link::PATIENCE;
                 None
             }
         }
