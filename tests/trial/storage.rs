@@ -1,18 +1,21 @@
 //! The store on a real file: migrations, locks, full disks, rows that cannot be changed, and telemetry.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
-use parfocal_base::clock::Moment;
+use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::{Hold, StepRecord};
-use parfocal_records::store::{MIGRATOR, Reader, Store, StoreError, telemetry, verify_database};
+use parfocal_dashboard::health::device_log;
+use parfocal_records::store::{DeviceEvent, MIGRATOR, Reader, Store, StoreError, telemetry, verify_database};
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+use tokio::sync::watch;
 
 use crate::fixture::{Trial, a_clock, a_run};
 
@@ -269,4 +272,34 @@ async fn telemetry_that_a_failing_disk_refused_is_tried_again() {
     let frames: Vec<i64> = sqlx::query_scalar("SELECT frame FROM telemetry").fetch_all(&pool).await.unwrap();
     assert_eq!(frames, [1, 2]);
     assert_eq!(counts.lost.load(Ordering::Relaxed), 0);
+}
+
+#[tokio::test]
+async fn a_devices_state_that_a_failing_disk_refused_is_recorded_later_with_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let pool = raw(folder.path()).await;
+    let trigger = "CREATE TRIGGER broken BEFORE INSERT ON device_events BEGIN SELECT RAISE(ABORT, 'broken'); END";
+    sqlx::query(trigger).execute(&pool).await.unwrap();
+
+    let found = Arc::clone(&trial.control.status.borrow());
+    let found_at = trial.clock.wall().to_string();
+    let (status, told) = watch::channel(Arc::clone(&found));
+    let recording = tokio::spawn(device_log::record(trial.store.clone(), trial.clock.clone(), told));
+    tokio::task::yield_now().await;
+    // Writers take turns, so the log has tried before this one is refused.
+    let device = "lens".to_owned();
+    let other =
+        DeviceEvent { wall: trial.clock.wall(), at: trial.clock.now(), device, working: true, message: String::new() };
+    trial.store.device_event(&other).await.unwrap_err();
+
+    sqlx::query("DROP TRIGGER broken").execute(&pool).await.unwrap();
+    trial.clock.advance(Duration::from_secs(5));
+    status.send_replace(found);
+    drop(status);
+    recording.await.unwrap();
+
+    let events = sqlx::query_as("SELECT device, wall FROM device_events ORDER BY number");
+    let events: Vec<(String, String)> = events.fetch_all(&pool).await.unwrap();
+    assert_eq!(events, [("camera".to_owned(), found_at.clone()), ("lens".to_owned(), found_at)]);
 }

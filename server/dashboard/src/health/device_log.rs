@@ -1,5 +1,6 @@
 //! Records when camera and lens start or stop working, and when a warning about the lens comes or goes.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,6 +13,9 @@ use parfocal_records::store::{DeviceEvent, Store};
 /// A device that failed counts as working again once it has worked for this long, so that a device that comes and goes
 /// does not fill the log.
 const SETTLED: Duration = Duration::from_secs(1);
+
+/// What the disk refused is tried again after this time.
+const RETRY: Duration = Duration::from_secs(1);
 
 /// Whether a device works, and whether there is a warning about it.
 type Condition = (bool, bool);
@@ -41,9 +45,39 @@ impl LastCondition {
     }
 }
 
-/// Records the condition in which the devices were found, and then every change until the control loop ends.
+/// Events that are not recorded yet.
+#[derive(Default)]
+struct Events {
+    waiting: VecDeque<DeviceEvent>,
+    /// When the disk last refused one, unless it has taken one since.
+    refused_at: Option<Moment>,
+}
+
+impl Events {
+    /// Records them in order, as far as the disk takes them.
+    async fn write(&mut self, store: &Store, now: Moment) {
+        if self.refused_at.is_some_and(|at| now.since(at) < RETRY) {
+            return;
+        }
+
+        while let Some(event) = self.waiting.front() {
+            if let Err(error) = store.device_event(event).await {
+                if self.refused_at.replace(now).is_none() {
+                    tracing::error!(%error, "cannot record the state of a device; it is tried again");
+                }
+                return;
+            }
+            self.waiting.pop_front();
+            self.refused_at = None;
+        }
+    }
+}
+
+/// Records the condition in which the devices were found, and then every change until the control loop ends. A change
+/// that the disk refuses is kept, and recorded as soon as the disk takes it.
 pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Receiver<Arc<ControlStatus>>) {
     let mut recorded = [LastCondition::default(), LastCondition::default()];
+    let mut events = Events::default();
     loop {
         let now = Arc::clone(&status.borrow_and_update());
         let devices = [
@@ -60,11 +94,10 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
 
             tracing::info!("{device}: {message}");
             let (working, _) = condition;
-            let event = DeviceEvent { wall, at, device: device.to_owned(), working, message: message.to_string() };
-            if let Err(error) = store.device_event(&event).await {
-                tracing::error!(%error, "cannot record the state of a device");
-            }
+            let message = message.to_string();
+            events.waiting.push_back(DeviceEvent { wall, at, device: device.to_owned(), working, message });
         }
+        events.write(&store, clock.now()).await;
 
         if status.changed().await.is_err() {
             return;
