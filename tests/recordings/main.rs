@@ -7,6 +7,7 @@ mod step;
 mod view;
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
@@ -327,6 +328,38 @@ fn a_span_becomes_a_video_or_pictures() {
 
     let told = complaint(&parfocal(&[&arguments[..], &["--from", "9"]].concat()));
     assert!(told.contains("lies within the seconds asked for"), "{told}");
+}
+
+#[test]
+fn a_video_that_is_interrupted_leaves_nothing() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 3);
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+
+    // An encoder that begins the file that is named last, and then waits until somebody writes into its pipe.
+    let tools = folder.path().join("tools");
+    fs::create_dir(&tools).unwrap();
+    let pipe = tools.join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let encoder = tools.join("ffmpeg");
+    let script = format!("#!/bin/sh\nfor last; do :; done\necho begun > \"${{last#file:}}\"\ncat '{}'\n", text(&pipe));
+    fs::write(&encoder, script).unwrap();
+    fs::set_permissions(&encoder, fs::Permissions::from_mode(0o755)).unwrap();
+
+    let video = out.join("video.mp4");
+    let mut command = command(&["recording", "video", text(&recording), "--out", text(&video)]);
+    let path = format!("{}:{}", text(&tools), std::env::var("PATH").unwrap());
+    let mut saving = command.env("PATH", path).stderr(Stdio::null()).spawn().unwrap();
+    while fs::read_dir(&out).unwrap().next().is_none() {
+        assert!(saving.try_wait().unwrap().is_none(), "it waits for the encoder");
+        std::thread::yield_now();
+    }
+
+    rustix::process::kill_process(rustix::process::Pid::from_child(&saving), rustix::process::Signal::TERM).unwrap();
+    assert!(!saving.wait().unwrap().success());
+    assert!(fs::read_dir(&out).unwrap().next().is_none());
+    fs::write(&pipe, "end").unwrap();
 }
 
 /// Width and height of a video's pictures.

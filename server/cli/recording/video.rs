@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use crate::cli::interrupt::undo_before_the_end;
 use crate::cli::output::{Failure, print, save};
 use parfocal_base::files::create_with;
 use parfocal_devices::camera::calibration;
@@ -68,6 +69,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     if let Some(format) = format {
         let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
+            // Ctrl-C must not leave a part of a video beside the place of the whole one.
+            let part = file.to_owned();
+            undo_before_the_end(move || drop(fs::remove_file(&part)))?;
             save_video(&Video { file, format }, &recording, &frames, &mut develop)
         });
         made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
