@@ -9,9 +9,8 @@ use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use prometheus_client::encoding::text::encode;
-use prometheus_client::metrics::counter::{ConstCounter, Counter};
-use prometheus_client::metrics::family::Family;
-use prometheus_client::metrics::gauge::{ConstGauge, Gauge};
+use prometheus_client::metrics::counter::ConstCounter;
+use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::registry::{Registry, Unit};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -19,7 +18,6 @@ use super::error::Error;
 use super::roles::Roles;
 use super::{App, AppState};
 use parfocal_base::priority::Scheduling;
-use parfocal_imaging::Size;
 use parfocal_trial::role::Role;
 
 /// The server's counters in the `OpenMetrics` text format.
@@ -31,22 +29,6 @@ async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoR
     let mut text = String::new();
     encode(&mut text, &collect(&app)).map_err(|_| Error::Internal)?;
     Ok(([(CONTENT_TYPE, "application/openmetrics-text; version=1.0.0; charset=utf-8")], text))
-}
-
-/// The label of metrics that are counted by size of pictures.
-type SizeLabel = [(&'static str, &'static str); 1];
-
-const fn label(size: Size) -> SizeLabel {
-    [("size", size.name())]
-}
-
-/// A counter for each size.
-fn by_size(count: impl Fn(Size) -> u64) -> Family<SizeLabel, Counter> {
-    let family = Family::<SizeLabel, Counter>::default();
-    for size in Size::ALL {
-        family.get_or_create(&label(size)).inc_by(count(size));
-    }
-    family
 }
 
 fn collect(app: &App) -> Registry {
@@ -80,16 +62,9 @@ fn collect(app: &App) -> Registry {
 
     registry.register("frames_sent", "Frames sent to viewers", app.metrics.frames_sent.clone());
     registry.register_with_unit("stream", "Frames sent to viewers", Unit::Bytes, app.metrics.bytes_sent.clone());
-    let encoded = by_size(|size| counts.encoded(size));
-    let jpeg = by_size(|size| counts.jpeg_bytes(size));
-    registry.register("frames_encoded", "Frames made into JPEG", encoded);
-    registry.register_with_unit("jpeg", "JPEG made", Unit::Bytes, jpeg);
-
-    let viewers = Family::<SizeLabel, Gauge>::default();
-    for size in Size::ALL {
-        viewers.get_or_create(&label(size)).set(counts.viewers(size).cast_signed());
-    }
-    registry.register("viewers", "Viewers that want pictures now", viewers);
+    registry.register("frames_encoded", "Frames made into JPEG", counts.encoded.clone());
+    registry.register_with_unit("jpeg", "JPEG made", Unit::Bytes, counts.jpeg_bytes.clone());
+    registry.register("viewers", "Viewers that want pictures now", counts.viewers.clone());
 
     if !app.blinded() {
         register_times(&mut registry, app);

@@ -1,9 +1,10 @@
 //! Counts of the work for viewers so far.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 
 use parfocal_base::step::StepRecord;
@@ -20,8 +21,8 @@ const STEP_BUCKETS: [f64; 10] = [1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3,
 /// intervals.
 const MAKING_BUCKETS: [f64; 10] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.1, 0.2];
 
-/// Histograms of the time to make a picture, labelled with the name of its size.
-pub type MakingTimes = Family<[(&'static str, &'static str); 1], Histogram>;
+/// A metric for each size of pictures, labelled with the size's name.
+pub type BySize<M> = Family<[(&'static str, &'static str); 1], M>;
 
 /// Counts of the imaging threads' work so far.
 ///
@@ -29,56 +30,55 @@ pub type MakingTimes = Family<[(&'static str, &'static str); 1], Histogram>;
 /// directly or through the load on the machine. So a comparison of them before and after a setting could unblind it.
 #[derive(Debug)]
 pub struct Counts {
-    sizes: [SizeCounts; Size::ALL.len()],
+    /// Viewers that want pictures now.
+    pub viewers: BySize<Gauge>,
+    /// Frames encoded as JPEG.
+    pub encoded: BySize<Counter>,
+    /// Bytes of these JPEGs.
+    pub jpeg_bytes: BySize<Counter>,
     /// Time from exposure to lens command, seconds, of the frames that reached the imaging thread.
     pub latency: Histogram,
     /// Time that a policy took for its step, seconds.
     pub steps: Histogram,
-    /// Time to develop and encode a picture, seconds, by size.
-    pub making: MakingTimes,
+    /// Time to develop and encode a picture, seconds.
+    pub making: BySize<Histogram>,
+    sizes: [SizeCounts; Size::ALL.len()],
 }
 
-/// Counts of one size.
+/// The counts of one size.
 #[derive(Debug)]
 pub(super) struct SizeCounts {
-    pub(super) viewers: AtomicU64,
-    pub(super) encoded: AtomicU64,
-    pub(super) jpeg_bytes: AtomicU64,
+    pub(super) viewers: Gauge,
+    pub(super) encoded: Counter,
+    pub(super) jpeg_bytes: Counter,
     making: Histogram,
 }
 
 impl Default for Counts {
     fn default() -> Self {
-        let making = MakingTimes::new_with_constructor(|| Histogram::new(MAKING_BUCKETS));
-        let sizes = Size::ALL.map(|size| SizeCounts {
-            viewers: AtomicU64::new(0),
-            encoded: AtomicU64::new(0),
-            jpeg_bytes: AtomicU64::new(0),
-            making: making.get_or_create(&[("size", size.name())]).clone(),
+        let viewers = BySize::<Gauge>::default();
+        let encoded = BySize::<Counter>::default();
+        let jpeg_bytes = BySize::<Counter>::default();
+        let making = BySize::<Histogram>::new_with_constructor(|| Histogram::new(MAKING_BUCKETS));
+        let sizes = Size::ALL.map(|size| {
+            let label = [("size", size.name())];
+            SizeCounts {
+                viewers: viewers.get_or_create_owned(&label),
+                encoded: encoded.get_or_create_owned(&label),
+                jpeg_bytes: jpeg_bytes.get_or_create_owned(&label),
+                making: making.get_or_create_owned(&label),
+            }
         });
 
-        Self { sizes, latency: Histogram::new(LATENCY_BUCKETS), steps: Histogram::new(STEP_BUCKETS), making }
+        let latency = Histogram::new(LATENCY_BUCKETS);
+        let steps = Histogram::new(STEP_BUCKETS);
+        Self { viewers, encoded, jpeg_bytes, latency, steps, making, sizes }
     }
 }
 
 impl Counts {
     pub(super) const fn of(&self, size: Size) -> &SizeCounts {
         &self.sizes[size as usize]
-    }
-
-    /// Viewers that want pictures of `size` now.
-    pub fn viewers(&self, size: Size) -> u64 {
-        self.of(size).viewers.load(Ordering::Relaxed)
-    }
-
-    /// Frames encoded as JPEG of `size` since the start.
-    pub fn encoded(&self, size: Size) -> u64 {
-        self.of(size).encoded.load(Ordering::Relaxed)
-    }
-
-    /// Bytes of JPEG of `size` made since the start.
-    pub fn jpeg_bytes(&self, size: Size) -> u64 {
-        self.of(size).jpeg_bytes.load(Ordering::Relaxed)
     }
 
     /// Records the times of the loop's `step`, unless it belongs to a setting.

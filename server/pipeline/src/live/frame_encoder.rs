@@ -40,7 +40,7 @@ impl FrameEncoder {
     ///
     /// # Errors
     /// If the picture cannot be encoded.
-    pub(super) fn encode(&mut self, controlled: ControlledFrame) -> Result<EncodedFrame, JpegError> {
+    pub(super) fn encode(&mut self, controlled: &ControlledFrame) -> Result<EncodedFrame, JpegError> {
         let ControlledFrame { frame, patch, content_area, aim, record, belief, left_by_session, .. } = controlled;
 
         let (width, height, jpeg) = match (&frame.image, &self.picture) {
@@ -59,17 +59,17 @@ impl FrameEncoder {
                 per_cell: if developed { self.size.per_cell() } else { 1 },
                 jpeg,
                 estimated: developed,
-                patch,
-                content_area,
-                aim,
+                patch: *patch,
+                content_area: *content_area,
+                aim: *aim,
             },
             insight: Insight {
                 asked: record.asked,
                 measured: record.measured,
                 metric: record.metric,
                 held: record.held,
-                belief,
-                left_by_session,
+                belief: belief.clone(),
+                left_by_session: *left_by_session,
             },
         })
     }

@@ -1,14 +1,13 @@
 //! The thread that makes the pictures of one larger size, while it has viewers. It takes the latest
 //! frame whenever it is done with one, so neither the smallest size nor the loop waits for it.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use super::frame_encoder::FrameEncoder;
 use super::frame_thread::{FrameSlot, FrameThread};
 use super::publisher::Publisher;
 use crate::control::ControlledFrame;
-use parfocal_base::clock::{Clock, Moment};
+use parfocal_base::clock::Moment;
 use parfocal_base::guarded;
 use parfocal_imaging::{Developer, Size};
 
@@ -31,14 +30,9 @@ impl LargerSize {
     ///
     /// # Errors
     /// If the system cannot create a thread or an encoder.
-    pub(super) fn start(
-        developer: Developer,
-        size: Size,
-        publisher: Publisher,
-        clock: Arc<dyn Clock>,
-    ) -> std::io::Result<Self> {
+    pub(super) fn start(developer: Developer, size: Size, publisher: Publisher) -> std::io::Result<Self> {
         let frame_encoder = FrameEncoder::new(developer, size).map_err(std::io::Error::other)?;
-        let worker = Worker { publisher: publisher.clone(), clock, frame_encoder, last: None };
+        let worker = Worker { publisher: publisher.clone(), frame_encoder, last: None };
         let thread = FrameThread::start(format!("imaging-{}", size.name()), |slot| worker.run(&slot))?;
         Ok(Self { publisher, thread })
     }
@@ -53,7 +47,6 @@ impl LargerSize {
 
 struct Worker {
     publisher: Publisher,
-    clock: Arc<dyn Clock>,
     frame_encoder: FrameEncoder,
     /// When the last frame that became a picture was exposed.
     last: Option<Moment>,
@@ -70,7 +63,7 @@ impl Worker {
             }
 
             // One bad picture must not end the live view.
-            if guarded(|| self.make(frame)).is_err() {
+            if guarded(|| self.make(&frame)).is_err() {
                 tracing::error!("a larger picture could not be made; continuing with the next");
             }
         }
@@ -82,16 +75,10 @@ impl Worker {
         !self.last.is_some_and(early)
     }
 
-    fn make(&mut self, frame: ControlledFrame) {
+    fn make(&mut self, frame: &ControlledFrame) {
         self.last = Some(frame.frame.exposed_at);
-        let began = self.clock.now();
-        let step = frame.record.clone();
-
+        let began = self.publisher.clock.now();
         self.frame_encoder.develop(&frame.frame.image);
-        match self.frame_encoder.encode(frame) {
-            Ok(frame) => self.publisher.publish(frame),
-            Err(error) => tracing::error!(%error, "a larger picture could not be encoded"),
-        }
-        self.publisher.note_time(&step, self.clock.now().since(began));
+        self.publisher.publish(&mut self.frame_encoder, frame, began);
     }
 }

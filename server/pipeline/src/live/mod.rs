@@ -22,7 +22,6 @@ pub use thread::start;
 pub use viewer::Viewer;
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use tokio::sync::watch;
 
@@ -49,7 +48,7 @@ impl LiveHandle {
     /// Joins the viewers of `size`, or of the largest size if that is smaller. A size without viewers is not made.
     fn join(&self, size: Size, leads: bool) -> Watcher {
         let size = size.min(self.largest());
-        self.counts.of(size).viewers.fetch_add(1, Ordering::Relaxed);
+        self.counts.of(size).viewers.inc();
         let mut frames = self.frames[size as usize].clone();
 
         // A frame made earlier is stale by the time somebody joins.
@@ -106,6 +105,6 @@ impl Watcher {
 
 impl Drop for Watcher {
     fn drop(&mut self) {
-        self.counts.of(self.size).viewers.fetch_sub(1, Ordering::Relaxed);
+        self.counts.of(self.size).viewers.dec();
     }
 }

@@ -1,44 +1,41 @@
 //! Publishes the pictures of one size to their viewers.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use tokio::sync::watch;
 
+use super::frame_encoder::FrameEncoder;
 use super::{Counts, EncodedFrame};
-use parfocal_base::step::StepRecord;
+use crate::control::ControlledFrame;
+use parfocal_base::clock::{Clock, Moment};
 use parfocal_imaging::Size;
 
 /// The sending end of a size's pictures.
 #[derive(Clone)]
 pub(super) struct Publisher {
-    size: Size,
-    sender: watch::Sender<Option<Arc<EncodedFrame>>>,
-    counts: Arc<Counts>,
+    pub(super) size: Size,
+    pub(super) sender: watch::Sender<Option<Arc<EncodedFrame>>>,
+    pub(super) counts: Arc<Counts>,
+    pub(super) clock: Arc<dyn Clock>,
 }
 
 impl Publisher {
-    /// The outlet for `size`, which counts its pictures in `counts`.
-    pub(super) const fn new(size: Size, sender: watch::Sender<Option<Arc<EncodedFrame>>>, counts: Arc<Counts>) -> Self {
-        Self { size, sender, counts }
-    }
-
     /// Whether this size has viewers.
     pub(super) fn is_watched(&self) -> bool {
-        self.counts.of(self.size).viewers.load(Ordering::Relaxed) > 0
+        self.counts.of(self.size).viewers.get() > 0
     }
 
-    /// Records the time that the picture of `step`'s frame `took`.
-    pub(super) fn note_time(&self, step: &StepRecord, took: Duration) {
-        self.counts.note_picture(self.size, step, took);
-    }
-
-    /// Hands `frame` to all viewers.
-    pub(super) fn publish(&self, frame: EncodedFrame) {
-        let counts = self.counts.of(self.size);
-        counts.encoded.fetch_add(1, Ordering::Relaxed);
-        counts.jpeg_bytes.fetch_add(frame.picture.jpeg.len() as u64, Ordering::Relaxed);
-        self.sender.send_replace(Some(Arc::new(frame)));
+    /// Encodes `frame`, which `encoder` has developed since `began`, and hands it to all viewers.
+    pub(super) fn publish(&self, encoder: &mut FrameEncoder, frame: &ControlledFrame, began: Moment) {
+        match encoder.encode(frame) {
+            Ok(made) => {
+                let counts = self.counts.of(self.size);
+                counts.encoded.inc();
+                counts.jpeg_bytes.inc_by(made.picture.jpeg.len() as u64);
+                self.sender.send_replace(Some(Arc::new(made)));
+            }
+            Err(error) => tracing::error!(%error, "a picture could not be encoded"),
+        }
+        self.counts.note_picture(self.size, &frame.record, self.clock.now().since(began));
     }
 }

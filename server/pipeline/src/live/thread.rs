@@ -40,7 +40,7 @@ pub fn start(
     let counts = Arc::new(Counts::default());
     let publisher = |size| {
         let (sender, frames) = watch::channel(None);
-        (Publisher::new(size, sender, Arc::clone(&counts)), frames)
+        (Publisher { size, sender, counts: Arc::clone(&counts), clock: Arc::clone(clock) }, frames)
     };
 
     let (cells, latest) = publisher(Size::Cell);
@@ -49,7 +49,7 @@ pub fn start(
     for size in Size::ALL.into_iter().filter(|size| (Size::Half..=largest).contains(size)) {
         let (publisher, latest) = publisher(size);
         frames.push(latest);
-        larger.push(LargerSize::start(developer.clone(), size, publisher, Arc::clone(clock))?);
+        larger.push(LargerSize::start(developer.clone(), size, publisher)?);
     }
 
     let frame_encoder = FrameEncoder::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
@@ -66,8 +66,6 @@ pub fn start(
     let worker = Worker {
         control,
         publisher: cells,
-        counts,
-        clock: Arc::clone(clock),
         frame_encoder,
         larger,
         surveyor,
@@ -83,8 +81,6 @@ pub fn start(
 struct Worker {
     control: ControlHandle,
     publisher: Publisher,
-    counts: Arc<Counts>,
-    clock: Arc<dyn Clock>,
     frame_encoder: FrameEncoder,
     larger: Vec<LargerSize>,
     surveyor: Surveyor,
@@ -109,7 +105,7 @@ impl Worker {
     }
 
     fn turn(&mut self, frame: &ControlledFrame) {
-        self.counts.note_step(&frame.record);
+        self.publisher.counts.note_step(&frame.record);
         let watched = self.publisher.is_watched();
 
         // We count from the last search: if frames come faster than this thread takes them, every multiple of ten could
@@ -117,19 +113,15 @@ impl Worker {
         let number = frame.frame.number;
         let detect = self.looked.is_none_or(|looked| number.abs_diff(looked) >= DETECT_EVERY);
 
-        let began = self.clock.now();
-        let image = frame.frame.image.clone();
+        let began = self.publisher.clock.now();
+        let image = &frame.frame.image;
         if watched || detect {
-            self.frame_encoder.develop(&image);
+            self.frame_encoder.develop(image);
         }
 
         // The picture leaves first: its viewers wait neither for a larger size nor for the detection.
         if watched {
-            match self.frame_encoder.encode(frame.clone()) {
-                Ok(frame) => self.publisher.publish(frame),
-                Err(error) => tracing::error!(%error, "a picture could not be encoded"),
-            }
-            self.counts.note_picture(Size::Cell, &frame.record, self.clock.now().since(began));
+            self.publisher.publish(&mut self.frame_encoder, frame, began);
         }
         for larger in &self.larger {
             larger.offer(frame);
@@ -144,7 +136,7 @@ impl Worker {
 
         if detect {
             self.looked = Some(number);
-            if let Some(news) = self.areas.see(content_area::detect(self.frame_encoder.gray(&image))) {
+            if let Some(news) = self.areas.see(content_area::detect(self.frame_encoder.gray(image))) {
                 self.control.send(Command::ContentArea(news));
             }
         }
