@@ -23,15 +23,19 @@ pub struct Advice {
 }
 
 /// Why a policy gave no advice.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// It panicked with this message. Its thread has ended.
+    #[error("it panicked: {0}")]
     Panicked(String),
     /// It could not be built. Its thread has ended.
+    #[error(transparent)]
     Unavailable(PolicyError),
     /// It runs in another process, which did not answer, or not as it should.
+    #[error(transparent)]
     Outside(Fault),
     /// It asked for this number, which is not a focal power.
+    #[error("it asked for {0}, which is not a focal power")]
     InvalidTarget(f64),
 }
 

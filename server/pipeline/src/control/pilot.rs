@@ -107,7 +107,7 @@ impl Pilot {
                 self.failed = None;
                 Ok(advice)
             }
-            Some(Err(failure)) => Err(self.fail(now, hold_reason(failure))),
+            Some(Err(failure)) => Err(self.fail(now, hold_reason(&failure))),
             None => Err(if proven { slow() } else { starting() }),
         }
     }
@@ -121,7 +121,7 @@ impl Pilot {
 
         match runner.answer(Duration::ZERO) {
             Some(Ok(_late)) => Ok(()),
-            Some(Err(failure)) => Err(self.fail(now, hold_reason(failure))),
+            Some(Err(failure)) => Err(self.fail(now, hold_reason(&failure))),
             None if now.since(since) < limit => Err(reason),
             None => Err(self.fail(now, slow())),
         }
@@ -172,52 +172,25 @@ impl Pilot {
 
 /// The reason for a hold after `failure`. Only the debug log gets the details: the operator of a blinded session may
 /// read the log, and only some policies fail in these ways. Outside a session the status shows the kind of failure.
-fn hold_reason(failure: Failure) -> HoldReason {
+fn hold_reason(failure: &Failure) -> HoldReason {
+    tracing::debug!(%failure, "the policy gave no advice");
     match failure {
-        Failure::Panicked(message) => {
-            tracing::debug!(message, "the policy panicked");
-            failed()
-        }
-        Failure::Outside(Fault::Late) => {
-            tracing::debug!("the policy's process did not answer and was ended");
-            slow()
-        }
-        Failure::Outside(Fault::Ended(message)) => {
-            tracing::debug!(message, "the policy's process ended");
-            failed()
-        }
-        Failure::Outside(Fault::Nonsense(message)) => {
-            tracing::debug!(message, "the policy's process sent something that is not an answer");
-            nonsense()
-        }
         Failure::Unavailable(PolicyError::Starting { failed: None, .. }) => starting(),
-        Failure::Unavailable(PolicyError::Starting { failed: Some(message), .. }) => {
-            tracing::debug!(message, "the policy's process did not start");
-            failed()
+        Failure::Outside(Fault::Late) => slow(),
+        Failure::Panicked(_)
+        | Failure::Outside(Fault::Ended(_))
+        | Failure::Unavailable(PolicyError::Starting { failed: Some(_), .. }) => {
+            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
         }
-        Failure::Unavailable(error) => {
-            tracing::debug!(%error, "the policy cannot be started");
-            HoldReason::new(
-                Hold::PolicyUnavailable,
-                "the policy cannot run here; the lens is held. `parfocal policies` shows the reason",
-            )
-        }
-        Failure::InvalidTarget(target) => {
-            tracing::debug!(target, "the policy returned an invalid focal power");
-            nonsense()
-        }
+        Failure::Outside(Fault::Nonsense(_)) | Failure::InvalidTarget(_) => HoldReason::new(
+            Hold::PolicyNonsense,
+            "the policy returned an invalid focal power and is being restarted; the lens is held",
+        ),
+        Failure::Unavailable(_) => HoldReason::new(
+            Hold::PolicyUnavailable,
+            "the policy cannot run here; the lens is held. `parfocal policies` shows the reason",
+        ),
     }
-}
-
-fn failed() -> HoldReason {
-    HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
-}
-
-fn nonsense() -> HoldReason {
-    HoldReason::new(
-        Hold::PolicyNonsense,
-        "the policy returned an invalid focal power and is being restarted; the lens is held",
-    )
 }
 
 fn slow() -> HoldReason {
