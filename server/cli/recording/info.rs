@@ -125,16 +125,5 @@ fn describe(info: &Info) -> String {
     let share = info.share_of_packed.map_or(String::new(), |share| format!(", {share:.2} of packed 10 bit"));
     let _ = writeln!(text, "size         {:.1} MB{share}", *bytes as f64 / 1e6);
 
-    let ended = match &header.ended {
-        Some(ended) => ended.to_string(),
-        None => "cut short, or still being recorded; the frames above are whole".to_owned(),
-    };
-    let _ = writeln!(text, "ended        {ended}");
-
-    let checked = if info.damaged.is_empty() { "every frame matches its checksum" } else { "damaged:" };
-    let _ = writeln!(text, "checked      {checked}");
-    for damage in &info.damaged {
-        let _ = writeln!(text, "  {damage}");
-    }
-    text
+    text + &view_info::state(header.ended.as_ref(), "every frame matches its checksum", &info.damaged)
 }

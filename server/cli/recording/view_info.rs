@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use parfocal_recording::{ViewHeader, ViewRecording, ViewRow};
+use parfocal_recording::{Ended, ViewHeader, ViewRecording, ViewRow};
 
 /// What is printed.
 #[derive(Debug, Serialize)]
@@ -39,8 +39,10 @@ struct SizeInfo {
 pub(super) fn look(path: &Path, recording: &ViewRecording) -> ViewInfo {
     let rows = recording.rows();
     let seconds = seconds(rows);
-    let numbered =
-        rows.first().zip(rows.last()).map_or(0, |(first, last)| last.number.saturating_sub(first.number) + 1);
+    let numbered = rows
+        .first()
+        .zip(rows.last())
+        .map_or(0, |(first, last)| last.number.saturating_sub(first.number).saturating_add(1));
 
     let mut sizes: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     for row in rows {
@@ -85,15 +87,16 @@ pub(super) fn describe(info: &ViewInfo) -> String {
     let _ = writeln!(text, "missing      {} that were not made for viewers", info.frames_missing);
     let _ = writeln!(text, "size         {:.1} MB", *bytes as f64 / 1e6);
 
-    let ended = match &header.ended {
-        Some(ended) => ended.to_string(),
-        None => "cut short, or still being recorded; the frames above are whole".to_owned(),
-    };
-    let _ = writeln!(text, "ended        {ended}");
+    text + &state(header.ended.as_ref(), "every picture is whole", &info.damaged)
+}
 
-    let checked = if info.damaged.is_empty() { "every picture is whole" } else { "damaged:" };
-    let _ = writeln!(text, "checked      {checked}");
-    for damage in &info.damaged {
+/// How a recording `ended`, and what the check found: `well`, if nothing is damaged.
+pub(super) fn state(ended: Option<&Ended>, well: &str, damaged: &[String]) -> String {
+    let cut = "cut short, or still being recorded; the frames above are whole".to_owned();
+    let ended = ended.map_or(cut, Ended::to_string);
+    let checked = if damaged.is_empty() { well } else { "damaged:" };
+    let mut text = format!("ended        {ended}\nchecked      {checked}\n");
+    for damage in damaged {
         let _ = writeln!(text, "  {damage}");
     }
     text
