@@ -114,8 +114,8 @@ impl Phantom {
         let rows = samples.chunks_exact(SENSOR_WIDTH).enumerate().skip(2).step_by(13);
 
         let lit = rows.flat_map(|(y, row)| {
-            let (first, last) = self.optics.span((y / CELL).min(view::HEIGHT - 1));
-            row.iter().take(CELL * (last + 1)).skip(CELL * first).step_by(5).copied()
+            let lit = self.optics.span((y / CELL).min(view::HEIGHT - 1));
+            row[CELL * lit.start..CELL * lit.end].iter().step_by(5).copied()
         });
 
         self.exposure.adjust(lit);

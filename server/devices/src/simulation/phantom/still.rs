@@ -130,8 +130,7 @@ impl Phantom {
         let mut counts = Vec::new();
 
         for y in (0..view::HEIGHT).step_by(METERED) {
-            let (first, last) = self.optics.span(y);
-            for x in (first..=last).step_by(METERED) {
+            for x in self.optics.span(y).step_by(METERED) {
                 let light = view::look_at(x, y, &self.optics, &mapping, surface, focal_power.get() as f32);
                 counts.extend(self.bands.counts(light));
             }

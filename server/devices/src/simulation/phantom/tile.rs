@@ -24,9 +24,7 @@ impl Tile {
         let noise = self.sensor.fresh_noise();
 
         for (y, row) in samples.chunks_exact_mut(SENSOR_WIDTH).enumerate().take(SENSOR_HEIGHT) {
-            let (first, last) = self.optics.span(y / CELL);
-            let columns = if first <= last { first..last + 1 } else { 0..0 };
-
+            let columns = self.optics.span(y / CELL);
             let light = columns.clone().map(|x| self.level * sensor::FULL_SCALE * self.optics.light(x, y / CELL));
             let expected: Vec<f32> = light.flat_map(|counts| [counts; CELL]).collect();
             self.sensor.read_row(row, y, CELL * columns.start, &expected, noise[y]);

@@ -37,8 +37,8 @@ pub(super) struct Optics {
     centre: [f32; 2],
     /// Light that reaches each pixel, 0..1: falls off to the rim of the content area and is 0 outside.
     light: Vec<f32>,
-    /// First and last lit column of each row.
-    spans: Vec<(usize, usize)>,
+    /// The lit columns of each row.
+    spans: Vec<Range<usize>>,
 }
 
 /// A part of the picture, in cells; only light within it is computed.
@@ -51,9 +51,9 @@ pub(super) struct Region {
 impl Region {
     pub(super) const WHOLE: Self = Self { columns: 0..WIDTH, rows: 0..HEIGHT };
 
-    /// The region's columns from the first to the last lit one; `0..0` if there are none.
-    pub(super) fn lit(&self, (first, last): (usize, usize)) -> Range<usize> {
-        let columns = first.max(self.columns.start)..(last + 1).min(self.columns.end);
+    /// The region's columns within the lit `span`; `0..0` if there are none.
+    pub(super) fn lit(&self, span: Range<usize>) -> Range<usize> {
+        let columns = span.start.max(self.columns.start)..span.end.min(self.columns.end);
         if columns.is_empty() { 0..0 } else { columns }
     }
 }
@@ -107,16 +107,16 @@ impl Optics {
         self.light[y * WIDTH + x]
     }
 
-    /// First and last lit column of a row; empty (`first > last`) in the dark.
-    pub(super) fn span(&self, y: usize) -> (usize, usize) {
-        self.spans[y]
+    /// The lit columns of a row; `0..0` in the dark.
+    pub(super) fn span(&self, y: usize) -> Range<usize> {
+        self.spans[y].clone()
     }
 }
 
-fn lit_span(row: &[f32]) -> (usize, usize) {
-    let first = row.iter().position(|light| *light > 0.0).unwrap_or(1);
-    let last = row.iter().rposition(|light| *light > 0.0).unwrap_or(0);
-    (first, last)
+fn lit_span(row: &[f32]) -> Range<usize> {
+    let first = row.iter().position(|light| *light > 0.0).unwrap_or(0);
+    let end = row.iter().rposition(|light| *light > 0.0).map_or(0, |last| last + 1);
+    first..end
 }
 
 /// The mapping from pixels to the surface at one pose.
@@ -200,8 +200,8 @@ pub(super) fn look(
 ) {
     darken(line);
 
-    let (first, last) = optics.spans[y];
-    for x in first.max(columns.start.saturating_sub(1))..(last + 1).min(columns.end + 1) {
+    let lit = &optics.spans[y];
+    for x in lit.start.max(columns.start.saturating_sub(1))..lit.end.min(columns.end + 1) {
         let cell = look_at(x, y, optics, mapping, surface, focal_power);
         for (plane, light) in line.iter_mut().zip(cell) {
             plane[x + 1] = light;
