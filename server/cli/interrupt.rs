@@ -1,5 +1,5 @@
-//! Signals that end a command. For commands that save their work, the first Ctrl-C asks them to stop, and the second
-//! ends the process at once. Every lens is released before the process ends.
+//! Signals that end a command. For commands that save their work, the first Ctrl-C or SIGTERM asks them to stop, and the
+//! second ends the process at once. Every lens is released before the process ends.
 
 use std::io;
 use std::sync::Arc;
@@ -35,12 +35,12 @@ pub fn undo_before_the_end(undo: impl Fn() + Clone + Send + 'static) -> io::Resu
     listen(&[SIGINT, SIGTERM, SIGHUP, SIGQUIT], undo)
 }
 
-/// The same without SIGINT, for commands that handle Ctrl-C with an [`Interrupt`].
+/// The same for the signals that an [`Interrupt`] does not handle.
 ///
 /// # Errors
 /// If the system cannot provide a thread or a signal handler.
 pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
-    listen(&[SIGTERM, SIGHUP, SIGQUIT], || {})
+    listen(&[SIGHUP, SIGQUIT], || {})
 }
 
 fn listen(ending: &[i32], undo: impl Fn() + Clone + Send + 'static) -> io::Result<()> {
@@ -63,7 +63,7 @@ fn listen(ending: &[i32], undo: impl Fn() + Clone + Send + 'static) -> io::Resul
     Ok(())
 }
 
-/// Whether Ctrl-C was pressed, and whether everything is saved.
+/// Whether Ctrl-C was pressed or SIGTERM came, and whether everything is saved.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
@@ -71,7 +71,7 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Starts to listen. The first Ctrl-C prints `notice`.
+    /// Starts to listen. The first signal prints `notice`.
     ///
     /// # Errors
     /// If the system cannot provide a thread or a signal handler.
@@ -79,12 +79,20 @@ impl Interrupt {
         let interrupt = Self::default();
         let heard = interrupt.clone();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let within = runtime.enter();
+        let mut interrupted = signal(SignalKind::interrupt())?;
+        let mut terminated = signal(SignalKind::terminate())?;
+        drop(within);
 
         std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
             runtime.block_on(async {
-                while tokio::signal::ctrl_c().await.is_ok() {
+                loop {
+                    let ending = tokio::select! {
+                        _ = interrupted.recv() => SIGINT,
+                        _ = terminated.recv() => SIGTERM,
+                    };
                     if heard.asked.swap(true, Ordering::Relaxed) || heard.saved.load(Ordering::Relaxed) {
-                        end_by(SIGINT);
+                        end_by(ending);
                     }
                     tell(format_args!("{notice}; Ctrl-C again to stop at once"));
                 }
@@ -94,12 +102,12 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Whether Ctrl-C was pressed, so that the command should stop.
+    /// Whether Ctrl-C was pressed or SIGTERM came, so that the command should stop.
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// From now on Ctrl-C ends the process at once, because everything is saved.
+    /// From now on either ends the process at once, because everything is saved.
     pub fn all_is_saved(&self) {
         self.saved.store(true, Ordering::Relaxed);
     }

@@ -23,6 +23,7 @@ use parfocal_learning::training::recipe::{Recipe, shipped};
 use parfocal_learning::training::run::checkpoint::Checkpoint;
 use parfocal_learning::training::run::resume::ResumeRequest;
 use parfocal_learning::training::run::{Run, Sources};
+use rustix::process::Signal;
 
 /// The recipe that ships as `policy`, made small, with `updates` updates.
 fn small(policy: &str, updates: u64) -> Recipe {
@@ -244,7 +245,7 @@ fn a_training_continues_on_the_footage_that_it_was_begun_with() {
 }
 
 #[test]
-fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_process() {
+fn a_signal_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_process() {
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("recipe.toml");
     let out = folder.path().join("run");
@@ -264,9 +265,8 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
         process.args(command).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     };
 
-    let interrupt = |process: &std::process::Child| {
-        let process = rustix::process::Pid::from_child(process);
-        rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
+    let send = |signal, process: &std::process::Child| {
+        rustix::process::kill_process(rustix::process::Pid::from_child(process), signal).unwrap();
     };
 
     let mut process = start(&["--config", config.to_str().unwrap()]);
@@ -279,7 +279,8 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
     let second = start(&["--resume"]).wait_with_output().unwrap();
     assert!(String::from_utf8_lossy(&second.stderr).contains("another training is running in"));
 
-    interrupt(&process);
+    // As a cluster's scheduler and a service manager do.
+    send(Signal::TERM, &process);
     let output = process.wait_with_output().unwrap();
     assert!(output.status.success());
 
@@ -289,9 +290,9 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
     let mut process = start(&["--resume"]);
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.contains(" of 1000000 updates: loss ")));
-    interrupt(&process);
+    send(Signal::INT, &process);
     assert!(lines.any(|line| line.contains("Ctrl-C again to stop at once")));
-    interrupt(&process);
+    send(Signal::INT, &process);
     assert_eq!(process.wait().unwrap().signal(), Some(2));
 }
 
