@@ -149,7 +149,9 @@ fn write_protocol(text: &mut String, protocol: &ProtocolAnalysis) {
 
 /// The figures of one site, below those of all.
 fn write_site(text: &mut String, site: &SiteAnalysis, compared: &Comparison) {
-    let _ = writeln!(text, "  at {}: {} surgeons, {} sessions", site.site, site.surgeons, site.sessions);
+    let surgeons = if site.surgeons == 1 { "surgeon" } else { "surgeons" };
+    let sessions = if site.sessions == 1 { "session" } else { "sessions" };
+    let _ = writeln!(text, "  at {}: {} {surgeons}, {} {sessions}", site.site, site.surgeons, site.sessions);
     write_policies(text, "    ", compared);
     for sentence in sentences(compared) {
         let _ = writeln!(text, "    {sentence}");
