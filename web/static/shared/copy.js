@@ -16,7 +16,7 @@ export function copyOnPress(button, source) {
   copyWhenPressed(button, text, () => {
     if (source instanceof HTMLInputElement) source.select();
     else getSelection()?.selectAllChildren(source);
-    document.execCommand("copy");
+    return document.execCommand("copy");
   });
 }
 
@@ -33,17 +33,19 @@ export function copyText(button, text) {
 /**
  * @param {HTMLButtonElement} button
  * @param {() => string} text
- * @param {() => void} otherwise copies without the clipboard interface, which is missing on plain http
+ * @param {() => boolean} otherwise copies without the clipboard interface, which is missing on plain http; returns
+ *   whether it could
  */
 function copyWhenPressed(button, text, otherwise) {
   const label = button.textContent ?? "";
   button.onclick = async () => {
+    let copied = true;
     try {
       await navigator.clipboard.writeText(text());
     } catch {
-      otherwise();
+      copied = otherwise();
     }
-    setText(button, "Copied");
+    setText(button, copied ? "Copied" : "Not copied");
     setTimeout(() => setText(button, label), TOLD_MS);
   };
 }
@@ -58,7 +60,8 @@ function copySelected(text, beside) {
   const field = make("textarea", { className: "visually-hidden", value: text, "aria-hidden": "true" });
   beside.after(field);
   field.select();
-  document.execCommand("copy");
+  const copied = document.execCommand("copy");
   field.remove();
   beside.focus({ preventScroll: true });
+  return copied;
 }
