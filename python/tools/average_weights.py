@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     total = sum(share for _, share in arguments.files)
-    if abs(total - 1) > 1e-6:
+    if not math.isclose(total, 1, abs_tol=1e-6):
         raise SystemExit(f"the shares add up to {total:g}, not to 1")
     write(arguments.out, average(arguments.files), arguments.made)
 
