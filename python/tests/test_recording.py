@@ -78,9 +78,28 @@ def test_colours_are_those_of_the_program(made: Path, tmp_path: Path) -> None:
     assert apart.mean() < 0.6
 
 
+def test_without_a_white_reference_there_are_counts_and_colours_but_no_reflectances(
+    made: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(made, copy)
+    toml = copy / "calibration" / "calibration.toml"
+    lines = [line for line in toml.read_text().splitlines() if not line.startswith("white = ")]
+    toml.write_text("\n".join(lines))
+    recording = parfocal.open_recording(copy)
+    assert recording.cube(0).shape == (272, 512, 16)
+    assert recording.rgb(0).shape == (272, 512, 3)
+    for frame in (0, None):
+        with pytest.raises(parfocal.BadRecording, match=r"no white reference.*Use cube"):
+            recording.isel(frame=slice(0, 1)).reflectance(frame)
+
+
 def test_a_frame_that_is_not_there_is_named(made: Path) -> None:
+    recording = parfocal.open_recording(made)
     with pytest.raises(IndexError, match=r"has the frames 0 to \d+, and not frame 900"):
-        parfocal.open_recording(made).cube(900)
+        recording.cube(900)
+    with pytest.raises(IndexError, match=r"holds no frame"):
+        recording.isel(frame=slice(0, 0)).cube(0)
 
 
 def change(folder: Path, **attributes: object) -> None:

@@ -48,9 +48,15 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
     def reflectance(self, frame: int | None = None) -> xr.DataArray:
         """Return reflectances, 0 for dark and 1 for the white reference: of one frame, or of all.
 
-        The calibration in the recording is used: dark, white, and the spectral correction. With dask
+        The calibration in the recording is used: dark, white, and the spectral correction. Without a white
+        reference, counts say nothing about reflectance, and `BadRecording` is raised. With dask
         (``pip install parfocal[lazy]``) all frames are computed only as they are used.
         """
+        if not self["white"].attrs["measured"]:
+            raise BadRecording(
+                "The recording has no white reference, so its counts say nothing about reflectance. Use cube() for "
+                "counts, or record again with a calibration of 'parfocal calibrate'."
+            )
         balanced = self._balanced(frame)
         correction = self._correction()
         if not np.array_equal(correction, np.eye(_BANDS)):
@@ -70,6 +76,8 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
 
     def _frame(self, frame: int) -> xr.DataArray:
         count = self.sizes["frame"]
+        if count == 0:
+            raise IndexError("The recording holds no frame.")
         if not -count <= frame < count:
             raise IndexError(f"The recording has the frames 0 to {count - 1}, and not frame {frame}.")
         return self["mosaic"].isel(frame=frame)
@@ -179,10 +187,13 @@ def _calibrated(file: Path, calibration: dict[str, Any], dataset: xr.Dataset) ->
         counts = np.broadcast_to(np.asarray(value, dtype=np.float64), (_BANDS,))
         return xr.Variable(("wavelength",), counts[order])
 
+    white = reference("white", full)
+    # As the program sees it: full scale in every band stands for a white that nobody has measured.
+    white.attrs["measured"] = white.ndim == 2 or bool((white != full).any())
     correction = np.asarray(calibration.get("spectral_correction", np.eye(_BANDS)), dtype=np.float64)
     return {
         "dark": reference("dark", 0.0),
-        "white": reference("white", full),
+        "white": white,
         "spectral_correction": xr.Variable(
             ("wavelength", "from_wavelength"), correction[np.ix_(order, order)]
         ),
