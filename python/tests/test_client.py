@@ -271,6 +271,9 @@ def test_an_encrypted_server_is_trusted_by_its_authority() -> None:
         with server.client() as client:
             assert client.service.healthz()["simulated"]
             assert next(client.frames()).jpeg
+        unencrypted = Client(server.url.replace("https", "http"), server.keys["operator"])
+        with unencrypted, pytest.raises(parfocal.IncompatibleServer, match=r"leads to https://.*use that"):
+            unencrypted.operator.choices()
         stranger = Client(server.url, server.keys["operator"])
         with stranger, pytest.raises(parfocal.ServerGone, match=r"not trusted: give the authority"):
             stranger.operator.choices()

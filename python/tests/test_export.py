@@ -114,6 +114,13 @@ def test_a_changed_value_loads_but_does_not_verify(folder: Path) -> None:
         parfocal.load(folder, verify=True)
 
 
+def test_damaged_checksums_do_not_verify(folder: Path) -> None:
+    sums = folder / "SHA256SUMS"
+    sums.write_bytes(sums.read_bytes().replace(b"comments.csv", b"comments.\xff\xfev"))
+    with pytest.raises(parfocal.BadExport, match=r"lacks the file comments"):
+        parfocal.load(folder, verify="checksums")
+
+
 def test_a_file_that_does_not_belong_to_it_does_not_verify(folder: Path) -> None:
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(parfocal.BadExport, match=r"notes.txt does not belong"):

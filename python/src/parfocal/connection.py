@@ -104,6 +104,12 @@ def _plain(value: Any) -> Any:
 
 def read(response: httpx.Response, answer: Answer, *, may_fail: bool = False) -> Any:
     """Return a response as the value that the interface promises, or raise the server's sentence."""
+    if response.has_redirect_location:
+        # What a server that encrypts answers on unencrypted connections.
+        raise IncompatibleServer(
+            f"{response.url} leads to {response.headers['Location']}: use that server's address. One with https "
+            "may need the authority's certificate, Client(..., ca='data/tls/authority.crt')."
+        )
     if not response.is_success and not may_fail:
         raise refusal(response.status_code, response.content)
     match answer:

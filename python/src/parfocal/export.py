@@ -184,7 +184,9 @@ class Export(Mapping[str, pd.DataFrame]):
     def verify_checksums(self) -> None:
         """Check every file against ``SHA256SUMS``. Needs no program, and finds damage, not forgery."""
         listed: set[str] = set()
-        for line in self._files.read(f"{self._parent}SHA256SUMS").decode().splitlines():
+        # A damaged name is then that of a file which is not there.
+        sums = self._files.read(f"{self._parent}SHA256SUMS").decode(errors="replace")
+        for line in sums.splitlines():
             sha256, _, name = line.partition("  ")
             listed.add(name)
             if hashlib.sha256(self._files.read(self._parent + name)).hexdigest() != sha256:
