@@ -161,6 +161,15 @@ fn a_makers_tables_are_imported() {
     let said = refused(&[&lobes[..], &["--range", "480-600"]].concat());
     assert!(said.contains("lobes.csv: band 0 has no peak between 480 and 600 nm"), "{said}");
 
+    // A calibration that nothing could read again is not saved.
+    let before = fs::read(path("unit/calibration.toml")).unwrap();
+    let infrared = |nm: u32| line(nm - 340).replacen(&(nm - 340).to_string(), &nm.to_string(), 1);
+    fs::write(path("infrared.csv"), (780..=940).map(infrared).collect::<String>()).unwrap();
+    let import = ["calibrate", "import", "--responses", &path("infrared.csv"), "--range", "790-940", "--out", &out];
+    let said = refused(&import);
+    assert!(said.contains("nothing was saved") && said.contains("between 380 and 780 nm"), "{said}");
+    assert_eq!(fs::read(path("unit/calibration.toml")).unwrap(), before);
+
     fs::write(path("correction.csv"), "1,2,3\n").unwrap();
     let said = refused(&["calibrate", "import", "--correction", &path("correction.csv"), "--out", &out]);
     assert!(said.contains("line 1 must have 16 numbers"), "{said}");

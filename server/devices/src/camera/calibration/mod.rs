@@ -142,11 +142,10 @@ pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
 /// names the references that are new. Returns the file's path.
 ///
 /// # Errors
-/// If the folder cannot be written.
+/// If it has a value that [`read`] refuses, as a maker's table may, or the folder cannot be written. In the first case
+/// nothing is written.
 pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, CalibrationFault> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
-    fs::create_dir_all(folder).map_err(failed)?;
-
     let current = folder.join(CURRENT);
     let before = match fs::read_to_string(&current) {
         Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
@@ -154,17 +153,24 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
     };
 
     let mut names = ["dark", "white"].map(|key| named(&before, key));
+    let mut new = Vec::new();
     let references = [("dark", &calibration.dark), ("white", &calibration.white)];
     for ((key, reference), name) in references.into_iter().zip(&mut names) {
         if let Reference::PerPixel(frame) = reference
             && (changed.contains(&key) || name.is_empty())
         {
             *name = format!("{key}-{}.tiff", calibration.version);
-            write_picture(&folder.join(name.as_str()), frame)?;
+            new.push((folder.join(name.as_str()), frame));
         }
     }
 
     let text = calibration.to_toml(&names[0], &names[1]);
+    check_readable(calibration, &text, &names[0])?;
+
+    fs::create_dir_all(folder).map_err(failed)?;
+    for (path, frame) in new {
+        write_picture(&path, frame)?;
+    }
 
     // The earlier calibration is kept under its version before the new one takes its place.
     if !before.is_empty() {
@@ -174,6 +180,22 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
 
     replace(&current, text.as_bytes()).map_err(failed)?;
     Ok(current)
+}
+
+/// Refuses a calibration that could not be read again from `text`, in which `dark` is the dark reference's picture.
+fn check_readable(calibration: &Calibration, text: &str, dark: &str) -> Result<(), CalibrationFault> {
+    let picture = |name: &str| {
+        let reference = if name == dark { &calibration.dark } else { &calibration.white };
+        match reference {
+            Reference::PerPixel(frame) => Ok(frame.clone()),
+            Reference::PerBand(_) => Err(format!("there is no picture {name}")),
+        }
+    };
+
+    match Calibration::default().changed_by_toml(text, picture) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(format!("this is not a usable calibration, and nothing was saved: {error}").into()),
+    }
 }
 
 /// The text that `key` has in a calibration's TOML; empty if it has none.
