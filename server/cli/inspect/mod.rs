@@ -165,7 +165,8 @@ impl<'a> Inspector<'a> {
 
         let picture = match self.raw {
             Some(format) if is_raw(path) => decode_raw(&bytes, Some(format)).map(|(frame, _)| Picture::Mosaic(frame)),
-            _ => read_picture(path, &bytes, self.mosaic),
+            // As they are stored: levels of several files can be compared.
+            _ => read_picture(path, &bytes, self.mosaic, 16),
         };
         let picture = picture.map_err(|error| named(&error))?;
         if self.size != Size::Cell && !matches!(picture, Picture::Mosaic(_)) {

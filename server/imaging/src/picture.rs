@@ -94,7 +94,7 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(usize, usize), 
 /// A picture as its file holds it.
 pub(super) struct Samples {
     pub(super) picture: DynamicImage,
-    /// Bits of the samples of a 16-bit gray picture. White is the greatest number of so many bits.
+    /// Bits of the samples of a 16-bit picture. White is the greatest number of so many bits.
     pub(super) bits: u32,
 }
 
@@ -104,7 +104,8 @@ impl Samples {
         let size = (self.picture.width() as usize, self.picture.height() as usize);
         let gray = matches!(self.picture, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLuma16(_));
         let mosaic_by_size = gray && size == SENSOR_SIZE;
-        let white = self.white();
+        // White in 16 bit, for each level of the 0..255 scale.
+        let per_level = f32::from(self.white()) / 255.0;
         let mut picture = self.picture;
 
         if mosaic || mosaic_by_size {
@@ -137,8 +138,8 @@ impl Samples {
                 Ok(Picture::Gray(GrayImage { width, height, data }))
             }
             DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
-                let scale = f32::from(white) / 255.0;
-                let data = picture.into_luma16().into_raw().into_iter().map(|value| f32::from(value) / scale).collect();
+                let levels = picture.into_luma16().into_raw().into_iter().map(|value| f32::from(value) / per_level);
+                let data = levels.collect();
                 Ok(Picture::Gray(GrayImage { width, height, data }))
             }
             DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
@@ -148,8 +149,9 @@ impl Samples {
             }
             DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
                 let wide = picture.to_rgb16().into_raw();
-                let gray = wide.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(from_16_bit))).collect();
-                let data = picture.into_rgb8().into_raw();
+                let level = |value: u16| f32::from(value) / per_level;
+                let gray = wide.as_chunks::<3>().0.iter().map(|pixel| luma(pixel.map(level))).collect();
+                let data = Self { picture, bits: self.bits }.scaled().into_rgb8().into_raw();
                 Ok(Picture::Rgb(RgbImage { width, height, data }, GrayImage { width, height, data: gray }))
             }
             other => Err(DecodeError::OtherPixels(format!("{:?}", other.color()))),
@@ -159,14 +161,22 @@ impl Samples {
     /// The picture with white at the greatest value that its type has.
     pub(super) fn scaled(self) -> DynamicImage {
         let white = u32::from(self.white());
-        match self.picture {
-            DynamicImage::ImageLuma16(mut samples) if white < 0xFFFF => {
-                let scaled = |sample: u16| ((u32::from(sample) * 0xFFFF + white / 2) / white).min(0xFFFF) as u16;
-                samples.iter_mut().for_each(|sample| *sample = scaled(*sample));
-                DynamicImage::ImageLuma16(samples)
-            }
-            picture => picture,
+        let mut picture = self.picture;
+        if white == 0xFFFF {
+            return picture;
         }
+
+        let scale = |sample: &mut u16| {
+            *sample = ((u32::from(*sample) * 0xFFFF + white / 2) / white).min(0xFFFF) as u16;
+        };
+        match &mut picture {
+            DynamicImage::ImageLuma16(samples) => samples.iter_mut().for_each(scale),
+            DynamicImage::ImageLumaA16(samples) => samples.iter_mut().for_each(scale),
+            DynamicImage::ImageRgb16(samples) => samples.iter_mut().for_each(scale),
+            DynamicImage::ImageRgba16(samples) => samples.iter_mut().for_each(scale),
+            _ => {}
+        }
+        picture
     }
 
     fn white(&self) -> u16 {
@@ -181,9 +191,4 @@ fn ten_bit(count: u16, bits: u32) -> u16 {
         11..=15 => count >> (bits - 10),
         _ => count,
     }
-}
-
-/// Scales 0..=65535 to 0..=255.
-fn from_16_bit(value: u16) -> f32 {
-    f32::from(value) / 257.0
 }

@@ -15,6 +15,8 @@ use super::tiff::Tiff;
 /// A PNG, JPEG or TIFF file.
 pub struct PictureFile<'a> {
     contents: Contents<'a>,
+    /// Bits of samples that fill 16, as far as the file does not say it.
+    wide_bits: u8,
 }
 
 enum Contents<'a> {
@@ -45,7 +47,14 @@ impl<'a> PictureFile<'a> {
                 return Err(DecodeError::OtherFormat(name));
             }
         };
-        Ok(Self { contents })
+        Ok(Self { contents, wide_bits: 16 })
+    }
+
+    /// The same file, but samples that [fill 16 bit](Self::is_wide) are read as numbers of `bits` bits: white is the
+    /// greatest of these.
+    #[must_use]
+    pub fn with_bits(self, bits: u8) -> Self {
+        Self { wide_bits: bits, ..self }
     }
 
     /// Number of pictures: pages of a TIFF, frames of an animated PNG, else 1.
@@ -166,11 +175,16 @@ impl<'a> PictureFile<'a> {
 
     fn samples(&self, page: usize) -> Result<Samples, DecodeError> {
         let whole = |picture| Ok(Samples { picture, bits: 16 });
-        guarded(|| match &self.contents {
+        let mut samples = guarded(|| match &self.contents {
             Contents::Png(bytes) => whole(DynamicImage::from_decoder(png(bytes)?).map_err(refused)?),
             Contents::Jpeg(bytes) => whole(jpeg_read::read(bytes)?),
             Contents::Tiff(tiff) => tiff.samples(page),
-        })
+        })?;
+
+        if self.wide_bits < 16 && self.is_wide() {
+            samples.bits = self.wide_bits.into();
+        }
+        Ok(samples)
     }
 }
 

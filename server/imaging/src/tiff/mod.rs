@@ -6,6 +6,7 @@
 
 mod colours;
 
+use image::DynamicImage;
 use image::metadata::Orientation;
 use tiff_reader::{Ifd, OpenOptions, ParseBudgets, TagValue, TiffError, TiffFile};
 
@@ -133,7 +134,9 @@ impl Tiff {
             _ => &[],
         };
         let picture = colours.picture((width, height), &samples, channels, bits, map)?;
-        Ok(Samples { picture, bits: if bits > 8 { bits as u32 } else { 16 } })
+        // Colours fill 16 bit already.
+        let bits = if matches!(picture, DynamicImage::ImageLuma16(_)) { bits as u32 } else { 16 };
+        Ok(Samples { picture, bits })
     }
 
     fn page(&self, page: usize) -> Result<&Ifd, DecodeError> {

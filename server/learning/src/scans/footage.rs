@@ -7,11 +7,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::clip::{Area, Clip};
-use super::wide::WideSamples;
 use crate::LearningError;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::footage::{self, SQUARE_PIXELS, cut_off, ffmpeg, is_picture, read_picture};
-use parfocal_imaging::{ContentArea, DecodeError, GrayImage, PictureFile, Reconstructor, content_area, reduced};
+use parfocal_devices::camera::footage::{self, SQUARE_PIXELS, cut_off, ffmpeg, is_picture, read_picture, sample_bits};
+use parfocal_imaging::{ContentArea, GrayImage, Reconstructor, content_area, reduced};
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: usize = 480;
@@ -37,29 +36,26 @@ fn clips_in(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
         return Ok(vec![clip(path, video(path)?)?]);
     };
 
-    let mut wide = WideSamples::default();
-    let mut images = files.iter().map(|file| image(file, &mut wide)).collect::<Result<Vec<_>, _>>()?;
-    wide.correct(path, images.iter_mut().map(|(image, is_wide)| (image, *is_wide)))?;
-    files.iter().zip(images).map(|(file, (image, _))| clip(file, vec![Arc::new(image)])).collect()
+    let bits = sample_bits(path, &files)?;
+    files.iter().map(|file| clip(file, vec![Arc::new(image(file, bits)?)])).collect()
 }
 
 fn unreadable(path: &Path, reason: &str) -> LearningError {
     footage::FootageError::unreadable(path, reason).into()
 }
 
-/// A picture, and whether it is one of those that `wide` has seen.
-fn image(path: &Path, wide: &mut WideSamples) -> Result<(GrayImage, bool), LearningError> {
+/// A picture whose samples, if they fill 16 bit, are numbers of `bits` bits.
+fn image(path: &Path, bits: u8) -> Result<GrayImage, LearningError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
-    let unusable = |error: DecodeError| unreadable(path, &error.to_string());
-    let gray = read_picture(path, &bytes, false).map_err(unusable)?.into_gray(&mut Reconstructor::default());
-    let is_wide = PictureFile::open(&bytes).and_then(|file| wide.see(path, &file, 0)).map_err(unusable)?;
+    let picture = read_picture(path, &bytes, false, bits).map_err(|error| unreadable(path, &error.to_string()))?;
+    let gray = picture.into_gray(&mut Reconstructor::default());
 
     if gray.height <= LINES {
-        return Ok((gray, is_wide));
+        return Ok(gray);
     }
 
     let width = gray.width * LINES / gray.height;
-    Ok((reduced(&gray, width, LINES), is_wide))
+    Ok(reduced(&gray, width, LINES))
 }
 
 fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, LearningError> {

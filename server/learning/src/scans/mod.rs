@@ -18,7 +18,6 @@ pub mod scenery;
 pub mod simulated;
 pub mod stack;
 pub mod variety;
-mod wide;
 
 use parfocal_base::FocalPower;
 use parfocal_imaging::{Patch, View};

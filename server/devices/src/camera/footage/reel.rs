@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::clip::Clip;
 use super::video::{FootageError, HEIGHT, WIDTH, large_enough};
+use super::wide::sample_bits;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{DecodeError, Picture, PictureFile, PixelFormat, RgbImage, decode_raw, is_mosaic};
@@ -29,13 +30,13 @@ impl Reel {
     pub(super) fn open(path: &Path) -> Result<Self, FootageError> {
         let metadata = std::fs::metadata(path).map_err(|error| FootageError::unreadable(path, error))?;
         if metadata.is_dir() {
-            return Stills::open(pictures_in(path)?).map(Self::Stills);
+            return Stills::open(path, pictures_in(path)?).map(Self::Stills);
         }
         if is_raw(path) {
             return Err(FootageError::unreadable(path, MOSAIC));
         }
         if is_picture(path) {
-            return Stills::open(vec![path.to_owned()]).map(Self::Stills);
+            return Stills::open(path, vec![path.to_owned()]).map(Self::Stills);
         }
         Clip::open(path).map(Self::Video)
     }
@@ -52,12 +53,15 @@ impl Reel {
 /// Stills, each shown for a while, over and over.
 pub(super) struct Stills {
     files: Vec<PathBuf>,
+    /// Bits of samples that fill 16.
+    bits: u8,
     shown: usize,
     picture: RgbImage,
 }
 
 impl Stills {
-    fn open(files: Vec<PathBuf>) -> Result<Self, FootageError> {
+    /// The pictures in `files`, all of `folder`.
+    fn open(folder: &Path, files: Vec<PathBuf>) -> Result<Self, FootageError> {
         for file in &files {
             let head = picture_head(file).map_err(|error| FootageError::unreadable(file, error))?;
             let opened = PictureFile::open(&head).and_then(|opened| Ok((opened.size(0)?, opened.pages())));
@@ -66,14 +70,15 @@ impl Stills {
             tell_unread(file, pages);
         }
 
-        let picture = still(&files[0])?;
-        Ok(Self { files, shown: 0, picture })
+        let bits = sample_bits(folder, &files)?;
+        let picture = still(&files[0], bits)?;
+        Ok(Self { files, bits, shown: 0, picture })
     }
 
     fn at(&mut self, time: Duration) -> Result<&RgbImage, FootageError> {
         let turn = (time.as_nanos() / STILL.as_nanos() % self.files.len() as u128) as usize;
         if turn != self.shown {
-            self.picture = still(&self.files[turn])?;
+            self.picture = still(&self.files[turn], self.bits)?;
             self.shown = turn;
         }
         Ok(&self.picture)
@@ -99,11 +104,12 @@ pub fn picture_head(file: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Reads the first picture of a file, or a raw mosaic; says on standard error how many others are left out, and in
-/// which format a raw mosaic was read if that is not 16 bit a sample.
+/// which format a raw mosaic was read if that is not 16 bit a sample. Samples of a picture that fill 16 bit are numbers
+/// of `bits` bits.
 ///
 /// # Errors
 /// If it is not a picture or is damaged.
-pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
+pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool, bits: u8) -> Result<Picture, DecodeError> {
     if is_raw(path) {
         let (frame, format) = decode_raw(bytes, None)?;
         if format != PixelFormat::Mono10 {
@@ -112,7 +118,7 @@ pub fn read_picture(path: &Path, bytes: &[u8], mosaic: bool) -> Result<Picture, 
         return Ok(Picture::Mosaic(frame));
     }
 
-    let file = PictureFile::open(bytes)?;
+    let file = PictureFile::open(bytes)?.with_bits(bits);
     let picture = file.read(0, mosaic)?;
     tell_unread(path, file.pages());
     Ok(picture)
@@ -125,10 +131,10 @@ pub fn tell_unread(path: &Path, pages: usize) {
     }
 }
 
-/// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
-fn still(file: &Path) -> Result<RgbImage, FootageError> {
+/// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`]. Samples that fill 16 bit are numbers of `bits` bits.
+fn still(file: &Path, bits: u8) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = PictureFile::open(&bytes).and_then(|opened| opened.read_any(0));
+    let picture = PictureFile::open(&bytes).and_then(|opened| opened.with_bits(bits).read_any(0));
     let picture = picture.map_err(|error| FootageError::unreadable(file, error))?;
 
     if is_mosaic(&picture) {
@@ -186,6 +192,23 @@ mod tests {
         std::fs::write(&raw, [0; 100]).unwrap();
         let error = Reel::open(&raw).err().unwrap().to_string();
         assert!(error.contains("frame.RAW: it is a sensor's mosaic: look at it with `parfocal inspect`"), "{error}");
+    }
+
+    #[test]
+    fn samples_of_twelve_bit_in_files_of_sixteen_keep_their_levels() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        image::ImageBuffer::from_pixel(64, 64, image::Luma([4095_u16])).save(inside("a.png")).unwrap();
+        image::ImageBuffer::from_pixel(64, 64, image::Rgb([819_u16, 1638, 4095])).save(inside("b.tiff")).unwrap();
+        // So large that it is made smaller.
+        image::ImageBuffer::from_pixel(2000, 500, image::Luma([819_u16])).save(inside("c.png")).unwrap();
+        image::GrayImage::from_pixel(64, 64, image::Luma([100])).save(inside("d.png")).unwrap();
+
+        let mut reel = Reel::open(folder.path()).unwrap();
+        for (turn, expected) in (0..).zip([[255; 3], [51, 102, 255], [51; 3], [100; 3]]) {
+            let picture = reel.at(turn * STILL).unwrap();
+            assert_eq!(picture.data[..3], expected, "picture {turn}");
+        }
     }
 
     #[test]

@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 use super::{PosePictures, shot};
 use crate::LearningError;
 use crate::scans::mosaics::RawMosaics;
-use crate::scans::wide::WideSamples;
 use parfocal_base::FocalPower;
 use parfocal_base::files::is_systems_own;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::footage::{is_picture, is_raw, picture_head};
+use parfocal_devices::camera::footage::{WideSamples, is_picture, is_raw, picture_head};
 use parfocal_devices::camera::recorded::{
     Header, LEAST_SIDE, MOST_POSES, ScanError, ScanFolder, ScanRecording, poses as numbered,
 };
@@ -120,16 +119,12 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         mosaics: RawMosaics::new(imported.raw),
         first: None,
         wide: WideSamples::default(),
-        scale: 1.0,
+        bits: 16,
     };
 
     // Checks all sizes before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
-    let (scale, note) = reader.wide.scale(imported.bits)?;
-    reader.scale = scale;
-    if let Some(note) = note {
-        tell(format_args!("note: {note}; --bits says otherwise"));
-    }
+    reader.settle_bits(imported.bits)?;
 
     let mut recording = ScanRecording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
@@ -180,11 +175,27 @@ struct Reader {
     mosaics: RawMosaics,
     first: Option<(PathBuf, (usize, usize))>,
     wide: WideSamples,
-    /// Factor for the gray levels of wide pictures.
-    scale: f32,
+    /// Bits of samples that fill 16.
+    bits: u8,
 }
 
 impl Reader {
+    /// Decides how many bits the samples have that were measured: as many as are `given`, else the fewest that hold all.
+    fn settle_bits(&mut self, given: Option<u8>) -> Result<(), LearningError> {
+        if let Some(bits) = given {
+            self.wide.check(bits)?;
+            self.bits = bits;
+            return Ok(());
+        }
+
+        let (bits, note) = self.wide.guess();
+        self.bits = bits;
+        if let Some(note) = note {
+            tell(format_args!("note: {note}; --bits says otherwise"));
+        }
+        Ok(())
+    }
+
     /// Compares a picture's size with the first one's. Reads only the beginning of the file, except of one with 16-bit
     /// samples, whose largest counts, and of a raw mosaic.
     fn measure(&mut self, path: &Path) -> Result<(), LearningError> {
@@ -229,11 +240,8 @@ impl Reader {
         }
 
         let file = PictureFile::open(&bytes).and_then(PictureFile::single).map_err(unusable(path))?;
-        let mut gray = file.read(0, false).map_err(unusable(path))?.into_gray(&mut self.reconstructor);
-        if file.is_wide() {
-            gray.data.iter_mut().for_each(|level| *level *= self.scale);
-        }
-        Ok(gray)
+        let picture = file.with_bits(self.bits).read(0, false).map_err(unusable(path))?;
+        Ok(picture.into_gray(&mut self.reconstructor))
     }
 }
 

@@ -11,10 +11,9 @@ pub mod source;
 use std::path::{Path, PathBuf};
 
 use super::mosaics::{RawMosaics, mosaics_in};
-use super::wide::WideSamples;
 use crate::LearningError;
 use parfocal_base::notices::tell;
-use parfocal_devices::camera::footage::{is_raw, pictures_in};
+use parfocal_devices::camera::footage::{is_raw, pictures_in, sample_bits};
 use parfocal_imaging::{GrayImage, Picture, PictureFile, PixelFormat, Reconstructor, in_blocks};
 
 pub use plane::{LEAST_PLANES, Plane};
@@ -89,43 +88,34 @@ impl FocalStack {
             let folder = folder.display();
             bail!("{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}");
         }
-
-        let mut wide = WideSamples::default();
         if folder.is_file() {
-            let planes = pages::planes(folder, list, scale, &mut wide)?;
-            return Self::corrected(planes, &wide, folder);
+            return Self::new(pages::planes(folder, list, scale)?);
         }
 
         let files = pictures_or_mosaics_in(folder, raw.is_some())?;
-        let placed = match list {
+        let placed: Vec<(PathBuf, f64)> = match list {
             Some(list) => listed(list)?.into_iter().map(|(name, at)| (folder.join(name), at)).collect(),
             None => named(files),
         };
+        let paths: Vec<PathBuf> = placed.iter().map(|(path, _)| path.clone()).collect();
+        let bits_of_samples = sample_bits(folder, &paths)?;
 
         let mut reconstructor = Reconstructor::default();
         let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|error| LearningError::unreadable(&path, &error))?;
-            let unusable = |error| LearningError::of(&path, error);
-            let (picture, is_wide) = if is_raw(&path) {
-                (Picture::Mosaic(mosaics.read(&path, &bytes).map_err(unusable)?), false)
+            let picture = if is_raw(&path) {
+                mosaics.read(&path, &bytes).map(Picture::Mosaic)
             } else {
-                let file = PictureFile::open(&bytes).and_then(PictureFile::single).map_err(unusable)?;
-                (file.read(0, false).map_err(unusable)?, wide.see(&path, &file, 0).map_err(unusable)?)
+                let file = PictureFile::open(&bytes).and_then(PictureFile::single);
+                file.and_then(|file| file.with_bits(bits_of_samples).read(0, false))
             };
 
-            let picture = in_blocks(&picture.into_gray(&mut reconstructor), scale);
-            Ok((Plane { name: file_name(&path), position, picture }, is_wide))
+            let gray = picture.map_err(|error| LearningError::of(&path, error))?.into_gray(&mut reconstructor);
+            Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
 
-        let planes = placed.into_iter().map(read).collect::<Result<Vec<_>, LearningError>>()?;
-        Self::corrected(planes, &wide, folder)
-    }
-
-    /// A stack of pictures of `folder`, each with whether it is one of those that `wide` has seen.
-    fn corrected(mut planes: Vec<(Plane, bool)>, wide: &WideSamples, folder: &Path) -> Result<Self, LearningError> {
-        wide.correct(folder, planes.iter_mut().map(|(plane, is_wide)| (&mut plane.picture, *is_wide)))?;
-        Self::new(planes.into_iter().map(|(plane, _)| plane).collect())
+        Self::new(placed.into_iter().map(read).collect::<Result<_, LearningError>>()?)
     }
 
     /// The pictures, in rising position.

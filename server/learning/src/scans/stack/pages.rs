@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::LearningError;
-use crate::scans::wide::WideSamples;
 use parfocal_base::notices::tell;
+use parfocal_devices::camera::footage::WideSamples;
 use parfocal_imaging::{PictureFile, Reconstructor, in_blocks};
 
 use super::plane::Plane;
@@ -21,18 +21,12 @@ struct Depth {
     source: String,
 }
 
-/// Reads the pages of the file at `path`, made smaller by blocks of `scale` x `scale` pixels, each with whether its
-/// samples are `wide`. Positions are those of `list` (lines of `page,position`, pages counted from 1), else what the
-/// file says, else the order of the pages.
+/// Reads the pages of the file at `path`, made smaller by blocks of `scale` x `scale` pixels. Positions are those of
+/// `list` (lines of `page,position`, pages counted from 1), else what the file says, else the order of the pages.
 ///
 /// # Errors
 /// If a page or the list cannot be read, or the pages vary in more than focus.
-pub(super) fn planes(
-    path: &Path,
-    list: Option<&Path>,
-    scale: usize,
-    wide: &mut WideSamples,
-) -> Result<Vec<(Plane, bool)>, LearningError> {
+pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, LearningError> {
     let unusable = |error| LearningError::of(path, error);
     let bytes = std::fs::read(path).map_err(|error| LearningError::unreadable(path, &error))?;
     let file = PictureFile::open(&bytes).map_err(unusable)?;
@@ -44,15 +38,18 @@ pub(super) fn planes(
     };
     tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
 
+    let mut wide = WideSamples::default();
+    depth.pages.iter().try_for_each(|&page| wide.see(path, &file, page)).map_err(unusable)?;
+    let file = file.with_bits(wide.guess_aloud(path));
+
     let name = file_name(path);
     let mut reconstructor = Reconstructor::default();
     let placed = depth.pages.iter().zip(&depth.positions);
     placed
         .map(|(&page, &position)| {
             let gray = file.read(page, false).map_err(unusable)?.into_gray(&mut reconstructor);
-            let is_wide = wide.see(path, &file, page).map_err(unusable)?;
             let name = format!("page {} of {name}", page + 1);
-            Ok((Plane { name, position, picture: in_blocks(&gray, scale) }, is_wide))
+            Ok(Plane { name, position, picture: in_blocks(&gray, scale) })
         })
         .collect()
 }
