@@ -10,7 +10,7 @@ use crate::cli::output::{Failure, print, save};
 use parfocal_base::files::create_with;
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, encode_png, encode_tiff};
-use parfocal_recording::Recording;
+use parfocal_recording::{FrameRow, Recording};
 
 /// File endings of videos, and ffmpeg's names of their formats.
 const VIDEOS: [(&str, &str); 4] = [("mp4", "mp4"), ("mkv", "matroska"), ("mov", "mov"), ("avi", "avi")];
@@ -137,8 +137,8 @@ fn save_video(
     frames: &[usize],
     develop: &mut impl FnMut(&MosaicFrame, &mut RgbImage),
 ) -> Result<(), Failure> {
-    let fps = recording.rate().map_or(25.0, |rate| rate.round().clamp(1.0, 1000.0));
     let rows = recording.rows();
+    let fps = pictures_a_second(rows);
     let start = rows[frames[0]].time;
     let tick = |frame: usize| ((rows[frame].time - start) as f64 / 1e9 * fps).round() as usize;
 
@@ -176,6 +176,19 @@ fn save_video(
         return Ok(());
     }
     Err(format!("ffmpeg: {}", complaint.lines().last().unwrap_or("no reason given")).into())
+}
+
+/// Pictures a second by the usual time between two frames. The mean would leave out frames of a recording with gaps.
+fn pictures_a_second(rows: &[FrameRow]) -> f64 {
+    let times = rows.windows(2).map(|pair| pair[1].time.saturating_sub(pair[0].time));
+    let mut times: Vec<i64> = times.filter(|time| *time > 0).collect();
+    if times.is_empty() {
+        return 25.0;
+    }
+
+    let middle = times.len() / 2;
+    let (_, usual, _) = times.select_nth_unstable(middle);
+    (1e9 / *usual as f64).round().clamp(1.0, 1000.0)
 }
 
 /// A running `ffmpeg`, ended if the frames cannot be read to the last.
