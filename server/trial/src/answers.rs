@@ -49,9 +49,13 @@ pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerVal
     }
 }
 
-/// Whether every item of `value` is answered.
+/// Whether nothing of `value` is left open: every item has a point, and a text has words.
 pub fn is_whole(value: &AnswerValue) -> bool {
-    !matches!(value, AnswerValue::Points(points) if points.contains(&0))
+    match value {
+        AnswerValue::Point(_) => true,
+        AnswerValue::Points(points) => !points.contains(&0),
+        AnswerValue::Text(text) => !text.trim().is_empty(),
+    }
 }
 
 #[cfg(test)]

@@ -104,6 +104,9 @@ fn a_whole_session_goes_from_ready_to_completed() {
         let early = run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap_err();
         assert!(matches!(early, Refusal::Said(RefusalKind::Conflict, _)), "{early}");
         assert_eq!(early.to_string(), "still to be answered: a?");
+        run.state.keep_answer(Some(segment), "a", said(" \n"));
+        let blank = run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) });
+        assert_eq!(blank, Err(early), "blanks are no answer");
         run.state.keep_answer(Some(segment), "a", said("yes"));
         run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap();
     }
