@@ -93,6 +93,29 @@ async fn a_movement_by_hand_is_recorded_where_it_begins_and_where_it_ends() {
 }
 
 #[tokio::test]
+async fn the_end_of_a_movement_is_recorded_though_the_next_session_is_made_or_the_server_ends_meanwhile() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let first = inspecting(&mut trial).await;
+    trial.conductor.act(Role::Operator, first, Action::Abort { reason: "bleeding".to_owned() }).await.unwrap();
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(0.3)).await.unwrap();
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(0.4)).await.unwrap();
+    let second = inspecting(&mut trial).await;
+    trial.conductor.act(Role::Operator, second, PAUSE).await.unwrap();
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(0.6)).await.unwrap();
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(0.7)).await.unwrap();
+    trial.conductor.record_the_rest().await;
+
+    for (session, end) in [(first, 0.4), (second, 0.7)] {
+        let last = kinds(&trial, session).await.pop();
+        assert!(
+            matches!(&last, Some(EventKind::FocusedByHand { focal_power, .. }) if *focal_power == power(end)),
+            "{last:?}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn after_an_abort_the_lens_is_focused_by_hand_until_the_session_is_closed() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;

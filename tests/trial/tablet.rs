@@ -142,6 +142,19 @@ async fn what_was_seen_until_the_end_of_a_setting_is_recorded_before_it() {
     assert_eq!(names(&trial, session).await, ["pictures-seen", "segment-finished"]);
 }
 
+#[tokio::test]
+async fn what_was_seen_until_the_server_ends_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = inspecting(&mut trial, "paper").await;
+    report(&trial, Presence::Present, Some(LARGE), 5).await;
+    trial.conductor.record_the_rest().await;
+    drop(trial);
+
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(names(&trial, session).await, ["pictures-seen", "server-restarted"]);
+}
+
 /// "Blurred" may be said of the link: so the size and the rate stand beside each comment, setting and step.
 #[tokio::test]
 async fn an_export_tells_what_size_of_picture_the_surgeon_saw_and_how_many() {

@@ -41,6 +41,9 @@ impl Shared {
         place: Option<StudyPlace>,
     ) -> Result<SessionId, ConductError> {
         let mut pen = self.pen.lock().await;
+        if let Some(course) = self.live().course.as_mut() {
+            course.record_movement();
+        }
         self.record_stops(&mut pen).await?;
         let current = CurrentSession::of(self.live().course.as_ref().map(|course| course.state.phase()));
         permission::check(by.role, Request::MakeSession, current)?;

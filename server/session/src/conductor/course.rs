@@ -338,6 +338,12 @@ impl Course {
         at_rest
     }
 
+    /// Makes events of a movement by hand and of what the surgeon sees, because the server is about to end.
+    pub fn record_what_goes_on(&mut self, stamp: Stamp) {
+        self.record_movement();
+        self.record_sight(stamp);
+    }
+
     /// Whether a movement waits for the hand to come to rest.
     pub const fn is_moved(&self) -> bool {
         self.movement.is_some()

@@ -50,6 +50,9 @@ impl Conductor {
     /// Records what is not on disk yet; the last chance before the server ends.
     pub async fn record_the_rest(&self) {
         let mut pen = self.shared.pen.lock().await;
+        if let Some(course) = self.shared.live().course.as_mut() {
+            course.record_what_goes_on(self.shared.stamp());
+        }
         if let Err(error) = self.shared.record_stops(&mut pen).await {
             tracing::error!("what stopped the session is lost: {error}; after the next start the session is paused");
         }
