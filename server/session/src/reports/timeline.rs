@@ -1,5 +1,6 @@
 //! A session over time: when each setting was inspected, the focal path, and the comments and answers.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -366,12 +367,19 @@ fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
 /// When the session was paused. A restart is recorded only when the server is back, but the pause starts when the
 /// server ended: when the setting's clock stopped, or when the last frame before was exposed, whichever is later.
 fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
+    let given: BTreeMap<u32, &str> = events
+        .iter()
+        .filter_map(|(_, kind)| match kind {
+            EventKind::ReasonGiven { about, reason } => Some((*about, reason.as_str())),
+            _ => None,
+        })
+        .collect();
     let mut spans: Vec<PauseSpan> = Vec::new();
     let mut inspecting = false;
     // When the inspection last began or resumed, and how many milliseconds of the setting had been inspected by then.
     let mut since = 0.0;
     let mut before = 0;
-    for &(at, kind) in events {
+    for (&(at, kind), number) in events.iter().zip(1..) {
         match kind {
             EventKind::SegmentStarted { .. } => {
                 inspecting = true;
@@ -386,7 +394,7 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
                     let frame = points.iter().rev().map(|point| point.seconds).find(|&seconds| seconds < at);
                     let ended = frame.map_or(clock, |frame| frame.max(clock)).min(at);
                     let from = if restarted && inspecting { ended } else { at };
-                    spans.push(PauseSpan { from, to: None, reason: kind.in_words(|_| 0) });
+                    spans.push(PauseSpan { from, to: None, reason: in_words(kind, given.get(&number).copied()) });
                 }
 
                 before = *inspected_ms;
@@ -402,6 +410,15 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     }
 
     spans
+}
+
+/// The pause `paused` in words, with the reason that was `given` afterwards.
+fn in_words(paused: &EventKind, given: Option<&str>) -> String {
+    let words = paused.in_words(|_| 0);
+    match given {
+        Some(reason) if !reason.is_empty() => format!("{words}: {reason}"),
+        _ => words,
+    }
 }
 
 /// When no tablet showed the surgeon's page.
@@ -521,5 +538,16 @@ mod tests {
         // The clock is stored once a second; a frame after that gives a later time.
         assert_eq!(spans(&[at(5.0), at(24.7), at(40.1)])[1], (24.7, Some(60.0)));
         assert_eq!(pauses(&events, &[])[0].reason, "Paused: phone");
+    }
+
+    #[test]
+    fn a_pause_has_the_reason_that_was_given_afterwards() {
+        let paused = EventKind::Paused { reason: String::new(), inspected_ms: 0 };
+        let words = |reason: &str| {
+            let given = EventKind::ReasonGiven { about: 1, reason: reason.to_owned() };
+            pauses(&[(2.0, &paused), (4.0, &given)], &[])[0].reason.clone()
+        };
+        assert_eq!(words("phone"), "Paused: phone");
+        assert_eq!(words(""), "Paused", "the reason was erased");
     }
 }
