@@ -1,11 +1,12 @@
 //! Plans that cannot work as they are meant: told when planned, and confirmed when opened.
 
 use parfocal_trial::account::AccountRole;
+use parfocal_trial::protocol::Protocol;
 use parfocal_trial::study::definition::Definition;
 use parfocal_trial::study::state::Change;
 
 use super::{STATISTICIAN, a_trial, change, definition, detail, plan};
-use crate::fixture::Trial;
+use crate::fixture::{Trial, known};
 
 /// A server with a planned study.
 async fn planned(folder: &std::path::Path, definition: String) -> Trial {
@@ -55,4 +56,14 @@ fn the_template_is_a_definition() {
     let read = Definition::parse(&text, "template", &[protocol]).unwrap();
     assert_eq!(read.may_unblind, ["Dr \"Lead\""]);
     assert_eq!(read.sites[0].surgeons % 2, 0);
+    assert!(text.contains("# A multiple of 2, so that every order comes equally often."), "{text}");
+}
+
+#[test]
+fn the_template_for_shuffled_orders_promises_no_balance() {
+    let paper = include_str!("../../../trial-protocols/paper.toml");
+    let protocol = Protocol::parse(paper, "paper.toml", &known()).unwrap();
+    let text = Definition::template(&protocol, "Dr Lead");
+    assert!(!text.contains("A multiple of"), "{text}");
+    assert!(Definition::parse(&text, "template", &[protocol]).is_ok());
 }

@@ -172,6 +172,11 @@ impl Definition {
         let in_a_set = protocol.set_size();
         let surgeons = in_a_set * 12_usize.div_ceil(in_a_set);
         let order = if protocol.order == Order::Balanced { "balanced" } else { "shuffled" };
+        let multiple = if in_a_set > 1 {
+            format!("# A multiple of {in_a_set}, so that every order comes equally often.\n")
+        } else {
+            String::new()
+        };
         format!(
             "# A study. docs/study.md explains each key.\n\
              name = \"my-study\"\n\
@@ -192,7 +197,7 @@ impl Definition {
              [[sites]]\n\
              name = \"my-site\"\n\
              title = \"The hospital\"\n\
-             # A multiple of {in_a_set}, so that every order comes equally often.\n\
+             {multiple}\
              surgeons = {surgeons}\n\
              spares = {in_a_set}\n",
             lead = toml::Value::from(lead),
