@@ -2,7 +2,6 @@
 //! session.
 
 use super::answers;
-use super::protocol::Protocol;
 use super::question::AnswerValue;
 use super::refusal::{Refusal, RefusalKind};
 use super::remark::{CommentContent, NewAnswer};
@@ -34,20 +33,19 @@ pub fn check_spoken(said: &CommentContent, voice: bool) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Checks the answer `new` in a session of `protocol` in the state `state`.
+/// Checks the answer `new` in a session in the state `state`.
 ///
 /// # Errors
 /// If the session does not ask this question, has not asked it yet, or the answer does not fit the question.
-pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) -> Result<(), Refusal> {
-    let plan = state.plan();
-    let has_segment = new.segment.is_none_or(|segment| plan.position(segment).is_some());
-    let question = protocol.question(&new.question, new.segment.is_some()).filter(|_| has_segment);
+pub fn check_answer(new: &NewAnswer, state: &SessionState) -> Result<(), Refusal> {
+    let has_segment = new.segment.is_none_or(|segment| state.position(segment).is_some());
+    let question = state.protocol().question(&new.question, new.segment.is_some()).filter(|_| has_segment);
     let question = question.ok_or(Refusal::unknown_question())?;
 
     if !state.takes_answers(new.segment) {
         return Err(Refusal::not_now("refused-question-not-asked"));
     }
-    answers::check(question, &new.value, plan.segments.len())
+    answers::check(question, &new.value, state.segments().len())
 }
 
 /// Checks the answer `new` in a session of `segments` whose questions are unknown, because this version cannot read the

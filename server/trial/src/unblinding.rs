@@ -113,7 +113,7 @@ impl Circumstances {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::sync::Arc;
 
     use jiff::Timestamp;
     use uuid::Uuid;
@@ -123,9 +123,7 @@ mod tests {
     use crate::balanced_set::Member;
     use crate::event::Event;
     use crate::phase::SessionStatus;
-    use crate::pointing::PatchRule;
-    use crate::session::Plan;
-    use crate::tablet::WhenAway;
+    use crate::protocol::Protocol;
 
     const SESSION: SessionId = SessionId(Uuid::from_u128(1));
     const OTHER: SessionId = SessionId(Uuid::from_u128(2));
@@ -136,18 +134,8 @@ mod tests {
 
     /// The state of a session after the events `kinds`.
     fn state(kinds: impl IntoIterator<Item = EventKind>) -> SessionState {
-        let plan = Plan {
-            segments: Vec::new(),
-            limit: Duration::from_mins(1),
-            after_segment: Vec::new(),
-            closing: Vec::new(),
-            consent: None,
-            when_tablet_away: WhenAway::Pause,
-            patch: PatchRule::default(),
-            hold: false,
-        };
-
-        let mut state = SessionState::new(plan);
+        let paper = Protocol::parse_kept(include_str!("../../../trial-protocols/paper.toml"), "paper.toml").unwrap();
+        let mut state = SessionState::new(Arc::new(paper), Vec::new());
         for (kind, number) in kinds.into_iter().zip(1..) {
             state.apply(&Event {
                 number,

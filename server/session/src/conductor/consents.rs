@@ -28,7 +28,7 @@ impl Shared {
         let known = self.live().course_of(new.session).map(|course| course.protocol.consent.clone());
         let required = match known {
             Some(required) => required,
-            None => self.load(new.session).await?.protocol.consent,
+            None => self.load(new.session).await?.protocol.consent.clone(),
         };
         let stamp = self.stamp();
         // The theatre's clock may be ahead of the server's, which often is on UTC. No day begins earlier than at

@@ -109,7 +109,7 @@ impl Shared {
             question: &answer.question,
             current: corrected.as_ref().unwrap_or(&standing.value),
         };
-        let settings = course.state.plan().segments.len();
+        let settings = course.state.segments().len();
         correction::check_value(&answer, old, new, &course.protocol, settings)?;
 
         let record = record.to_string();

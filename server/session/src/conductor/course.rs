@@ -28,7 +28,7 @@ use parfocal_trial::refusal::Refusal;
 use parfocal_trial::remark::CommentContent;
 use parfocal_trial::role::Role;
 use parfocal_trial::session::{
-    Plan, SessionState, decide, decide_by_hand, decide_choice, decide_small_picture, decide_tablet, decide_time,
+    SessionState, decide, decide_by_hand, decide_choice, decide_small_picture, decide_tablet, decide_time,
 };
 use parfocal_trial::tablet::{PictureSize, Presence, TabletReport};
 use parfocal_trial::unblinding::Circumstances;
@@ -40,7 +40,7 @@ pub(super) const LATEST: usize = 30;
 /// A session in memory.
 pub(crate) struct Course {
     pub made: NewSession,
-    pub protocol: Protocol,
+    pub protocol: Arc<Protocol>,
     /// The session's state, including the stops that are not on disk yet.
     pub state: SessionState,
     /// Whether comments and answers that arrive still count.
@@ -163,7 +163,8 @@ impl Course {
 
     fn without_events(made: NewSession, protocol: Protocol, clock: RunClock) -> Self {
         let segments = made.segments.iter().map(|(segment, _)| *segment).collect();
-        let state = SessionState::new(Plan::new(&protocol, segments));
+        let protocol = Arc::new(protocol);
+        let state = SessionState::new(Arc::clone(&protocol), segments);
         let grace = Grace::new(protocol.grace);
         Self {
             made,
@@ -225,7 +226,7 @@ impl Course {
 
     /// Number of `segment` as surgeons read it, from 1; 0 if the segment is not of this session.
     pub fn setting(&self, segment: SegmentId) -> usize {
-        self.state.plan().position(segment).map_or(0, |position| position + 1)
+        self.state.position(segment).map_or(0, |position| position + 1)
     }
 
     /// Makes the next events: numbers and stamps `kinds`.
@@ -603,7 +604,7 @@ impl Course {
 
     /// Time of inspection until what is shown changes, after `inspected` of it has passed in the segment.
     pub fn until_next_change(&self, inspected: Duration) -> Duration {
-        let limit = self.state.plan().limit;
+        let limit = self.protocol.segment_limit;
         let next = self.protocol.next_prompt_change(inspected).map_or(limit, |change| change.min(limit));
         next.saturating_sub(inspected).max(Duration::from_millis(1))
     }

@@ -7,7 +7,6 @@ use parfocal_base::ids::{SegmentId, SessionId};
 use parfocal_records::store::{Answer, Comment, KeepOutcome};
 use parfocal_trial::acceptance;
 use parfocal_trial::grace::Grace;
-use parfocal_trial::refusal::Refusal;
 use parfocal_trial::remark::{Holding, NewAnswer, NewComment};
 
 impl Shared {
@@ -17,7 +16,7 @@ impl Shared {
 
         let _pen = self.pen.lock().await;
         let known = |course: &mut Course| SessionFacts {
-            segments: course.state.plan().segments.clone(),
+            segments: course.state.segments().to_vec(),
             grace: course.grace,
             voice: course.protocol.voice,
         };
@@ -61,17 +60,14 @@ impl Shared {
         // Events that led to the question are written before its answer.
         self.record_stops(&mut pen).await?;
 
-        let checked = self.live().course_of(new.session).map(|course| check(course, &new).map(|()| course.grace));
-        let grace = match checked {
+        let check = |course: &Course| acceptance::check_answer(&new, &course.state).map(|()| course.grace);
+        let current = self.live().course_of(new.session).map(|course| check(course));
+        let grace = match current {
             Some(checked) => checked?,
             None => match self.load(new.session).await {
                 // The questions can no longer be read; keep the answer anyway.
                 Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
-                earlier => {
-                    let earlier = earlier?;
-                    check(&earlier, &new)?;
-                    earlier.grace
-                }
+                earlier => check(&earlier?)?,
             },
         };
 
@@ -131,10 +127,6 @@ struct SessionFacts {
     grace: Grace,
     /// Whether the session accepts spoken comments.
     voice: bool,
-}
-
-fn check(course: &Course, new: &NewAnswer) -> Result<(), Refusal> {
-    acceptance::check_answer(new, &course.protocol, &course.state)
 }
 
 fn unless_taken(kept: KeepOutcome) -> Result<(), ConductError> {

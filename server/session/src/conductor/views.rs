@@ -55,8 +55,8 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         title: course.protocol.title.clone(),
         segment: state.segment(),
         setting: setting(course),
-        settings: state.plan().segments.len(),
-        remaining_seconds: inspecting.then(|| state.plan().limit.saturating_sub(inspected).as_secs_f64()),
+        settings: state.segments().len(),
+        remaining_seconds: inspecting.then(|| course.protocol.segment_limit.saturating_sub(inspected).as_secs_f64()),
         prompt: course.protocol.prompt_at(inspected).filter(|_| inspecting).map(|prompt| prompt.text.clone()),
         quick_comments: course.protocol.quick_comments.clone(),
         voice: course.protocol.voice,
@@ -72,7 +72,7 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
 
 /// What the surgeon said in words of each setting, so that the closing questions can recall it.
 fn comments_by_setting(course: &Course) -> Vec<Vec<String>> {
-    let mut settings = vec![Vec::new(); course.state.plan().segments.len()];
+    let mut settings = vec![Vec::new(); course.state.segments().len()];
     for comment in course.standing_comments() {
         let (CommentContent::Text(text) | CommentContent::Quick(text)) = &comment.said else { continue };
         let place = comment.setting.and_then(|setting| settings.get_mut(setting.checked_sub(1)?));
@@ -102,7 +102,7 @@ fn setting(course: &Course) -> usize {
     match state.phase() {
         Phase::Ready => 0,
         Phase::Notice | Phase::Inspecting | Phase::Questions => state.done() + 1,
-        Phase::Closing | Phase::Completed | Phase::Aborted => state.done().min(state.plan().segments.len()),
+        Phase::Closing | Phase::Completed | Phase::Aborted => state.done().min(state.segments().len()),
     }
 }
 

@@ -248,7 +248,7 @@ fn settings(course: &Course) -> Vec<SettingDetail> {
         }
     };
 
-    course.state.plan().segments.iter().zip(1..).map(detail).collect()
+    course.state.segments().iter().zip(1..).map(detail).collect()
 }
 
 fn unblinding(course: &Course) -> Option<Unblinding> {

@@ -44,10 +44,10 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
 
 /// The events that the passing of time causes: the end of a segment at its time limit.
 pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
-    if !state.running() || state.inspected(now) < state.plan.limit {
+    if !state.running() || state.inspected(now) < state.protocol.segment_limit {
         return Vec::new();
     }
-    state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
+    state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.protocol.segment_limit))
 }
 
 /// The events that are caused when `by` moves the lens to `focal_power` by hand. `left_at` is where the lens is, if
@@ -80,7 +80,7 @@ pub fn decide_choice(state: &SessionState, by: Role, choice: &Choice) -> Result<
     if !matches!(by, Role::Surgeon | Role::Operator) {
         return Err(Refusal::only("the surgeon or the operator"));
     }
-    if !state.plan.patch.is_free() {
+    if !state.protocol.patch.is_free() {
         return Err(Refusal::not_now("refused-centre"));
     }
 
@@ -118,7 +118,7 @@ pub fn decide_tablet(state: &SessionState, presence: Presence, now: Moment) -> V
     }
 
     let mut events = vec![EventKind::TabletAway { hidden }];
-    if state.running() && state.plan.when_tablet_away == WhenAway::Pause {
+    if state.running() && state.protocol.when_tablet_away == WhenAway::Pause {
         events.push(paused_by_system(state, reason::TABLET_AWAY, now));
     }
     events
@@ -138,7 +138,7 @@ pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKin
     if state.ended() || state.phase == Phase::Ready {
         return Vec::new();
     }
-    let inspected = inspected.clamp(state.inspected.min(state.plan.limit), state.plan.limit);
+    let inspected = inspected.clamp(state.inspected.min(state.protocol.segment_limit), state.protocol.segment_limit);
     vec![EventKind::ServerRestarted { inspected_ms: milliseconds(inspected) }]
 }
 
@@ -166,7 +166,7 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
 /// # Errors
 /// If the session has no such segment or has not reached it, or was aborted.
 fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
-    let position = state.plan.position(segment).ok_or(Refusal::unknown_segment())?;
+    let position = state.position(segment).ok_or(Refusal::unknown_segment())?;
     if position < state.done {
         return Ok(None);
     }
@@ -183,7 +183,7 @@ fn start(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
     if state.phase != Phase::Ready {
         return Ok(Vec::new());
     }
-    match &state.plan.consent {
+    match &state.protocol.consent {
         Some(required) if state.consented.as_ref() != Some(required) => Err(Refusal::Conflict(format!(
             "the protocol requires the participant's consent to version '{required}' of the text; record it first"
         ))),
@@ -216,7 +216,7 @@ fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<Even
     match current(state, segment)? {
         Some(Phase::Questions) => {
             going_on(state)?;
-            answered(state, Some(segment), &state.plan.after_segment)?;
+            answered(state, Some(segment), &state.protocol.after_segment)?;
             Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
         }
         Some(_) => Err(Refusal::not_now("refused-not-asked")),
@@ -229,7 +229,7 @@ fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
         Phase::Completed => Ok(Vec::new()),
         Phase::Closing => {
             going_on(state)?;
-            answered(state, None, &state.plan.closing)?;
+            answered(state, None, &state.protocol.closing)?;
             Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
         }
         _ => Err(Refusal::not_now("refused-closing-not-asked")),
@@ -238,12 +238,12 @@ fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
 
 fn finish(state: &SessionState, segment: SegmentId, inspected: Duration) -> Vec<EventKind> {
     let finished = EventKind::SegmentFinished { segment, inspected_ms: milliseconds(inspected) };
-    if state.plan.after_segment.is_empty() { with_completion(state, finished) } else { vec![finished] }
+    if state.protocol.after_segment.is_empty() { with_completion(state, finished) } else { vec![finished] }
 }
 
 /// The event `last`, which ends the current segment, and the session's completion if nothing follows.
 fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
-    let completes = state.done + 1 == state.plan.segments.len() && state.plan.closing.is_empty();
+    let completes = state.done + 1 == state.segments.len() && state.protocol.closing.is_empty();
     let mut events = vec![last];
     events.extend(completes.then_some(EventKind::Completed));
     events
@@ -280,7 +280,7 @@ fn give_reason(state: &SessionState, event: u32, reason: &str) -> Result<Vec<Eve
 }
 
 fn hold_focus(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
-    if !state.plan.hold {
+    if !state.protocol.hold {
         return Err(Refusal::not_now("refused-no-hold"));
     }
     match current(state, segment)? {

@@ -16,6 +16,7 @@ mod inspections;
 mod tests;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -28,58 +29,13 @@ pub use inspections::{Inspection, inspections};
 
 use super::event::{Event, EventKind};
 use super::phase::Phase;
-use super::pointing::PatchRule;
 use super::protocol::Protocol;
 use super::question::{AnswerValue, Question};
 use super::role::Role;
 use super::standing::{GivenAnswer, counted};
-use super::tablet::WhenAway;
 use parfocal_base::PatchPlace;
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SegmentId;
-
-/// The parts of a session that never change and that determine its course.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// The segments, in order.
-    pub segments: Vec<SegmentId>,
-    /// Maximum time inspected in a segment.
-    pub limit: Duration,
-    /// Questions asked after each segment.
-    pub after_segment: Vec<Question>,
-    /// Closing questions, asked at the end.
-    pub closing: Vec<Question>,
-    /// Version of the consent text that the participant must have consented to before the start; none if the protocol
-    /// requires no consent.
-    pub consent: Option<String>,
-    /// What happens to a segment's clock while no tablet shows the surgeon's page.
-    pub when_tablet_away: WhenAway,
-    /// Who chooses the patch's place.
-    pub patch: PatchRule,
-    /// Whether the focus may be held.
-    pub hold: bool,
-}
-
-impl Plan {
-    /// The plan of a session with this protocol and these segments.
-    pub fn new(protocol: &Protocol, segments: Vec<SegmentId>) -> Self {
-        Self {
-            segments,
-            limit: protocol.segment_limit,
-            after_segment: protocol.after_segment.clone(),
-            closing: protocol.closing.clone(),
-            consent: protocol.consent.clone(),
-            when_tablet_away: protocol.when_tablet_away,
-            patch: protocol.patch,
-            hold: protocol.hold,
-        }
-    }
-
-    /// Place of `segment` in the session, from 0.
-    pub fn position(&self, segment: SegmentId) -> Option<usize> {
-        self.segments.iter().position(|&known| known == segment)
-    }
-}
 
 /// What paused a session. The surgeon can resume it too, unless it was the operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -100,7 +56,8 @@ pub enum PauseCause {
 /// The state of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionState {
-    plan: Plan,
+    protocol: Arc<Protocol>,
+    segments: Vec<SegmentId>,
     phase: Phase,
     done: usize,
     /// Number of segments whose inspection has ended, so that their questions may be answered.
@@ -141,10 +98,11 @@ struct Answered {
 }
 
 impl SessionState {
-    /// The state of a new session.
-    pub const fn new(plan: Plan) -> Self {
+    /// The state of a new session by `protocol` with `segments`, in order.
+    pub const fn new(protocol: Arc<Protocol>, segments: Vec<SegmentId>) -> Self {
         Self {
-            plan,
+            protocol,
+            segments,
             phase: Phase::Ready,
             done: 0,
             asked: 0,
@@ -165,13 +123,23 @@ impl SessionState {
     /// The state before the first event, but with the present answers and the consent.
     #[must_use]
     pub fn before_all_events(&self) -> Self {
-        let state = Self::new(self.plan.clone());
+        let state = Self::new(Arc::clone(&self.protocol), self.segments.clone());
         Self { answers: self.answers.clone(), consented: self.consented.clone(), ..state }
     }
 
-    /// The session's plan.
-    pub const fn plan(&self) -> &Plan {
-        &self.plan
+    /// The session's protocol.
+    pub fn protocol(&self) -> &Protocol {
+        &self.protocol
+    }
+
+    /// The session's segments, in order.
+    pub fn segments(&self) -> &[SegmentId] {
+        &self.segments
+    }
+
+    /// Place of `segment` in the session, from 0.
+    pub fn position(&self, segment: SegmentId) -> Option<usize> {
+        self.segments.iter().position(|&known| known == segment)
     }
 
     /// The session's phase. It does not change while the session is paused.
@@ -232,13 +200,13 @@ impl SessionState {
     /// The current segment, from its notice to the end of its questions; none outside that.
     pub fn segment(&self) -> Option<SegmentId> {
         let under_way = matches!(self.phase, Phase::Notice | Phase::Inspecting | Phase::Questions);
-        self.plan.segments.get(self.done).copied().filter(|_| under_way)
+        self.segments.get(self.done).copied().filter(|_| under_way)
     }
 
     /// Time inspected in the current segment, without pauses, and never more than the limit.
     pub fn inspected(&self, now: Moment) -> Duration {
         let running = self.running_since.map_or(Duration::ZERO, |since| now.since(since));
-        (self.inspected + running).min(self.plan.limit)
+        (self.inspected + running).min(self.protocol.segment_limit)
     }
 
     /// Whether the segment's clock is running.
@@ -249,8 +217,8 @@ impl SessionState {
     /// The questions that are asked now.
     pub fn questions(&self) -> &[Question] {
         match self.phase {
-            Phase::Questions => &self.plan.after_segment,
-            Phase::Closing => &self.plan.closing,
+            Phase::Questions => &self.protocol.after_segment,
+            Phase::Closing => &self.protocol.closing,
             _ => &[],
         }
     }
@@ -271,8 +239,8 @@ impl SessionState {
     /// the questions have been shown. [`Grace`](super::grace::Grace) decides whether a late answer counts.
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {
-            None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.plan.segments.len(),
-            Some(segment) => self.plan.position(segment).is_some_and(|position| position < self.asked),
+            None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.segments.len(),
+            Some(segment) => self.position(segment).is_some_and(|position| position < self.asked),
         }
     }
 
@@ -291,11 +259,15 @@ impl SessionState {
             }
             EventKind::SegmentFinished { inspected_ms, .. } => {
                 self.stop_clock(*inspected_ms);
-                if !self.plan.patch.stays() {
+                if !self.protocol.patch.stays() {
                     self.pointed.patch = PatchPlace::CENTRE;
                 }
                 self.asked = self.done + 1;
-                if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
+                if self.protocol.after_segment.is_empty() {
+                    self.leave_segment();
+                } else {
+                    self.phase = Phase::Questions;
+                }
             }
             EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),
             EventKind::Paused { inspected_ms, reason } => {
@@ -348,6 +320,6 @@ impl SessionState {
     const fn leave_segment(&mut self) {
         self.done += 1;
         self.inspected = Duration::ZERO;
-        self.phase = if self.done < self.plan.segments.len() { Phase::Notice } else { Phase::Closing };
+        self.phase = if self.done < self.segments.len() { Phase::Notice } else { Phase::Closing };
     }
 }

@@ -21,17 +21,15 @@ fn question(id: &str, optional: bool) -> Question {
     Question { id: id.to_owned(), text: format!("{id}?"), kind: QuestionKind::Text, optional, only_if_yes: None }
 }
 
-fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
-    Plan {
-        segments: (0..segments).map(segment).collect(),
-        limit: Duration::from_mins(2),
+/// A new session by the paper's protocol, whose settings last two minutes, with other questions.
+fn session(segments: usize, asks_after: bool, asks_closing: bool) -> SessionState {
+    let paper = Protocol::parse_kept(include_str!("../../../../trial-protocols/paper.toml"), "paper.toml").unwrap();
+    let protocol = Protocol {
         after_segment: if asks_after { vec![question("a", false), question("b", true)] } else { Vec::new() },
         closing: if asks_closing { vec![question("z", false)] } else { Vec::new() },
-        consent: None,
-        when_tablet_away: WhenAway::Pause,
-        patch: PatchRule::default(),
-        hold: false,
-    }
+        ..paper
+    };
+    SessionState::new(Arc::new(protocol), (0..segments).map(segment).collect())
 }
 
 /// A session with its event log and a clock.
@@ -42,8 +40,8 @@ struct Run {
 }
 
 impl Run {
-    fn new(plan: Plan) -> Self {
-        Self { state: SessionState::new(plan), log: Vec::new(), now: Moment::from_nanos(1_000_000_000) }
+    fn new(state: SessionState) -> Self {
+        Self { state, log: Vec::new(), now: Moment::from_nanos(1_000_000_000) }
     }
 
     fn record(&mut self, by: Role, kinds: Vec<EventKind>) {
@@ -75,7 +73,7 @@ impl Run {
     }
 
     fn inspecting(asks_after: bool) -> Self {
-        let mut run = Self::new(plan(2, asks_after, true));
+        let mut run = Self::new(session(2, asks_after, true));
         run.act(Role::Operator, &Action::Start).unwrap();
         run.act(Role::Surgeon, &Action::Acknowledge { segment: segment(0) }).unwrap();
         run
@@ -92,7 +90,7 @@ const SECOND: Duration = Duration::from_secs(1);
 
 #[test]
 fn a_whole_session_goes_from_ready_to_completed() {
-    let mut run = Run::new(plan(2, true, true));
+    let mut run = Run::new(session(2, true, true));
     run.act(Role::Operator, &Action::Start).unwrap();
     for number in 0..2 {
         let segment = segment(number);
@@ -119,7 +117,7 @@ fn a_whole_session_goes_from_ready_to_completed() {
 
 #[test]
 fn without_any_question_the_last_segment_completes_the_session() {
-    let mut run = Run::new(plan(1, false, false));
+    let mut run = Run::new(session(1, false, false));
     run.act(Role::Operator, &Action::Start).unwrap();
     run.act(Role::Surgeon, &Action::Acknowledge { segment: segment(0) }).unwrap();
     run.wait(120 * SECOND);
@@ -348,10 +346,10 @@ proptest! {
     fn segments_run_one_at_a_time_in_order_and_a_replay_gives_the_same_state(
         steps in prop::collection::vec(any_step(), 0..150), asks_after: bool, asks_closing: bool,
     ) {
-        let mut run = Run::new(plan(3, asks_after, asks_closing));
+        let mut run = Run::new(session(3, asks_after, asks_closing));
         for step in steps {
             take(&mut run, step);
-            prop_assert!(run.state.inspected(run.now) <= run.state.plan().limit);
+            prop_assert!(run.state.inspected(run.now) <= run.state.protocol().segment_limit);
             let inspecting = run.state.phase() == Phase::Inspecting && run.state.paused().is_none();
             prop_assert!(inspecting || !run.state.running());
         }
@@ -374,7 +372,7 @@ proptest! {
             }
         }
 
-        let mut replayed = SessionState::new(plan(3, asks_after, asks_closing));
+        let mut replayed = session(3, asks_after, asks_closing);
         replayed.answers = run.state.answers.clone();
         run.log.iter().for_each(|event| replayed.apply(event));
         prop_assert_eq!(replayed, run.state);
