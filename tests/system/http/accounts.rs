@@ -444,6 +444,29 @@ async fn a_live_view_ends_when_its_account_is_disabled() {
     assert!(pictures.expect("the stream of pictures ends, too").unwrap().len() > 100);
 }
 
+#[tokio::test]
+async fn a_live_view_ends_when_its_account_no_longer_has_the_role() {
+    let (_protocols, mut server) = server();
+    sign_in_as_lead(&mut server).await;
+    server.add_account("operator", "operator", "Nurse Op");
+    let token = server.sign_in("operator").await;
+    // The browser has also opened a surgeon's link, which goes on.
+    let entered = server.get(&format!("/enter?key={}", server.key("surgeon"))).send().await.unwrap();
+    let surgeons = entered.headers()[SET_COOKIE].to_str().unwrap().split(';').next().unwrap();
+    let cookies = format!("parfocal-account={token}; {surgeons}");
+    let stream = client().get(server.url("/stream.mjpeg")).header(COOKIE, cookies).send().await.unwrap();
+    assert_eq!(stream.status(), StatusCode::OK);
+    server.use_key("operator", &token);
+    let mut page = Page::open(&server, "operator").await;
+    page.watch(2).await;
+
+    let change = change(&server, "operator", json!({"change": "role", "role": "monitor"}), PASSPHRASE).await;
+    assert_eq!(change.0, 200);
+    assert_eq!(closed(&mut page).await, CloseCode::Policy);
+    let pictures = tokio::time::timeout(Duration::from_secs(20), stream.bytes()).await;
+    assert!(pictures.expect("the stream of pictures ends, too").unwrap().len() > 100);
+}
+
 /// Runs `parfocal account` with these arguments in a terminal of its own. Types each of `lines` after its prompt, and
 /// returns what the terminal showed.
 fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> String {

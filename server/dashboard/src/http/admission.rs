@@ -8,6 +8,7 @@ use super::credentials::Pass;
 use super::error::Error;
 use super::{App, AppState};
 use parfocal_records::accounts::Token;
+use parfocal_trial::role::Role;
 
 /// Time between two looks at whether a sign-in has ended.
 const SIGN_IN_CHECK: Duration = Duration::from_secs(5);
@@ -31,17 +32,25 @@ pub(super) fn admit(app: &App, pass: Pass) -> Result<(), Error> {
 pub(super) enum Over {
     /// The surgeon's link is no longer valid.
     Link,
-    /// The sign-in has ended.
+    /// The sign-in has ended, or no longer gives the role.
     SignIn,
 }
 
-/// Waits until a page may no longer stay that was let in by the surgeon's link `pass`, or else by the sign-in with
-/// `token`. One that was let in by neither may stay.
-pub(super) async fn over(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Over {
-    match (pass, token) {
-        (Some(pass), _) => no_longer_admitted(&app, pass).await,
-        (None, Some(token)) => signed_out(&app, &token).await,
-        (None, None) => std::future::pending().await,
+/// What lets a page or a stream stay only for a time. A role's key or cookie lets it stay as long as it likes.
+#[derive(Clone)]
+pub(super) enum Ground {
+    /// The surgeon's link.
+    Link(Pass),
+    /// The sign-in with this token, to an account that may act as this role.
+    SignIn(Token, Role),
+}
+
+/// Waits until a page may no longer stay that was let in on this `ground`.
+pub(super) async fn over(app: AppState, ground: Option<Ground>) -> Over {
+    match ground {
+        Some(Ground::Link(pass)) => no_longer_admitted(&app, pass).await,
+        Some(Ground::SignIn(token, role)) => signed_out(&app, &token, role).await,
+        None => std::future::pending().await,
     }
 }
 
@@ -55,8 +64,8 @@ async fn no_longer_admitted(app: &App, pass: Pass) -> Over {
     Over::Link
 }
 
-async fn signed_out(app: &App, token: &Token) -> Over {
-    while !matches!(app.accounts.has_ended(token).await, Ok(true)) {
+async fn signed_out(app: &App, token: &Token, role: Role) -> Over {
+    while !matches!(app.accounts.has_ended(token, role).await, Ok(true)) {
         sleep(SIGN_IN_CHECK).await;
     }
     Over::SignIn

@@ -12,14 +12,11 @@ use futures_util::{Stream, StreamExt, stream};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::admission::over;
+use super::admission::{Ground, over};
 use super::connections::ended;
-use super::credentials::Pass;
-use super::error::Error;
 use super::people::SignedIn;
 use super::roles::Roles;
 use parfocal_imaging::Size;
-use parfocal_records::accounts::Token;
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
@@ -29,23 +26,16 @@ const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held")))]
-async fn mjpeg(
-    State(app): State<AppState>,
-    roles: Roles,
-    SignedIn(person): SignedIn,
-) -> Result<impl IntoResponse, Error> {
-    // If the browser's only role comes from a surgeon's link, the stream ends when the link is no longer valid. If it
-    // comes from an account alone, it ends with the sign-in.
-    let pass = roles.pass().filter(|_| roles.is_surgeon_alone());
-    let role = roles.choose(None)?;
-    let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
-    let parts = parts(app, pass, token).map(Ok::<_, std::convert::Infallible>);
-    Ok(([(CONTENT_TYPE, KIND)], Body::from_stream(parts)))
+async fn mjpeg(State(app): State<AppState>, roles: Roles, SignedIn(person): SignedIn) -> impl IntoResponse {
+    let ground = roles.ground(roles.own(), person);
+    let parts = parts(app, ground).map(Ok::<_, std::convert::Infallible>);
+    ([(CONTENT_TYPE, KIND)], Body::from_stream(parts))
 }
 
-fn parts(app: AppState, pass: Option<Pass>, token: Option<Token>) -> impl Stream<Item = Bytes> {
+/// The stream's bytes, until a request that was let in on this `ground` may no longer stay.
+fn parts(app: AppState, ground: Option<Ground>) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
-    let over = over(AppState::clone(&app), pass, token);
+    let over = over(AppState::clone(&app), ground);
     let viewer = app.live.viewer(Size::Cell, false);
 
     let frames = stream::unfold((app, viewer), async |(app, mut viewer)| {

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::admission::admit;
+use super::admission::{Ground, admit};
 use super::credentials::{Pass, cookie_name, holds, pass, set_cookie};
 use super::error::{Error, role_name};
 use super::keys::ROLES;
@@ -72,19 +72,20 @@ impl Roles {
         }
     }
 
-    /// Whether `role` is held only by an account.
-    pub(super) fn by_account_alone(&self, role: Role) -> bool {
-        !self.by_link.contains(&role)
+    /// The role in which the request's person is here: somebody who holds more than the surgeon's works here, and is not
+    /// a participant of the trial.
+    pub(super) fn own(&self) -> Role {
+        self.held.iter().copied().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)
     }
 
-    /// Whether the surgeon's is the only role.
-    pub(super) fn is_surgeon_alone(&self) -> bool {
-        self.held == [Role::Surgeon]
-    }
-
-    /// The surgeon's link that the request holds, if any.
-    pub(super) const fn pass(&self) -> Option<Pass> {
-        self.pass
+    /// What lets a page stay that is served as `role`, one of those held; `None` if it may stay as long as it likes.
+    /// `person` is who is signed in.
+    pub(super) fn ground(&self, role: Role, person: Option<Person>) -> Option<Ground> {
+        if role == Role::Surgeon {
+            return self.pass.map(Ground::Link);
+        }
+        let person = person.filter(|_| !self.by_link.contains(&role))?;
+        Some(Ground::SignIn(person.token, role))
     }
 }
 
@@ -211,9 +212,8 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "Redirect to the role's page"),
     (status = 403, description = "No role is held")))]
-async fn start(Roles { held, .. }: Roles) -> Redirect {
-    // Somebody who holds more than one role works here, and is not a participant of the trial.
-    Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
+async fn start(roles: Roles) -> Redirect {
+    Redirect::to(home(roles.own()))
 }
 
 /// The routes of this file.

@@ -27,6 +27,7 @@ use parfocal_trial::account::{
     Account, AccountChange, AccountName, AccountRole, IDLE_LIMIT, SIGN_IN_LIMIT, check_change, check_display,
 };
 use parfocal_trial::refusal::Refusal;
+use parfocal_trial::role::Role;
 use throttle::Throttle;
 
 /// How often the use of a sign-in is recorded at most: each time is a write to the disk.
@@ -250,16 +251,17 @@ impl Accounts {
         Ok(Some(account))
     }
 
-    /// Whether the sign-in with `token` was ended, or is too old. Streams such as a live view end then. A sign-in that
-    /// was only unused for a while does not end them.
+    /// Whether the sign-in with `token` was ended, is too old, or is to an account that may no longer read as `role`.
+    /// Streams such as a live view end then. A sign-in that was only unused for a while does not end them.
     ///
     /// # Errors
     /// If the database failed.
-    pub async fn has_ended(&self, token: &Token) -> Result<bool, AccountError> {
+    pub async fn has_ended(&self, token: &Token, role: Role) -> Result<bool, AccountError> {
         let found = self.reader().sign_in(&token.sha256()).await?;
         let now = self.clock.wall();
-        let goes_on = |found: StoredSignIn| {
-            !found.account.disabled && now.duration_since(found.began).unsigned_abs() <= SIGN_IN_LIMIT
+        let goes_on = |StoredSignIn { account, began, .. }: StoredSignIn| {
+            let is_recent = now.duration_since(began).unsigned_abs() <= SIGN_IN_LIMIT;
+            !account.disabled && account.role.may_act_as(role, false) && is_recent
         };
         Ok(!found.is_some_and(goes_on))
     }

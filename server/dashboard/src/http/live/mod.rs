@@ -37,9 +37,8 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::admission::{Over, admit, over};
+use super::admission::{Ground, Over, admit, over};
 use super::connections::ended;
-use super::credentials::Pass;
 use super::error::Error;
 use super::people::SignedIn;
 use super::permits::Permit;
@@ -50,7 +49,6 @@ use message::{PageMessage, ServerMessage, close, pack, tell, tenth_millis, whole
 use operator::ForOperator;
 use parfocal_pipeline::control::ControlStatus;
 use parfocal_pipeline::live::{DepthMap, DepthMaps, EncodedFrame};
-use parfocal_records::accounts::Token;
 use parfocal_trial::role::Role;
 use pictures::Pictures;
 use surgeon::ForSurgeon;
@@ -93,8 +91,7 @@ async fn live(
     upgrade: WebSocketUpgrade,
 ) -> Result<Response, Error> {
     let role = roles.choose(query.role)?;
-    let pass = roles.pass().filter(|_| role == Role::Surgeon);
-    let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
+    let ground = roles.ground(role, person);
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
     let browser = headers.get(USER_AGENT).and_then(|name| name.to_str().ok()).unwrap_or_default().to_owned();
     Ok(upgrade.on_upgrade(async move |socket| {
@@ -102,10 +99,10 @@ async fn live(
         let _permit = permit;
         match role {
             Role::Operator | Role::Researcher => {
-                attend::<ForOperator>(socket, PageConnection::new(app, pass, token, None)).await;
+                attend::<ForOperator>(socket, PageConnection::new(app, ground, None)).await;
             }
             Role::Surgeon | Role::System => {
-                attend::<ForSurgeon>(socket, PageConnection::new(app, pass, token, Some(browser))).await;
+                attend::<ForSurgeon>(socket, PageConnection::new(app, ground, Some(browser))).await;
             }
         }
     }))
@@ -129,8 +126,8 @@ struct PageConnection<A: Audience> {
     app: AppState,
     pictures: Pictures,
     heartbeat: Heartbeat,
-    /// The link of a surgeon's page.
-    pass: Option<Pass>,
+    /// What lets the page stay.
+    ground: Option<Ground>,
     /// Resolves when the page may no longer stay.
     over: BoxFuture<'static, Over>,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
@@ -150,7 +147,7 @@ struct PageConnection<A: Audience> {
 }
 
 impl<A: Audience> PageConnection<A> {
-    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>, surgeons_browser: Option<String>) -> Self {
+    fn new(app: AppState, ground: Option<Ground>, surgeons_browser: Option<String>) -> Self {
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
 
@@ -160,8 +157,8 @@ impl<A: Audience> PageConnection<A> {
         Self {
             pictures: Pictures::new(&app.live, A::LEADS, &app.clock, app.control.status.clone()),
             heartbeat: Heartbeat::new(app.clock.now()),
-            pass,
-            over: Box::pin(over(AppState::clone(&app), pass, token)),
+            over: Box::pin(over(AppState::clone(&app), ground.clone())),
+            ground,
             sessions,
             statuses,
             depth_maps: None,
@@ -258,7 +255,9 @@ impl<A: Audience> PageConnection<A> {
 
     fn session(&mut self) -> Option<Message> {
         // A page that may not see the session is about to be closed.
-        if self.pass.is_some_and(|pass| admit(&self.app, pass).is_err()) {
+        if let Some(Ground::Link(pass)) = self.ground
+            && admit(&self.app, pass).is_err()
+        {
             return None;
         }
 
