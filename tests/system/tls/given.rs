@@ -116,6 +116,25 @@ async fn files_renewed_while_the_server_runs_are_used_and_bad_ones_are_not() {
 }
 
 #[tokio::test]
+async fn a_renewed_certificate_that_begins_later_is_used_from_then_on() {
+    let site = Site::new();
+    let now = SystemClock.wall();
+    let certificates = Certificates::given(site.certificate(), site.key(), now).unwrap();
+    let until = certificates.until();
+
+    site.renew(&["localhost"], DAY, 300 * DAY);
+    let error = certificates.refresh(now, Names::of_machine).unwrap_err().to_string();
+    assert!(error.contains("begins on"), "{error}");
+    assert!(!certificates.refresh(now, Names::of_machine).unwrap(), "told of once");
+    assert_eq!(certificates.until(), until, "the present one is kept");
+
+    let begun = now + SignedDuration::from_hours(DAY + 1);
+    assert!(certificates.refresh(begun, Names::of_machine).unwrap());
+    assert!(certificates.until() > until);
+    assert!(!certificates.refresh(begun, Names::of_machine).unwrap(), "once");
+}
+
+#[tokio::test]
 async fn a_certificate_that_ends_while_the_server_runs_is_shown_until_its_files_are_renewed() {
     let site = Site::new();
     let now = SystemClock.wall();

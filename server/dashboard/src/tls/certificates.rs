@@ -43,8 +43,15 @@ pub struct Certificates {
 enum Source {
     /// The local authority signs them, for a server that listens on the address `listening`.
     Local { authority: Box<Authority>, listening: IpAddr },
-    /// Two files hold them. Their last contents are kept, so that a bad certificate is reported only once.
-    Given { files: Files, last: Mutex<Contents> },
+    /// Two files hold them.
+    Given { files: Files, last: Mutex<LastLook> },
+}
+
+/// What was last found in the two files of a given certificate.
+struct LastLook {
+    contents: Contents,
+    /// Whether it is in use. If not, it was bad when it was found.
+    in_use: bool,
 }
 
 /// The certificate that the server shows now.
@@ -79,7 +86,7 @@ impl Certificates {
         let (key, facts) = files.check(&contents, &provider, now)?;
 
         let shown = CurrentCertificate { key, facts, wanted: Names::default() };
-        let source = Source::Given { files, last: Mutex::new(contents) };
+        let source = Source::Given { files, last: Mutex::new(LastLook { contents, in_use: true }) };
         Ok(Self { source, provider, shown: ArcSwap::from_pointee(shown) })
     }
 
@@ -143,12 +150,17 @@ impl Certificates {
             Source::Given { files, last } => {
                 let contents = files.read()?;
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                if *last == contents {
+                let is_known = last.contents == contents;
+                if is_known && last.in_use {
                     return Ok(false);
                 }
 
                 let checked = files.check(&contents, &self.provider, now);
-                *last = contents;
+                *last = LastLook { contents, in_use: checked.is_ok() };
+                // A bad one is reported once. It is checked again, because one that begins later becomes good.
+                if is_known && checked.is_err() {
+                    return Ok(false);
+                }
                 let (key, facts) = checked?;
                 self.shown.store(Arc::new(CurrentCertificate { key, facts, wanted: Names::default() }));
                 tracing::info!("the renewed certificate in {} is in use", files.certificate.display());
