@@ -243,7 +243,14 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     assert!(status == 409 && said.contains("despite_outstanding"), "{said}");
     let mut lock = signed("lock");
     lock["despite_outstanding"] = true.into();
+    let page = async || {
+        let path = format!("/researcher/sessions/{}", session.as_str().unwrap());
+        ask(&server, "researcher", Method::GET, &path, &Value::Null).await.1
+    };
+    assert!(page().await.contains("correct-answer"));
     post(&server, "researcher", changes, lock).await;
+    let locked = page().await;
+    assert!(locked.contains("The study is locked") && !locked.contains("correct-answer"), "{locked}");
     assert_eq!(refused(&server, "researcher", changes, signed("unblind")).await.0, 403);
 
     // The definition names who may unblind.

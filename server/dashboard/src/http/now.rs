@@ -22,8 +22,8 @@ pub(super) struct Session {
     pub(super) withdrawn: bool,
     /// Whether the session is unblinded.
     pub(super) unblinded: bool,
-    /// Whether the session belongs to a study.
-    pub(super) in_study: bool,
+    /// Whether its study was locked; `None` outside studies.
+    pub(super) study_locked: Option<bool>,
 }
 
 /// The line on the page of a session.
@@ -36,7 +36,12 @@ pub(super) const fn on_session(session: Session) -> &'static str {
             "Wait until the session has ended. Then correct and export it."
         }
         Session { unblinded: true, .. } => "Export it unblinded, or look at what the policies did.",
-        Session { in_study: true, .. } => "Correct what was recorded wrongly. The study is unblinded as a whole.",
+        Session { study_locked: Some(true), .. } => {
+            "The study is locked, so only notes can be added. It is unblinded as a whole."
+        }
+        Session { study_locked: Some(false), .. } => {
+            "Correct what was recorded wrongly. The study is unblinded as a whole."
+        }
         Session { .. } => "Correct what was recorded wrongly and export it blinded. Unblind when the trial is over.",
     }
 }
@@ -81,7 +86,8 @@ mod tests {
 
     #[test]
     fn a_session_is_corrected_exported_and_unblinded_in_that_order() {
-        let ended = Session { status: SessionStatus::Completed, withdrawn: false, unblinded: false, in_study: false };
+        let ended =
+            Session { status: SessionStatus::Completed, withdrawn: false, unblinded: false, study_locked: None };
         assert!(on_session(ended).contains("export it blinded"));
         assert!(on_session(Session { unblinded: true, ..ended }).contains("unblinded"));
 
@@ -89,9 +95,10 @@ mod tests {
         assert!(on_session(under_way).starts_with("Wait"));
         assert!(on_session(Session { withdrawn: true, ..under_way }).starts_with("The participant withdrew"));
         assert!(
-            !on_session(Session { in_study: true, ..ended }).contains("Unblind when"),
+            !on_session(Session { study_locked: Some(false), ..ended }).contains("Unblind when"),
             "only its study is unblinded"
         );
+        assert!(on_session(Session { study_locked: Some(true), ..ended }).starts_with("The study is locked"));
     }
 
     #[test]

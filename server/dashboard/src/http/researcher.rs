@@ -150,7 +150,7 @@ impl SessionPage {
             status: line.status,
             withdrawn: line.withdrawn,
             unblinded: line.unblinded,
-            in_study: line.study.is_some(),
+            study_locked: line.study.as_ref().map(|_| self.detail.study_locked),
         })
     }
 

@@ -53,6 +53,9 @@ pub struct SessionDetail {
     pub log: Vec<LogLine>,
     /// What unblinding revealed; none before.
     pub unblinding: Option<Unblinding>,
+    /// Whether its study was locked, so that only notes can be added. For the page alone.
+    #[serde(skip)]
+    pub study_locked: bool,
 }
 
 /// A setting of a session.
@@ -156,6 +159,7 @@ impl Reports {
             outstanding: self.outstanding(&course).await?,
             log: self.log(&course).await?,
             unblinding: unblinding(&course),
+            study_locked: course.study_locked.is_some(),
         })
     }
 
