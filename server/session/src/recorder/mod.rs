@@ -16,11 +16,11 @@ use std::time::Duration;
 
 use tokio::sync::Mutex as Pen;
 use tokio::task::spawn_blocking;
-use tokio::time::{Instant, interval};
+use tokio::time::{Instant, interval, timeout};
 
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
-use parfocal_recording::{Ended, Intake, compressed_size, room};
+use parfocal_recording::{Ended, Intake, Room, compressed_size, room};
 use parfocal_trial::protocol::Record;
 use running::Running;
 
@@ -28,7 +28,7 @@ use running::Running;
 const TICK: Duration = Duration::from_secs(1);
 /// Interval at which a frame is compressed while nothing is recorded, to estimate how long the disk would last.
 const MEASURE: Duration = Duration::from_secs(10);
-/// Longest wait for that frame.
+/// Longest wait for that frame, and for the disk.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Records at most one thing at a time. Clone freely.
@@ -40,6 +40,9 @@ struct Shared {
     state: Mutex<State>,
     /// Held while a recording is being started or stopped.
     pen: Pen<()>,
+    /// Held while the disk is asked for its room, so that a disk that hangs blocks only one thread, however often
+    /// somebody asks.
+    asking: Arc<Pen<()>>,
 }
 
 #[derive(Default)]
@@ -72,7 +75,7 @@ struct Active {
 impl Recordings {
     /// A recorder that records nothing yet. It follows protocols only while [`Recordings::run`] is awaited.
     pub fn new(parts: RecorderParts) -> Self {
-        Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
+        Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()), asking: Arc::default() }))
     }
 
     /// Follows the sessions, and notices when a recording ends by itself. Never ends.
@@ -131,12 +134,25 @@ impl Recordings {
         done.await.ok()
     }
 
-    /// The state of recording, for the operator's page.
+    /// The room on the disk; `None` if the disk does not say it in time.
+    async fn room(&self) -> Option<Room> {
+        let folder = self.0.parts.folder.clone();
+        let asking = Arc::clone(&self.0.asking);
+        let answer = async {
+            let asking = asking.lock_owned().await;
+            spawn_blocking(move || {
+                let _asking = asking;
+                room(&folder)
+            })
+            .await
+        };
+        timeout(PATIENCE, answer).await.ok()?.ok()?.ok()
+    }
+
+    /// The state of recording, for the operator's page. It is told even while the disk hangs.
     pub async fn status(&self) -> RecordingStatus {
         let parts = &self.0.parts;
-        let folder = parts.folder.clone();
-        // A disk that hangs must not keep a thread that serves others.
-        let room = spawn_blocking(move || room(&folder)).await.ok().and_then(Result::ok);
+        let room = self.room().await;
 
         let status = parts.status.borrow().clone();
         let state = self.0.state();
