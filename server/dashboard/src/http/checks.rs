@@ -1,6 +1,7 @@
 //! The operator's card that says whether everything is ready for a trial: the checks of `parfocal doctor` on the
 //! machine, and what the running server knows about its devices and the surgeon's tablet.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use axum::Json;
@@ -8,6 +9,7 @@ use axum::extract::State;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use serde::Serialize;
+use tokio::sync::OwnedMutexGuard;
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -17,6 +19,7 @@ use super::error::Error;
 use super::roles::Operator;
 use super::{App, AppState};
 use crate::doctor::{self, Finding};
+use parfocal_base::clock::Clock;
 use parfocal_records::store::look_at_database;
 
 /// Results of all checks.
@@ -36,21 +39,27 @@ struct Checks {
 #[utoipa::path(get, path = "/api/operator/checks", tag = "operator", responses((status = 200, body = Checks)))]
 async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;
-    let folder = app.store.folder().to_owned();
-    let database = doctor::database(&folder, look_at_database(&folder).await);
-    let clock = Arc::clone(&app.clock);
-    let machine = spawn_blocking(move || {
-        let _look = look;
-        doctor::machine(&folder, clock.as_ref())
-    });
-
-    let mut findings = machine.await.map_err(|_| Error::Internal)?;
-    findings.extend(database);
+    // A task of its own, because this handler is dropped when its browser gives up or the disk hangs.
+    let looking = tokio::spawn(look_at_machine(app.store.folder().to_owned(), Arc::clone(&app.clock), look));
+    let mut findings = looking.await.map_err(|_| Error::Internal)??;
     let now = app.clock.wall();
     let local = app.address.authority().is_some();
     findings.extend(app.address.certificate_until().map(|until| doctor::certificate(until, local, now)));
     findings.extend(devices(&app));
     Ok(Json(Checks { at: now, findings }))
+}
+
+/// Checks the machine, and the database in the data folder `folder`, while nobody else does.
+async fn look_at_machine(
+    folder: PathBuf,
+    clock: Arc<dyn Clock>,
+    _look: OwnedMutexGuard<()>,
+) -> Result<Vec<Finding>, Error> {
+    let database = doctor::database(&folder, look_at_database(&folder).await);
+    let machine = spawn_blocking(move || doctor::machine(&folder, clock.as_ref()));
+    let mut findings = machine.await.map_err(|_| Error::Internal)?;
+    findings.extend(database);
+    Ok(findings)
 }
 
 fn devices(app: &App) -> Vec<Finding> {
