@@ -1,7 +1,6 @@
 //! Checks the surgeon's tablet by what its page reports to the server anyway.
 
-use jiff::Timestamp;
-use jiff::tz::TimeZone;
+use jiff::{Timestamp, Zoned};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -68,14 +67,16 @@ pub struct TriedTablet {
     pub failing: Vec<TabletPart>,
 }
 
-/// One finding for each tablet that was tried.
-pub fn tried(tablets: &[TriedTablet], zone: &TimeZone) -> Vec<Finding> {
-    tablets.iter().map(|tablet| tried_one(tablet, zone)).collect()
+/// One finding for each tablet that was tried; `now` is the local time.
+pub fn tried(tablets: &[TriedTablet], now: &Zoned) -> Vec<Finding> {
+    tablets.iter().map(|tablet| tried_one(tablet, now)).collect()
 }
 
-fn tried_one(tablet: &TriedTablet, zone: &TimeZone) -> Finding {
-    let at = tablet.at.to_zoned(zone.clone()).strftime("%H:%M");
-    let found = format!("{} was tried at {at}", browser(&tablet.user_agent));
+fn tried_one(tablet: &TriedTablet, now: &Zoned) -> Finding {
+    let at = tablet.at.to_zoned(now.time_zone().clone());
+    // A server may run for weeks.
+    let format = if at.date() == now.date() { "at %H:%M" } else { "on %Y-%m-%d at %H:%M" };
+    let found = format!("{} was tried {}", browser(&tablet.user_agent), at.strftime(format));
     if tablet.failing.is_empty() {
         return Finding::well(TABLET, format!("{found}: everything works."));
     }
@@ -147,6 +148,8 @@ fn browser(user_agent: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use jiff::tz::TimeZone;
+
     use super::*;
     use crate::doctor::Verdict;
 
@@ -169,10 +172,11 @@ mod tests {
 
     #[test]
     fn a_tablet_that_was_tried_tells_what_does_not_work_on_it() {
+        let now = Timestamp::from_second(60_000).unwrap().to_zoned(TimeZone::UTC);
         let with = |failing: &[TabletPart]| {
             let at = Timestamp::from_second(50_520).unwrap();
             let tablet = TriedTablet { user_agent: IPAD.into(), at, failing: failing.to_vec() };
-            tried(&[tablet], &TimeZone::UTC).remove(0)
+            tried(&[tablet], &now).remove(0)
         };
         let well = with(&[]);
         assert_eq!(well.verdict, Verdict::Well);
@@ -181,6 +185,11 @@ mod tests {
         assert_eq!(silent.verdict, Verdict::Advice);
         assert!(silent.found.ends_with("Does not work: the microphone, keeping the screen on."), "{}", silent.found);
         assert_eq!(with(&[TabletPart::Storage]).verdict, Verdict::Wrong);
+
+        let earlier =
+            TriedTablet { user_agent: IPAD.into(), at: "1969-12-30T09:30:00Z".parse().unwrap(), failing: vec![] };
+        let found = tried(&[earlier], &now).remove(0).found;
+        assert_eq!(found, "Safari on an iPad or a Mac was tried on 1969-12-30 at 09:30: everything works.");
     }
 
     #[test]

@@ -65,15 +65,15 @@ async fn look_at_machine(
 fn devices(app: &App) -> Vec<Finding> {
     let status = Arc::clone(&app.control.status.borrow());
     let Equipment { calibration, mosaics, .. } = &app.equipment;
-    let today = app.clock.wall().to_zoned(TimeZone::system()).date();
+    let now = app.clock.wall().to_zoned(TimeZone::system());
 
     let mut findings = vec![
         doctor::camera_in_use(&status.camera),
         doctor::lens_in_use(&status.lens),
-        doctor::calibration(calibration, *mosaics, status.camera.simulated, today),
+        doctor::calibration(calibration, *mosaics, status.camera.simulated, now.date()),
     ];
     findings.extend(doctor::tablets(&app.tablets.open()));
-    findings.extend(doctor::tried(&app.tablet_trials.all(), &TimeZone::system()));
+    findings.extend(doctor::tried(&app.tablet_trials.all(), &now));
     findings
 }
 
