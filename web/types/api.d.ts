@@ -1710,7 +1710,7 @@ export interface components {
             /** @description Number of surgeons left out of the tests because a value is missing. */
             left_out: number;
             /** @description Every pair of policies. */
-            pairs: components["schemas"]["Pair"][];
+            pairs: components["schemas"]["PolicyPair"][];
             /** @description Each policy's values over all settings. */
             policies: components["schemas"]["PolicySummary"][];
             /** @description Whether values rise or fall with the position in the session. */
@@ -2310,6 +2310,58 @@ export interface components {
             reason: string;
             /** @description The sites of the study that this database runs; all sites if none are named. */
             sites?: string[];
+        };
+        /** @description Two policies compared by the surgeons' means. */
+        PolicyPair: {
+            /** @description The first policy. */
+            a: string;
+            /** @description The second policy. */
+            b: string;
+            /** @description Number of surgeons whose means differ; a signed-rank test ignores the others. */
+            differing: number;
+            /**
+             * Format: double
+             * @description Mean of `a` minus mean of `b`.
+             */
+            mean_difference: number;
+            mean_difference_interval?: components["schemas"]["Interval"] | null;
+            /**
+             * Format: double
+             * @description Median of the surgeons' differences.
+             */
+            median_difference: number;
+            /** @description How `p` was computed. */
+            method: components["schemas"]["Method"];
+            /** @description Number of surgeons compared. */
+            n: number;
+            /**
+             * Format: double
+             * @description Sum of the ranks where `b` is higher.
+             */
+            negative: number;
+            /**
+             * Format: double
+             * @description Two-sided p of Wilcoxon's signed-rank test.
+             */
+            p: number;
+            /**
+             * Format: double
+             * @description `p` corrected by Holm's method for the pairs of this outcome.
+             */
+            p_holm: number;
+            /**
+             * Format: double
+             * @description Sum of the ranks where `a` is higher.
+             */
+            positive: number;
+            /**
+             * Format: double
+             * @description Rank-biserial correlation, -1..=1: above 0 if `a` is higher; none if no surgeon's means differ.
+             */
+            rank_biserial?: number | null;
+            rank_biserial_interval?: components["schemas"]["Interval"] | null;
+            /** @description The finding in a sentence. */
+            said: string;
         };
         /** @description Summary of a policy's values. */
         PolicySummary: components["schemas"]["Summary"] & {

@@ -327,7 +327,7 @@ class Comparison(TypedDict):
     left_out: int
     """Number of surgeons left out of the tests because a value is missing."""
 
-    pairs: builtins.list[Pair]
+    pairs: builtins.list[PolicyPair]
     """Every pair of policies."""
 
     policies: builtins.list[PolicySummary]
@@ -988,6 +988,52 @@ class PlanStudy(TypedDict):
 
     sites: NotRequired[builtins.list[str]]
     """The sites of the study that this database runs; all sites if none are named."""
+
+class PolicyPair(TypedDict):
+    """Two policies compared by the surgeons' means."""
+
+    a: str
+    """The first policy."""
+
+    b: str
+    """The second policy."""
+
+    differing: int
+    """Number of surgeons whose means differ; a signed-rank test ignores the others."""
+
+    mean_difference: float
+    """Mean of `a` minus mean of `b`."""
+
+    mean_difference_interval: NotRequired[Interval | None]
+
+    median_difference: float
+    """Median of the surgeons' differences."""
+
+    method: Method
+    """How `p` was computed."""
+
+    n: int
+    """Number of surgeons compared."""
+
+    negative: float
+    """Sum of the ranks where `b` is higher."""
+
+    p: float
+    """Two-sided p of Wilcoxon's signed-rank test."""
+
+    p_holm: float
+    """`p` corrected by Holm's method for the pairs of this outcome."""
+
+    positive: float
+    """Sum of the ranks where `a` is higher."""
+
+    rank_biserial: NotRequired[float | None]
+    """Rank-biserial correlation, -1..=1: above 0 if `a` is higher; none if no surgeon's means differ."""
+
+    rank_biserial_interval: NotRequired[Interval | None]
+
+    said: str
+    """The finding in a sentence."""
 
 class PolicySummary(TypedDict):
     """Summary of a policy's values."""

@@ -79,6 +79,7 @@ pub struct Difference {
 
 /// Two policies compared by the surgeons' means.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = PolicyPair)]
 pub struct Pair {
     /// The first policy.
     pub a: String,
