@@ -7,7 +7,6 @@ use axum::response::Html;
 use jiff::Timestamp;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -57,7 +56,7 @@ impl Page {
 #[utoipa::path(get, path = "/researcher/accounts", tag = "accounts", responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 403, description = "No lead is signed in")))]
-async fn people_page(
+pub(super) async fn people_page(
     by: Researcher,
     SignedIn(person): SignedIn,
     State(app): State<AppState>,
@@ -73,14 +72,14 @@ async fn people_page(
 #[utoipa::path(get, path = "/api/researcher/accounts", tag = "accounts", responses(
     (status = 200, body = Vec<AccountLine>),
     (status = 403, description = "No lead is signed in")))]
-async fn list(by: Researcher, State(app): State<AppState>) -> Result<Json<Vec<AccountLine>>, Error> {
+pub(super) async fn list(by: Researcher, State(app): State<AppState>) -> Result<Json<Vec<AccountLine>>, Error> {
     lead(&by)?;
     Ok(Json(app.accounts.lines().await?))
 }
 
 /// An account to be made.
 #[derive(Deserialize, ToSchema)]
-struct NewAccount {
+pub(super) struct NewAccount {
     /// The name that the person will sign in with: lower-case letters, digits, dots and dashes.
     account: String,
     /// The person's name, as it will appear in signatures.
@@ -100,7 +99,7 @@ struct NewAccount {
     (status = 409, description = "An account of this name or display name exists"),
     (status = 422, description = "A name or passphrase is missing or malformed"),
     (status = 429, description = "Too many attempts failed")))]
-async fn make(
+pub(super) async fn make(
     by: Researcher,
     State(app): State<AppState>,
     PeerAddress(peer): PeerAddress,
@@ -137,7 +136,7 @@ enum WantedChange {
 
 /// A change of an account, confirmed by a lead.
 #[derive(Deserialize, ToSchema)]
-struct ChangeAccount {
+pub(super) struct ChangeAccount {
     /// The change.
     #[serde(flatten)]
     change: WantedChange,
@@ -154,7 +153,7 @@ struct ChangeAccount {
     (status = 409, description = "The account is of the last lead who can sign in"),
     (status = 422, description = "A passphrase is missing or malformed"),
     (status = 429, description = "Too many attempts failed")))]
-async fn change(
+pub(super) async fn change(
     by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
@@ -177,9 +176,4 @@ async fn change(
     };
     app.accounts.change(&name, &change, by).await?;
     Ok(Json(app.accounts.lines().await?))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(people_page)).routes(routes!(list, make)).routes(routes!(change))
 }

@@ -5,7 +5,6 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use jiff::Timestamp;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -111,7 +110,7 @@ fn remarked(protocol: &ProtocolAnalysis) -> Vec<&parfocal_results::analysis::Ana
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such study"),
     (status = 409, description = "The study is not unblinded")))]
-async fn analysis_page(
+pub(super) async fn analysis_page(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
@@ -130,7 +129,7 @@ async fn analysis_page(
     (status = 200, body = Analysis),
     (status = 404, description = "No such study"),
     (status = 409, description = "The study is not unblinded")))]
-async fn analysis(
+pub(super) async fn analysis(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
@@ -144,16 +143,11 @@ async fn analysis(
     (status = 200, description = "The file", content_type = "application/zip"),
     (status = 404, description = "No such study"),
     (status = 409, description = "The study is not unblinded")))]
-async fn analysis_zip(
+pub(super) async fn analysis_zip(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
 ) -> Result<Response, Error> {
     let analysis = looked_at(&app, &by, &study).await?;
     Ok(zip_download(Analysis::folder_name(&study), async move |zip| analysis.into_zip(zip).await))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(analysis_page)).routes(routes!(analysis)).routes(routes!(analysis_zip))
 }

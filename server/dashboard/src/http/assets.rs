@@ -18,9 +18,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rust_embed::RustEmbed;
 use sha2::{Digest, Sha256};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
 use super::bundle::bundle;
 use super::error::Error;
 use parfocal_language::Language;
@@ -180,7 +178,7 @@ pub fn body(name: &str) -> Option<&'static [u8]> {
         (status = 404, description = "No such file"),
     )
 )]
-async fn asset(
+pub(super) async fn asset(
     Path((version, folder, name)): Path<(String, String, String)>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
@@ -224,11 +222,6 @@ fn content_type(name: &str) -> &'static str {
         Some("webmanifest") => "application/manifest+json",
         _ => "application/octet-stream",
     }
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(asset))
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use futures_util::stream;
 use serde::Deserialize;
 use tokio::io::AsyncReadExt;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -26,7 +25,7 @@ const BLOCK: usize = 256 * 1024;
 
 /// A request for a backup.
 #[derive(Deserialize, ToSchema)]
-struct MakeBackup {
+pub(super) struct MakeBackup {
     /// The lead's own passphrase, entered again.
     #[schema(min_length = 1)]
     passphrase: String,
@@ -38,7 +37,7 @@ struct MakeBackup {
     (status = 403, description = "No lead is signed in, or the lead's passphrase is wrong"),
     (status = 422, description = "The passphrase is missing"),
     (status = 429, description = "Too many attempts failed")))]
-async fn start_backup(
+pub(super) async fn start_backup(
     by: Researcher,
     State(app): State<AppState>,
     PeerAddress(peer): PeerAddress,
@@ -53,7 +52,7 @@ async fn start_backup(
 #[utoipa::path(get, path = "/api/researcher/backup", tag = "accounts", responses(
     (status = 200, body = BackupState),
     (status = 403, description = "No lead is signed in")))]
-async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Json<BackupState>, Error> {
+pub(super) async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Json<BackupState>, Error> {
     let lead = lead(&by)?;
     let state = app.backups.state(app.store.reader(), &lead.account).await;
     Ok(Json(state?))
@@ -64,7 +63,7 @@ async fn backup_state(by: Researcher, State(app): State<AppState>) -> Result<Jso
     (status = 200, description = "The file", content_type = "application/vnd.sqlite3"),
     (status = 403, description = "No lead is signed in"),
     (status = 404, description = "The lead has no backup that is ready")))]
-async fn backup_file(by: Researcher, State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
+pub(super) async fn backup_file(by: Researcher, State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let lead = lead(&by)?;
     let made = app.backups.made(app.store.reader(), &lead.account).await?;
     let made = made.ok_or_else(|| Error::NotFound("No backup is ready. Make one on the page People.".to_owned()))?;
@@ -91,9 +90,4 @@ async fn content(made: FinishedBackup) -> Result<Body, Error> {
         Ok::<_, std::io::Error>((read > 0).then(|| (Bytes::from(block), (file, kept))))
     });
     Ok(Body::from_stream(blocks))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(backup_state, start_backup)).routes(routes!(backup_file))
 }

@@ -5,7 +5,6 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -17,13 +16,13 @@ use parfocal_records::store::DeviceEvent;
 /// What can be changed now, with the camera's own bounds. Empty for a camera without such settings, or one that is
 /// disconnected.
 #[utoipa::path(get, path = "/api/operator/camera", tag = "operator", responses((status = 200, body = CameraOffer)))]
-async fn offer(_: Operator, State(app): State<AppState>) -> Json<CameraOffer> {
+pub(super) async fn offer(_: Operator, State(app): State<AppState>) -> Json<CameraOffer> {
     Json(app.control.camera.as_ref().map(parfocal_devices::camera::Controls::offered).unwrap_or_default())
 }
 
 /// A setting to change.
 #[derive(Debug, Deserialize, ToSchema)]
-struct Change {
+pub(super) struct Change {
     /// The setting.
     setting: Setting,
     /// The new value: microseconds, the camera's unit of gain, or frames a second.
@@ -38,7 +37,7 @@ struct Change {
     (status = 409, description = "The camera does not offer this setting now"),
     (status = 422, description = "The value is outside the camera's bounds"),
     (status = 507, description = "The camera received the request, but the log could not be written")))]
-async fn change(
+pub(super) async fn change(
     _: Operator,
     State(app): State<AppState>,
     JsonBody(change): JsonBody<Change>,
@@ -63,9 +62,4 @@ async fn record(app: &App, message: String) -> Result<(), Error> {
 
     let event = DeviceEvent { wall, at, device: "camera".into(), working, message };
     Ok(app.store.device_event(&event).await?)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(offer)).routes(routes!(change))
 }

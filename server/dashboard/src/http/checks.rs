@@ -12,7 +12,6 @@ use serde::Serialize;
 use tokio::sync::OwnedMutexGuard;
 use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::equipment::Equipment;
 use super::error::Error;
@@ -24,7 +23,7 @@ use parfocal_records::store::look_at_database;
 
 /// Results of all checks.
 #[derive(Debug, Serialize, ToSchema)]
-struct Checks {
+pub(super) struct Checks {
     /// When the checks were made, by the server's wall clock.
     #[schema(value_type = String)]
     at: Timestamp,
@@ -37,7 +36,7 @@ struct Checks {
 /// Checks the machine and the database again.
 /// Devices are not asked, because the focus loop holds them: the server reports what it already knows.
 #[utoipa::path(get, path = "/api/operator/checks", tag = "operator", responses((status = 200, body = Checks)))]
-async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
+pub(super) async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;
     // A task of its own, because this handler is dropped when its browser gives up or the disk hangs.
     let looking = tokio::spawn(look_at_machine(app.store.folder().to_owned(), Arc::clone(&app.clock), look));
@@ -75,9 +74,4 @@ fn devices(app: &App) -> Vec<Finding> {
     findings.extend(doctor::tablets(&app.tablets.open()));
     findings.extend(doctor::tried(&app.tablet_trials.all(), &now));
     findings
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(checks))
 }

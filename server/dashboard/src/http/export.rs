@@ -11,7 +11,6 @@ use serde::Deserialize;
 use tokio::runtime::Handle;
 use tokio::task::spawn_blocking;
 use utoipa::IntoParams;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -35,7 +34,7 @@ impl From<ExportError> for Error {
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct ExportQuery {
+pub(super) struct ExportQuery {
     /// Whether to include which policy ran in which setting; only after unblinding.
     #[serde(default)]
     unblinded: bool,
@@ -47,7 +46,7 @@ struct ExportQuery {
     (status = 200, description = "The file", content_type = "application/zip"),
     (status = 404, description = "No such session"),
     (status = 409, description = "The session is not unblinded, or its participant withdrew")))]
-async fn zip(
+pub(super) async fn zip(
     by: Researcher,
     State(app): State<AppState>,
     Path(session): Path<SessionId>,
@@ -87,11 +86,6 @@ struct Dictionary {
 /// The data dictionary: every table and column of an export, with its unit.
 #[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
+pub(super) async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
     Dictionary { tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(zip)).routes(routes!(dictionary))
 }

@@ -10,7 +10,6 @@ use axum::http::StatusCode;
 use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::OwnBody;
@@ -18,7 +17,7 @@ use crate::health::{Condition, Problem};
 
 /// The server's health.
 #[derive(Debug, Serialize, ToSchema)]
-struct Health {
+pub(super) struct Health {
     /// The server's condition.
     status: Condition,
     /// The program's version.
@@ -39,7 +38,7 @@ struct Health {
 #[utoipa::path(get, path = "/healthz", tag = "service", responses(
     (status = 200, description = "The server works: `ok`, or `degraded` if a person has to act", body = Health),
     (status = 503, description = "The server cannot do its work: `failing`", body = Health)))]
-async fn healthz(State(app): State<AppState>) -> (StatusCode, Extension<OwnBody>, Json<Health>) {
+pub(super) async fn healthz(State(app): State<AppState>) -> (StatusCode, Extension<OwnBody>, Json<Health>) {
     let status = Arc::clone(&app.control.status.borrow());
     let (condition, problems) = app.health.now();
     let code = if condition == Condition::Failing { StatusCode::SERVICE_UNAVAILABLE } else { StatusCode::OK };
@@ -53,9 +52,4 @@ async fn healthz(State(app): State<AppState>) -> (StatusCode, Extension<OwnBody>
         problems,
     };
     (code, Extension(OwnBody), Json(health))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(healthz))
 }

@@ -12,7 +12,6 @@ use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::ConstCounter;
 use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::registry::{Registry, Unit};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::roles::Roles;
@@ -24,7 +23,7 @@ use parfocal_trial::role::Role;
 #[utoipa::path(get, path = "/metrics", tag = "service", responses(
     (status = 200, description = "Counters", content_type = "application/openmetrics-text"),
     (status = 403, description = "For operator and researcher")))]
-async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoResponse, Error> {
+pub(super) async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoResponse, Error> {
     roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
     let mut text = String::new();
     encode(&mut text, &collect(&app)).map_err(|_| Error::Internal)?;
@@ -102,9 +101,4 @@ fn register_times(registry: &mut Registry, app: &App) {
 
     let writes = app.store.writes().times().clone();
     registry.register_with_unit("database_write", "Time of a write to the database", Unit::Seconds, writes);
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(metrics))
 }

@@ -9,7 +9,6 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt, stream};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::admission::{Ground, over};
@@ -26,7 +25,7 @@ const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held")))]
-async fn mjpeg(State(app): State<AppState>, roles: Roles, SignedIn(person): SignedIn) -> impl IntoResponse {
+pub(super) async fn mjpeg(State(app): State<AppState>, roles: Roles, SignedIn(person): SignedIn) -> impl IntoResponse {
     let ground = roles.ground(roles.own(), person);
     let parts = parts(app, ground).map(Ok::<_, std::convert::Infallible>);
     ([(CONTENT_TYPE, KIND)], Body::from_stream(parts))
@@ -50,9 +49,4 @@ fn parts(app: AppState, ground: Option<Ground>) -> impl Stream<Item = Bytes> {
         .chain(frames)
         .take_until(async move { ended(&mut shutdown).await })
         .take_until(over)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(mjpeg))
 }

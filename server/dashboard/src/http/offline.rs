@@ -8,11 +8,10 @@ use axum::http::HeaderName;
 use axum::http::header::{CONTENT_TYPE, HeaderValue};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::assets;
 use super::error::Error;
 use super::roles::SurgeonsTablet;
-use super::{AppState, assets};
 
 /// Header that tells the worker that an answer is the surgeon's page, and its version. Nothing else may be kept.
 pub(super) const PAGE_VERSION: HeaderName = HeaderName::from_static("parfocal-page-version");
@@ -33,7 +32,7 @@ struct Offline {
 /// The service worker of the surgeon's page, which opens the page if there is no network.
 #[utoipa::path(get, path = "/surgeon/worker.js", tag = "surgeon",
     responses((status = 200, description = "The script", content_type = "text/javascript")))]
-async fn worker(_: SurgeonsTablet) -> Result<Response, Error> {
+pub(super) async fn worker(_: SurgeonsTablet) -> Result<Response, Error> {
     let files = assets::surgeon_urls().collect();
     let offline = Offline { version: assets::version(), files };
     let offline = serde_json::to_string(&offline).map_err(|_| Error::Internal)?;
@@ -47,9 +46,4 @@ async fn worker(_: SurgeonsTablet) -> Result<Response, Error> {
         (ALLOWED, HeaderValue::from_static(PAGE)),
     ];
     Ok((headers, text).into_response())
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(worker))
 }

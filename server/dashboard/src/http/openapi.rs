@@ -10,9 +10,7 @@ use utoipa::OpenApi;
 use utoipa::openapi::path::Operation;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{Components, Content, Ref, RefOr, Response, ResponseBuilder};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
 use super::credentials::cookie_name;
 use super::error::{Error, ErrorBody, role_name};
 use super::keys::ROLES;
@@ -204,12 +202,7 @@ fn shown_by(operation: &Operation) -> Vec<SecurityRequirement> {
 /// This document.
 #[utoipa::path(get, path = "/api/openapi.json", tag = "service",
     responses((status = 200, description = "OpenAPI 3.1")))]
-async fn openapi(_: Roles, Extension(document): Extension<Finished>) -> Result<impl IntoResponse, Error> {
+pub(super) async fn openapi(_: Roles, Extension(document): Extension<Finished>) -> Result<impl IntoResponse, Error> {
     let text = document.get().cloned().ok_or(Error::Internal)?;
     Ok(([(CONTENT_TYPE, JSON)], text))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(openapi))
 }

@@ -9,7 +9,6 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::Html;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -76,7 +75,7 @@ impl Trust {
 #[utoipa::path(get, path = "/operator", tag = "operator", responses(
     (status = 200, description = "The page", content_type = "text/html"),
 ))]
-async fn page(
+pub(super) async fn page(
     by: Operator,
     SignedIn(person): SignedIn,
     roles: Roles,
@@ -106,7 +105,7 @@ async fn page(
 
 /// The surgeon's link, as text and as a QR code.
 #[derive(Debug, Serialize, ToSchema)]
-struct SurgeonLink {
+pub(super) struct SurgeonLink {
     /// The link.
     link: String,
     /// The link as a QR code in SVG.
@@ -118,7 +117,11 @@ struct SurgeonLink {
 /// The surgeon's link. In a session of a study it is valid only for that session, and ends with it.
 #[utoipa::path(get, path = "/api/operator/surgeon-link", tag = "operator", responses(
     (status = 200, body = SurgeonLink)))]
-async fn link(by: Operator, State(app): State<AppState>, headers: HeaderMap) -> Result<Json<SurgeonLink>, Error> {
+pub(super) async fn link(
+    by: Operator,
+    State(app): State<AppState>,
+    headers: HeaderMap,
+) -> Result<Json<SurgeonLink>, Error> {
     let session = app.linked_session();
     if session.is_some() {
         by.personally()?;
@@ -130,7 +133,7 @@ async fn link(by: Operator, State(app): State<AppState>, headers: HeaderMap) -> 
 
 /// What the operator can choose from.
 #[derive(Debug, Serialize, ToSchema)]
-struct Choices {
+pub(super) struct Choices {
     /// Codes of the participants.
     participants: Vec<String>,
     /// The protocols.
@@ -144,7 +147,7 @@ struct Choices {
 
 /// What the operator can choose from.
 #[utoipa::path(get, path = "/api/operator/choices", tag = "operator", responses((status = 200, body = Choices)))]
-async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
+pub(super) async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
     Ok(Json(Choices {
         participants: app.store.reader().participants().await?,
         protocols: app.library.summaries(),
@@ -159,7 +162,7 @@ async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choice
     (status = 204, description = "Done"),
     (status = 404, description = "No such policy"),
     (status = 409, description = "A session is under way, or the policy cannot run")))]
-async fn focus(
+pub(super) async fn focus(
     by: Operator,
     State(app): State<AppState>,
     JsonBody(focus): JsonBody<Focus>,
@@ -179,7 +182,7 @@ async fn focus(
     (status = 404, description = "No such session"),
     (status = 409, description = "The protocol or the state of the session does not allow it"),
     (status = 422, description = "The place lies outside the picture")))]
-async fn patch(
+pub(super) async fn patch(
     by: Operator,
     State(app): State<AppState>,
     JsonBody(new): JsonBody<NewChoice>,
@@ -194,7 +197,7 @@ async fn patch(
 
 /// A participant to add.
 #[derive(Debug, Deserialize, ToSchema)]
-struct NewParticipant {
+pub(super) struct NewParticipant {
     /// 2 to 16 capital letters, digits and dashes; never a name.
     #[schema(pattern = r"^[A-Z0-9\-]{2,16}$")]
     code: String,
@@ -203,7 +206,7 @@ struct NewParticipant {
 /// Adds a participant; one that exists already stays as it is. Answers with all codes.
 #[utoipa::path(post, path = "/api/operator/participants", tag = "operator", request_body = NewParticipant, responses(
     (status = 200, body = Vec<String>), (status = 422, description = "No such code")))]
-async fn add_participant(
+pub(super) async fn add_participant(
     _: Operator,
     State(app): State<AppState>,
     JsonBody(new): JsonBody<NewParticipant>,
@@ -214,7 +217,7 @@ async fn add_participant(
 
 /// A session to prepare.
 #[derive(Debug, Deserialize, ToSchema)]
-struct NewSession {
+pub(super) struct NewSession {
     /// Code of the participant.
     participant: String,
     /// Name of the protocol.
@@ -230,7 +233,7 @@ type View = Json<Option<Arc<OperatorView>>>;
 #[utoipa::path(get, path = "/api/operator/session", tag = "operator", responses(
     (status = 200, body = Option<OperatorView>),
 ))]
-async fn session(_: Operator, State(app): State<AppState>) -> View {
+pub(super) async fn session(_: Operator, State(app): State<AppState>) -> View {
     Json(app.operator_view.borrow().clone())
 }
 
@@ -240,7 +243,11 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
     (status = 404, description = "No such participant, protocol or study"),
     (status = 409, description = "A session is under way, or the study allows no such session"),
     (status = 422, description = "The study has no such site or protocol")))]
-async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
+pub(super) async fn create(
+    by: Operator,
+    State(app): State<AppState>,
+    JsonBody(new): JsonBody<NewSession>,
+) -> Result<View, Error> {
     if new.study.is_some() {
         by.personally()?;
     }
@@ -255,7 +262,11 @@ async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBo
     (status = 404, description = "No such session or segment"),
     (status = 422, description = "No reason was given"),
     (status = 409, description = "The action does not fit the state of the session")))]
-async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
+pub(super) async fn act(
+    by: Operator,
+    State(app): State<AppState>,
+    JsonBody(act): JsonBody<Act>,
+) -> Result<View, Error> {
     let by = by.for_session(&app, act.session).await?;
     app.conductor.act(by, act.session, act.action).await?;
     Ok(Json(app.operator_view.borrow().clone()))
@@ -267,7 +278,7 @@ async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<
     (status = 404, description = "No such session"),
     (status = 422, description = "Something is missing, the day is in the future, or the protocol requires another \
                                   version of the text")))]
-async fn consent(
+pub(super) async fn consent(
     by: Operator,
     State(app): State<AppState>,
     JsonBody(new): JsonBody<NewConsent>,
@@ -279,7 +290,7 @@ async fn consent(
 
 /// A session to take off the screens.
 #[derive(Debug, Deserialize, ToSchema)]
-struct Dismissal {
+pub(super) struct Dismissal {
     /// The session.
     session: SessionId,
 }
@@ -288,7 +299,7 @@ struct Dismissal {
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
     (status = 200, body = Option<OperatorView>),
     (status = 409, description = "The session is under way")))]
-async fn dismiss(
+pub(super) async fn dismiss(
     by: Operator,
     State(app): State<AppState>,
     JsonBody(gone): JsonBody<Dismissal>,
@@ -296,20 +307,4 @@ async fn dismiss(
     by.for_session(&app, gone.session).await?;
     app.conductor.dismiss(Role::Operator, gone.session)?;
     Ok(Json(app.operator_view.borrow().clone()))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(page))
-        .routes(routes!(link))
-        .routes(routes!(choices))
-        .routes(routes!(focus))
-        .routes(routes!(patch))
-        .routes(routes!(add_participant))
-        .routes(routes!(session))
-        .routes(routes!(create))
-        .routes(routes!(consent))
-        .routes(routes!(act))
-        .routes(routes!(dismiss))
 }

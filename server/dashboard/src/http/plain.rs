@@ -10,14 +10,13 @@ use axum::middleware;
 use axum::response::{IntoResponse, Redirect, Response};
 use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
-use utoipa_axum::router::OpenApiRouter;
 
 use super::error::{self, Error};
-use super::{AppState, assets, security, trust};
+use super::{AppState, security, unencrypted_routes};
 
 /// The routes for unencrypted connections. None of them reads a body or waits for anything.
 pub(super) fn router(app: AppState) -> Router {
-    let (router, _) = OpenApiRouter::new().merge(trust::routes()).merge(assets::routes()).split_for_parts();
+    let (router, _) = unencrypted_routes().split_for_parts();
 
     let layers = ServiceBuilder::new()
         .layer(middleware::from_fn(security::headers))

@@ -6,7 +6,6 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -24,7 +23,7 @@ use parfocal_trial::role::Role;
     (status = 200, body = SessionRecordings),
     (status = 404, description = "No such session"),
     (status = 409, description = "The session is not unblinded, or its participant withdrew")))]
-async fn recordings(
+pub(super) async fn recordings(
     by: Researcher,
     State(app): State<AppState>,
     Path(session): Path<SessionId>,
@@ -41,7 +40,7 @@ async fn recordings(
 /// A frame of a session's recording.
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Path)]
-struct FramePath {
+pub(super) struct FramePath {
     session: SessionId,
     /// The recording's name
     recording: String,
@@ -71,7 +70,7 @@ impl From<PictureSize> for Size {
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct PictureQuery {
+pub(super) struct PictureQuery {
     /// The resolution at which mosaics are developed. Pictures of a recording of the view are sent as they were
     /// recorded.
     #[serde(default)]
@@ -88,7 +87,7 @@ struct PictureQuery {
     (status = 404, description = "No such session, recording or frame"),
     (status = 409, description = "The session is not unblinded, or its participant withdrew"),
     (status = 500, description = "The frame is damaged")))]
-async fn frame(
+pub(super) async fn frame(
     by: Researcher,
     State(app): State<AppState>,
     Path(FramePath { session, recording, frame }): Path<FramePath>,
@@ -103,7 +102,7 @@ async fn frame(
 /// A circle in a mosaic.
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct PlaceQuery {
+pub(super) struct PlaceQuery {
     /// Centre: samples of the mosaic from its left edge.
     x: f64,
     /// Centre: samples of the mosaic from its upper edge.
@@ -123,7 +122,7 @@ struct PlaceQuery {
     (status = 409, description = "The session is not unblinded, or its participant withdrew"),
     (status = 422, description = "No such place in the picture"),
     (status = 500, description = "The frame is damaged")))]
-async fn spectrum(
+pub(super) async fn spectrum(
     by: Researcher,
     State(app): State<AppState>,
     Path(FramePath { session, recording, frame }): Path<FramePath>,
@@ -132,9 +131,4 @@ async fn spectrum(
     by.for_session(&app, session).await?;
     let circle = Circle { x, y, radius };
     Ok(Json(app.player.spectrum(Role::Researcher, session, &recording, frame, circle).await?))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(recordings)).routes(routes!(frame)).routes(routes!(spectrum))
 }

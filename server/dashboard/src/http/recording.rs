@@ -4,7 +4,6 @@ use axum::Json;
 use axum::extract::State;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -16,13 +15,13 @@ use parfocal_session::recorder::{RecordingStatus, StartError};
 #[utoipa::path(get, path = "/api/operator/recording", tag = "operator", responses(
     (status = 200, body = RecordingStatus),
 ))]
-async fn status(_: Operator, State(app): State<AppState>) -> Json<RecordingStatus> {
+pub(super) async fn status(_: Operator, State(app): State<AppState>) -> Json<RecordingStatus> {
     Json(app.recordings.status().await)
 }
 
 /// Whether to start or to stop recording.
 #[derive(Debug, Deserialize, ToSchema)]
-struct RecordingOrder {
+pub(super) struct RecordingOrder {
     /// True to start recording mosaics, false to stop.
     record: bool,
 }
@@ -32,7 +31,7 @@ struct RecordingOrder {
     (status = 200, body = RecordingStatus),
     (status = 409, description = "A recording is under way, or the camera has no mosaics"),
     (status = 507, description = "The disk has no room, or cannot be written")))]
-async fn order(
+pub(super) async fn order(
     _: Operator,
     State(app): State<AppState>,
     JsonBody(order): JsonBody<RecordingOrder>,
@@ -52,9 +51,4 @@ impl From<StartError> for Error {
             StartError::NoRoom(_) | StartError::Failed(_) => Self::Storage(error.to_string()),
         }
     }
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(status)).routes(routes!(order))
 }

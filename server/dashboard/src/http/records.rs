@@ -4,7 +4,6 @@ use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -25,7 +24,7 @@ use parfocal_trial::erasure::NewErasure;
     (status = 409, description = "The session is under way, its participant withdrew, its study is locked, what a \
                                   surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile"),
     (status = 422, description = "The correction does not fit the record, or no reason was given")))]
-async fn correct(
+pub(super) async fn correct(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -44,7 +43,7 @@ async fn correct(
     (status = 404, description = "No such session or record"),
     (status = 409, description = "A session is under way, or the record has no words"),
     (status = 422, description = "No reason was given")))]
-async fn erase(
+pub(super) async fn erase(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -57,7 +56,7 @@ async fn erase(
 
 /// An erasure of all words of a session.
 #[derive(Debug, Deserialize, ToSchema)]
-struct EraseAll {
+pub(super) struct EraseAll {
     /// Why; stored with each erasure. It must not repeat the words.
     #[schema(pattern = r"\S")]
     reason: String,
@@ -72,7 +71,7 @@ struct EraseAll {
     (status = 404, description = "No such session"),
     (status = 409, description = "The participant has not withdrawn, a session is under way, or no words are left"),
     (status = 422, description = "No reason was given")))]
-async fn erase_all(
+pub(super) async fn erase_all(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -85,7 +84,7 @@ async fn erase_all(
 
 /// A participant's withdrawal.
 #[derive(Debug, Deserialize, ToSchema)]
-struct Withdraw {
+pub(super) struct Withdraw {
     /// Why the participant withdrew; stored in the audit trail.
     #[schema(pattern = r"\S")]
     reason: String,
@@ -99,7 +98,7 @@ struct Withdraw {
     (status = 404, description = "No such session"),
     (status = 409, description = "The session is under way"),
     (status = 422, description = "No reason was given")))]
-async fn withdraw(
+pub(super) async fn withdraw(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -108,13 +107,4 @@ async fn withdraw(
     let by = by.for_session(&app, id).await?;
     app.conductor.act(by, id, Action::Withdraw { reason }).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(correct))
-        .routes(routes!(erase))
-        .routes(routes!(erase_all))
-        .routes(routes!(withdraw))
 }

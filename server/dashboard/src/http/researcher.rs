@@ -11,7 +11,6 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -80,7 +79,7 @@ impl ListPage {
 /// The list of sessions, with practice sessions listed separately.
 #[utoipa::path(get, path = "/researcher", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn list_page(
+pub(super) async fn list_page(
     _: Researcher,
     SignedIn(person): SignedIn,
     Nonce(nonce): Nonce,
@@ -208,7 +207,7 @@ pub(super) fn day_and_time(at: &Timestamp) -> String {
     params(("session" = SessionId, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such session")))]
-async fn session_page(
+pub(super) async fn session_page(
     by: Researcher,
     SignedIn(person): SignedIn,
     State(app): State<AppState>,
@@ -232,7 +231,7 @@ async fn session_page(
 /// The sessions, newest first, including practice sessions, which are marked.
 #[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher",
     responses((status = 200, body = Vec<SessionLine>)))]
-async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
+pub(super) async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
     Ok(Json(app.store.reader().sessions(true).await?))
 }
 
@@ -240,7 +239,7 @@ async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<Ses
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionDetail), (status = 404, description = "No such session")))]
-async fn session(
+pub(super) async fn session(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -254,7 +253,7 @@ async fn session(
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session"),
     (status = 409, description = "The participant withdrew")))]
-async fn course(
+pub(super) async fn course(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -269,7 +268,7 @@ async fn course(
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session"),
     (status = 409, description = "The participant withdrew")))]
-async fn timeline(
+pub(super) async fn timeline(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -282,7 +281,7 @@ async fn timeline(
 
 /// The latest row of the chain of records.
 #[derive(Debug, Serialize, ToSchema)]
-struct ChainHead {
+pub(super) struct ChainHead {
     /// Its number, from 1.
     number: i64,
     /// Its hash: SHA-256, hexadecimal.
@@ -295,7 +294,7 @@ struct ChainHead {
 #[utoipa::path(get, path = "/api/chain/head", tag = "service", responses(
     (status = 200, body = ChainHead),
     (status = 403, description = "For operator and researcher")))]
-async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {
+pub(super) async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {
     roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
     let head = app.store.reader().head().await?;
     Ok(Json(ChainHead { number: head.number, head: head.to_string(), hash: head.hash }))
@@ -308,7 +307,7 @@ pub(super) async fn chain_words(app: &AppState) -> String {
 
 /// A request to unblind a session.
 #[derive(Debug, Deserialize, ToSchema)]
-struct Unblind {
+pub(super) struct Unblind {
     /// Why; stored in the audit trail.
     #[schema(pattern = r"\S")]
     reason: String,
@@ -332,7 +331,7 @@ struct Unblind {
                                   comments and answers may be outstanding"),
     (status = 422, description = "No reason was given, or no passphrase for a session of a study"),
     (status = 429, description = "Too many attempts failed")))]
-async fn unblind(
+pub(super) async fn unblind(
     by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
@@ -347,17 +346,4 @@ async fn unblind(
         app.conductor.act(by.actor(), id, Action::Unblind { reason, despite_outstanding }).await?;
     }
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(list_page))
-        .routes(routes!(session_page))
-        .routes(routes!(list))
-        .routes(routes!(session))
-        .routes(routes!(course))
-        .routes(routes!(timeline))
-        .routes(routes!(chain_head))
-        .routes(routes!(unblind))
 }

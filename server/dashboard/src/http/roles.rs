@@ -4,22 +4,19 @@
 //! cookie, so one laptop can be operator and researcher at the same time. Somebody who is signed in also has the roles
 //! of the account. Nothing else proves a role: the address of a request may be only that of a proxy.
 
-use std::sync::Arc;
-
 use axum::extract::{FromRequestParts, Query, State};
 use axum::http::header::SET_COOKIE;
 use axum::http::request::Parts;
 use axum::response::{AppendHeaders, IntoResponse, Redirect};
 use serde::Deserialize;
 use utoipa::IntoParams;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::AppState;
 use super::admission::{Ground, admit};
 use super::credentials::{Pass, cookie_name, holds, pass, set_cookie};
 use super::error::{Error, role_name};
 use super::keys::ROLES;
 use super::people::{Acting, Person};
-use super::{App, AppState};
 use parfocal_records::store::Access;
 use parfocal_trial::account::Account;
 use parfocal_trial::role::Role;
@@ -179,7 +176,7 @@ pub const fn home(role: Role) -> &'static str {
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct EnterQuery {
+pub(super) struct EnterQuery {
     /// The role's key.
     key: String,
 }
@@ -188,7 +185,10 @@ struct EnterQuery {
 #[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
     (status = 303, description = "The role's cookie, and a redirect to its page"),
     (status = 403, description = "The key is not of this server, or its session has ended")))]
-async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
+pub(super) async fn enter(
+    State(app): State<AppState>,
+    Query(query): Query<EnterQuery>,
+) -> Result<impl IntoResponse, Error> {
     let key = query.key.trim();
     let (role, token) = match (app.keys.role_of(key), app.keys.session_of(key)) {
         (Some(role), _) => (role, app.keys.token(role)),
@@ -212,11 +212,6 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "Redirect to the role's page"),
     (status = 403, description = "No role is held")))]
-async fn start(roles: Roles) -> Redirect {
+pub(super) async fn start(roles: Roles) -> Redirect {
     Redirect::to(home(roles.own()))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<Arc<App>> {
-    OpenApiRouter::new().routes(routes!(enter)).routes(routes!(start))
 }

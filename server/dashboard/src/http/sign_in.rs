@@ -8,7 +8,6 @@ use axum::http::header::SET_COOKIE;
 use axum::response::{AppendHeaders, Html, IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::credentials::{ACCOUNT_COOKIE, set_cookie};
@@ -23,7 +22,7 @@ use parfocal_trial::role::Role;
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct SignInQuery {
+pub(super) struct SignInQuery {
     /// Path of the page to open after signing in.
     next: Option<String>,
 }
@@ -41,7 +40,7 @@ struct Page {
 /// The page to sign in.
 #[utoipa::path(get, path = "/sign-in", params(SignInQuery), tag = "accounts", responses(
     (status = 200, description = "The page", content_type = "text/html")))]
-async fn page(
+pub(super) async fn page(
     Query(query): Query<SignInQuery>,
     SignedIn(person): SignedIn,
     Nonce(nonce): Nonce,
@@ -59,7 +58,7 @@ fn is_own_path(path: &str) -> bool {
 
 /// A request to sign in.
 #[derive(Deserialize, ToSchema)]
-struct SignIn {
+pub(super) struct SignIn {
     /// The account's name.
     name: String,
     /// The account's passphrase.
@@ -93,7 +92,7 @@ struct SignedInAs {
     (status = 422, description = "The new passphrase is too short, or the same as before"),
     (status = 429, description = "Too many attempts failed"),
     (status = 507, description = "The disk failed")))]
-async fn sign_in(
+pub(super) async fn sign_in(
     State(app): State<AppState>,
     PeerAddress(peer): PeerAddress,
     JsonBody(wanted): JsonBody<SignIn>,
@@ -116,7 +115,10 @@ async fn sign_in(
 #[utoipa::path(post, path = "/api/sign-out", tag = "accounts", responses(
     (status = 204, description = "Signed out"),
     (status = 507, description = "The disk failed")))]
-async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Result<impl IntoResponse, Error> {
+pub(super) async fn sign_out(
+    State(app): State<AppState>,
+    SignedIn(person): SignedIn,
+) -> Result<impl IntoResponse, Error> {
     if let Some(person) = person {
         app.accounts.sign_out(&person.token).await?;
     }
@@ -130,11 +132,6 @@ pub(super) const fn page_role(role: AccountRole) -> Role {
         AccountRole::Operator => Role::Operator,
         AccountRole::Lead | AccountRole::Researcher | AccountRole::Monitor => Role::Researcher,
     }
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(page)).routes(routes!(sign_in)).routes(routes!(sign_out))
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -34,7 +33,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Places of the live picture.
 #[derive(Debug, Deserialize, ToSchema)]
-struct LivePlaces {
+pub(super) struct LivePlaces {
     /// The places.
     #[schema(min_items = 1, max_items = 5)]
     places: Vec<LivePlace>,
@@ -55,7 +54,7 @@ struct LivePlace {
 
 /// The spectra of one frame.
 #[derive(Debug, Serialize, ToSchema)]
-struct LiveSpectra {
+pub(super) struct LiveSpectra {
     /// Number of the frame.
     frame: u64,
     /// The spectrum at each place, in the order in which they were asked for.
@@ -67,7 +66,7 @@ struct LiveSpectra {
     (status = 200, body = LiveSpectra),
     (status = 409, description = "A session is under way, the camera delivers nothing, or its pictures have no bands"),
     (status = 422, description = "No such place in the picture, too many places, or too large a circle")))]
-async fn spectra(
+pub(super) async fn spectra(
     _: Operator,
     State(app): State<AppState>,
     JsonBody(LivePlaces { places }): JsonBody<LivePlaces>,
@@ -141,9 +140,4 @@ fn spectrum(calibration: &Calibration, circle: Circle, mosaic: &MosaicFrame) -> 
     let mut sum = SpectrumSum::new(calibration, circle, (mosaic.width(), mosaic.height()))?;
     sum.add(mosaic);
     Ok(PlaceSpectrum::new(calibration, &sum.spectrum()))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(spectra))
 }

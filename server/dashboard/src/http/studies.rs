@@ -6,7 +6,6 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -51,7 +50,7 @@ impl ListPage {
 /// The list of studies, and a form to plan one.
 #[utoipa::path(get, path = "/researcher/studies", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn studies_page(
+pub(super) async fn studies_page(
     _: Researcher,
     SignedIn(person): SignedIn,
     State(app): State<AppState>,
@@ -163,7 +162,7 @@ pub(super) const fn session_state(session: &Enrolled) -> &'static str {
     params(("study" = String, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such study")))]
-async fn study_page(
+pub(super) async fn study_page(
     by: Researcher,
     SignedIn(person): SignedIn,
     State(app): State<AppState>,
@@ -180,7 +179,7 @@ async fn study_page(
 /// The studies, in the order in which they were planned.
 #[utoipa::path(get, path = "/api/researcher/studies", tag = "researcher",
     responses((status = 200, body = Vec<StudyLine>)))]
-async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<StudyLine>>, Error> {
+pub(super) async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<StudyLine>>, Error> {
     Ok(Json(StudyLine::all(app.conductor.studies()).await?))
 }
 
@@ -188,7 +187,7 @@ async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json
 #[utoipa::path(get, path = "/api/researcher/studies/{study}", tag = "researcher",
     params(("study" = String, Path)), responses(
     (status = 200, body = StudyDetail), (status = 404, description = "No such study")))]
-async fn study(
+pub(super) async fn study(
     by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
@@ -199,7 +198,7 @@ async fn study(
 
 /// A study to plan.
 #[derive(Debug, Deserialize, ToSchema)]
-struct PlanStudy {
+pub(super) struct PlanStudy {
     /// The definition in TOML, as docs/study.md describes it.
     definition: String,
     /// The sites of the study that this database runs; all sites if none are named.
@@ -215,7 +214,7 @@ struct PlanStudy {
     (status = 200, body = StudyDetail),
     (status = 409, description = "A study of this name exists"),
     (status = 422, description = "The definition is malformed, or a reason is missing")))]
-async fn plan_study(
+pub(super) async fn plan_study(
     by: Researcher,
     State(app): State<AppState>,
     JsonBody(plan): JsonBody<PlanStudy>,
@@ -228,7 +227,7 @@ async fn plan_study(
 
 /// A signed change of a study.
 #[derive(Debug, Deserialize, ToSchema)]
-struct ChangeStudy {
+pub(super) struct ChangeStudy {
     /// The change.
     #[serde(flatten)]
     change: Change,
@@ -251,7 +250,7 @@ struct ChangeStudy {
     (status = 404, description = "No such study"),
     (status = 409, description = "The change does not fit the stage of the study"),
     (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy")))]
-async fn change_study(
+pub(super) async fn change_study(
     by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
@@ -265,14 +264,4 @@ async fn change_study(
     let signature = Signature::of_account(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;
     Ok(Json(StudyDetail::read(app.conductor.studies(), &name).await?))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(studies_page))
-        .routes(routes!(study_page))
-        .routes(routes!(list_studies, plan_study))
-        .routes(routes!(study))
-        .routes(routes!(change_study))
 }

@@ -5,7 +5,6 @@ use axum::extract::{Path, State};
 use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -30,7 +29,7 @@ impl From<StudyExportError> for Error {
 
 /// What to export.
 #[derive(Debug, Deserialize, ToSchema)]
-struct ExportStudy {
+pub(super) struct ExportStudy {
     /// Whether to include which policy ran in which setting; only after unblinding.
     #[serde(default)]
     unblinded: bool,
@@ -43,7 +42,7 @@ struct ExportStudy {
     (status = 200, body = StudyExportState),
     (status = 404, description = "No such study"),
     (status = 409, description = "The study has no session to export, or is not unblinded")))]
-async fn start_study_export(
+pub(super) async fn start_study_export(
     by: ResearchReader,
     State(app): State<AppState>,
     Path(study): Path<String>,
@@ -58,7 +57,7 @@ async fn start_study_export(
 /// words are erased.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/export", tag = "researcher",
     params(("study" = String, Path)), responses((status = 200, body = StudyExportState)))]
-async fn study_export(
+pub(super) async fn study_export(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
@@ -73,7 +72,7 @@ async fn study_export(
     params(("study" = String, Path)), responses(
     (status = 200, description = "The file", content_type = "application/zip"),
     (status = 404, description = "No export of the study is finished")))]
-async fn study_export_zip(
+pub(super) async fn study_export_zip(
     by: Researcher,
     State(app): State<AppState>,
     Path(study): Path<String>,
@@ -94,9 +93,4 @@ async fn study_export_zip(
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
     // The closure holds `made`, so its files stay until all of them are sent.
     Ok(zip_download(name, async move |zip| Box::pin(zip.send_folder(made.folder())).await))
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(study_export, start_study_export)).routes(routes!(study_export_zip))
 }

@@ -9,7 +9,6 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{Html, IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::credentials::{link_name, pass};
 use super::error::Error;
@@ -49,7 +48,7 @@ struct OverPage {
 /// The surgeon's page.
 #[utoipa::path(get, path = "/surgeon", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(
+pub(super) async fn page(
     _: SurgeonsTablet,
     surgeon: Result<Surgeon, Error>,
     State(app): State<AppState>,
@@ -81,7 +80,7 @@ type View = Json<Option<Arc<SurgeonView>>>;
 /// The session under way; null if there is none.
 #[utoipa::path(get, path = "/api/surgeon/session", tag = "surgeon",
     responses((status = 200, body = Option<SurgeonView>)))]
-async fn session(_: Surgeon, State(app): State<AppState>) -> View {
+pub(super) async fn session(_: Surgeon, State(app): State<AppState>) -> View {
     Json(app.surgeon_view.borrow().clone())
 }
 
@@ -101,7 +100,7 @@ pub(super) struct Act {
     (status = 403, description = "The action belongs to another role"),
     (status = 404, description = "No such session or segment"),
     (status = 409, description = "The action does not fit the state of the session")))]
-async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
+pub(super) async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Surgeon, act.session, act.action).await?;
     Ok(Json(app.surgeon_view.borrow().clone()))
 }
@@ -113,7 +112,7 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
     (status = 404, description = "No such session"),
     (status = 409, description = "The protocol or the state of the session does not allow it"),
     (status = 422, description = "The place lies outside the picture")))]
-async fn patch(
+pub(super) async fn patch(
     _: Surgeon,
     State(app): State<AppState>,
     JsonBody(new): JsonBody<NewChoice>,
@@ -129,7 +128,7 @@ async fn patch(
     (status = 409, description = "The key belongs to another comment"),
     (status = 422, description = "Empty or too long"),
     (status = 507, description = "The disk failed; send it again")))]
-async fn comment(
+pub(super) async fn comment(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(comment): JsonBody<NewComment>,
@@ -146,7 +145,7 @@ async fn comment(
     (status = 409, description = "The question is not asked yet, or the key belongs to another answer"),
     (status = 422, description = "The value does not fit the question"),
     (status = 507, description = "The disk failed; send it again")))]
-async fn answer(
+pub(super) async fn answer(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(answer): JsonBody<NewAnswer>,
@@ -160,23 +159,11 @@ async fn answer(
     (status = 204, description = "Noted"),
     (status = 404, description = "No such session"),
     (status = 507, description = "The disk failed; send it again")))]
-async fn holding(
+pub(super) async fn holding(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(holding): JsonBody<Holding>,
 ) -> Result<StatusCode, Error> {
     app.conductor.holding(holding).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(page))
-        .routes(routes!(session))
-        .routes(routes!(act))
-        .routes(routes!(patch))
-        .routes(routes!(comment))
-        .routes(routes!(answer))
-        .routes(routes!(holding))
 }

@@ -8,7 +8,6 @@ use axum::http::header::USER_AGENT;
 use axum::response::{Html, IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::Error;
 use super::json::JsonBody;
@@ -29,7 +28,7 @@ struct Page {
 /// The page that tries a tablet.
 #[utoipa::path(get, path = "/tablet", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn tablet_page(
+pub(super) async fn tablet_page(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
@@ -44,7 +43,7 @@ async fn tablet_page(
 
 /// What a tablet found out about itself.
 #[derive(Debug, Deserialize, ToSchema)]
-struct TabletTrial {
+pub(super) struct TabletTrial {
     /// The tablet.
     device: DeviceId,
     /// What was tried.
@@ -64,7 +63,7 @@ struct TriedPart {
 #[utoipa::path(post, path = "/api/surgeon/tablet-trials", tag = "surgeon", request_body = TabletTrial, responses(
     (status = 200, description = "Noted", body = bool),
     (status = 422, description = "The body is malformed")))]
-async fn tried(
+pub(super) async fn tried(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     headers: HeaderMap,
@@ -74,9 +73,4 @@ async fn tried(
     let failing = trial.tried.iter().filter(|tried| !tried.works).map(|tried| tried.part).collect();
     app.tablet_trials.note(trial.device, TriedTablet { user_agent, at: app.clock.wall(), failing });
     Json(true)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(tablet_page)).routes(routes!(tried))
 }

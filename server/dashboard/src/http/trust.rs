@@ -6,7 +6,6 @@ use axum::extract::State;
 use axum::http::header::{ACCESS_CONTROL_ALLOW_ORIGIN, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{Html, IntoResponse};
-use utoipa_axum::{router::OpenApiRouter, routes};
 use uuid::Uuid;
 
 use super::error::Error;
@@ -54,7 +53,11 @@ fn authority(app: &App) -> Result<&PublicAuthority, Error> {
 #[utoipa::path(get, path = "/trust", tag = "trust", responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "The server has no local authority")))]
-async fn page(State(app): State<AppState>, Nonce(nonce): Nonce, headers: HeaderMap) -> Result<Html<String>, Error> {
+pub(super) async fn page(
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+    headers: HeaderMap,
+) -> Result<Html<String>, Error> {
     let authority = authority(&app)?;
     let host = asked_host(&headers).map_or_else(|| app.address.host(), str::to_owned);
     let page = Page {
@@ -70,7 +73,7 @@ async fn page(State(app): State<AppState>, Nonce(nonce): Nonce, headers: HeaderM
 #[utoipa::path(get, path = "/trust/authority.crt", tag = "trust", responses(
     (status = 200, description = "The certificate", content_type = "application/x-x509-ca-cert"),
     (status = 404, description = "The server has no local authority")))]
-async fn certificate(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
+pub(super) async fn certificate(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let authority = authority(&app)?;
     let headers = [
         (CONTENT_TYPE, "application/x-x509-ca-cert"),
@@ -83,7 +86,7 @@ async fn certificate(State(app): State<AppState>) -> Result<impl IntoResponse, E
 #[utoipa::path(get, path = "/trust/authority.mobileconfig", tag = "trust", responses(
     (status = 200, description = "The profile", content_type = "application/x-apple-aspen-config"),
     (status = 404, description = "The server has no local authority")))]
-async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
+pub(super) async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error> {
     let authority = authority(&app)?;
     let [own_id, content_id] = [0, 16].map(|from| identifier(&authority.digest[from..from + 16]));
     let body = Profile { name: &authority.name, certificate: base64_of(&authority.pem), own_id, content_id };
@@ -98,7 +101,7 @@ async fn profile(State(app): State<AppState>) -> Result<impl IntoResponse, Error
 /// Requested over TLS by the trust page, which was loaded unencrypted: a device that gets the answer trusts the server.
 #[utoipa::path(get, path = "/trust/check", tag = "trust", responses(
     (status = 204, description = "The connection works; the answer is empty")))]
-async fn check() -> impl IntoResponse {
+pub(super) async fn check() -> impl IntoResponse {
     // While the page is not encrypted, it has another origin.
     (StatusCode::NO_CONTENT, [(ACCESS_CONTROL_ALLOW_ORIGIN, "*")])
 }
@@ -112,13 +115,4 @@ fn identifier(digest: &[u8]) -> Uuid {
 /// The lines of `pem` between its first and last: DER in base 64.
 fn base64_of(pem: &str) -> String {
     pem.lines().filter(|line| !line.starts_with("-----")).collect()
-}
-
-/// The routes of this file.
-pub(super) fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(page))
-        .routes(routes!(certificate))
-        .routes(routes!(profile))
-        .routes(routes!(check))
 }

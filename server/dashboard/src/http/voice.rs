@@ -8,7 +8,6 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
 use serde::Deserialize;
 use utoipa::IntoParams;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::Error;
@@ -21,7 +20,7 @@ use parfocal_trial::voice::{Ending, NewPiece};
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct PieceQuery {
+pub(super) struct PieceQuery {
     /// Session in which the comment was spoken.
     session: SessionId,
     /// Length of the recording up to the end of this piece, milliseconds.
@@ -49,7 +48,7 @@ struct PieceQuery {
     (status = 409, description = "The recording has another piece in this place"),
     (status = 422, description = "The sound is of an unknown kind, or too large"),
     (status = 507, description = "The disk failed; send it again")))]
-async fn keep_piece(
+pub(super) async fn keep_piece(
     _: SurgeonsTablet,
     State(app): State<AppState>,
     Path((comment, piece)): Path<(IdempotencyKey, u32)>,
@@ -74,7 +73,7 @@ async fn keep_piece(
     (status = 404, description = "No such session or recording, or the recording was erased"),
     (status = 409, description = "The participant withdrew"),
     (status = 416, description = "The recording has no such part")))]
-async fn recording(
+pub(super) async fn recording(
     by: Researcher,
     State(app): State<AppState>,
     Path((session, comment)): Path<(SessionId, IdempotencyKey)>,
@@ -85,9 +84,4 @@ async fn recording(
     let mut response = ranges::answer(&headers, with_duration(media_type, audio));
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(media_type.name()));
     Ok(response)
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(keep_piece)).routes(routes!(recording))
 }

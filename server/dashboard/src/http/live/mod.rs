@@ -34,7 +34,6 @@ use serde::Deserialize;
 use tokio::sync::watch;
 use tokio::time::timeout;
 use utoipa::IntoParams;
-use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::admission::{Ground, Over, admit, over};
@@ -70,7 +69,7 @@ const LARGEST_REQUEST: usize = 1024;
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
-struct LiveQuery {
+pub(super) struct LiveQuery {
     /// The role to be served as, of those that the browser holds; by default, the one that may see least.
     role: Option<Role>,
 }
@@ -81,7 +80,7 @@ struct LiveQuery {
     (status = 400, description = "The request is not for a WebSocket"),
     (status = 403, description = "The role is not held"),
     (status = 426, description = "The connection cannot become a WebSocket")))]
-async fn live(
+pub(super) async fn live(
     State(app): State<AppState>,
     roles: Roles,
     SignedIn(person): SignedIn,
@@ -305,9 +304,4 @@ impl<A: Audience> PageConnection<A> {
         }
         Ok(Some(ping))
     }
-}
-
-/// The routes of this file.
-pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(live))
 }
