@@ -11,6 +11,7 @@ use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::{Hold, StepRecord};
 use parfocal_dashboard::health::device_log;
+use parfocal_pipeline::control::ControlStatus;
 use parfocal_records::store::{DeviceEvent, MIGRATOR, Reader, Store, StoreError, telemetry, verify_database};
 use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::Action;
@@ -302,4 +303,34 @@ async fn a_devices_state_that_a_failing_disk_refused_is_recorded_later_with_its_
     let events = sqlx::query_as("SELECT device, wall FROM device_events ORDER BY number");
     let events: Vec<(String, String)> = events.fetch_all(&pool).await.unwrap();
     assert_eq!(events, [("camera".to_owned(), found_at.clone()), ("lens".to_owned(), found_at)]);
+}
+
+#[tokio::test]
+async fn a_camera_that_comes_back_while_the_disk_hangs_is_recorded_as_having_been_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let pool = raw(folder.path()).await;
+    let mut hanging = pool.acquire().await.unwrap();
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut *hanging).await.unwrap();
+
+    let camera = |working| {
+        let mut status = ControlStatus::clone(&trial.control.status.borrow());
+        status.camera.working = working;
+        Arc::new(status)
+    };
+    let (status, told) = watch::channel(camera(true));
+    let recording = tokio::spawn(device_log::record(trial.store.clone(), trial.clock.clone(), told));
+    for working in [true, false, true, true] {
+        status.send_replace(camera(working));
+        // The log is on the same thread: it has seen this before the next.
+        tokio::task::yield_now().await;
+        trial.clock.advance(Duration::from_secs(5));
+    }
+    sqlx::query("COMMIT").execute(&mut *hanging).await.unwrap();
+    drop(status);
+    recording.await.unwrap();
+
+    let worked = sqlx::query_scalar("SELECT working FROM device_events WHERE device = 'camera' ORDER BY number");
+    let worked: Vec<bool> = worked.fetch_all(&pool).await.unwrap();
+    assert_eq!(worked, [true, false, true]);
 }

@@ -1,10 +1,10 @@
 //! Records when camera and lens start or stop working, and when a warning about the lens comes or goes.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::watch;
+use tokio::sync::{mpsc, watch};
+use tokio::time::sleep;
 
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_pipeline::control::ControlStatus;
@@ -20,7 +20,7 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Whether a device works, and whether there is a warning about it.
 type Condition = (bool, bool);
 
-/// What was last recorded about a device.
+/// What was last noticed of a device.
 #[derive(Default)]
 struct LastCondition {
     last: Option<Condition>,
@@ -45,39 +45,21 @@ impl LastCondition {
     }
 }
 
-/// Events that are not recorded yet.
-#[derive(Default)]
-struct Events {
-    waiting: VecDeque<DeviceEvent>,
-    /// When the disk last refused one, unless it has taken one since.
-    refused_at: Option<Moment>,
-}
-
-impl Events {
-    /// Records them in order, as far as the disk takes them.
-    async fn write(&mut self, store: &Store, now: Moment) {
-        if self.refused_at.is_some_and(|at| now.since(at) < RETRY) {
-            return;
-        }
-
-        while let Some(event) = self.waiting.front() {
-            if let Err(error) = store.device_event(event).await {
-                if self.refused_at.replace(now).is_none() {
-                    tracing::error!(%error, "cannot record the state of a device; it is tried again");
-                }
-                return;
-            }
-            self.waiting.pop_front();
-            self.refused_at = None;
-        }
-    }
-}
-
 /// Records the condition in which the devices were found, and then every change until the control loop ends. A change
 /// that the disk refuses is kept, and recorded as soon as the disk takes it.
-pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Receiver<Arc<ControlStatus>>) {
-    let mut recorded = [LastCondition::default(), LastCondition::default()];
-    let mut events = Events::default();
+pub async fn record(store: Store, clock: Arc<dyn Clock>, status: watch::Receiver<Arc<ControlStatus>>) {
+    let (events, waiting) = mpsc::unbounded_channel();
+    // Two loops, because a disk may hang for a while, and what happens meanwhile must be noticed.
+    tokio::join!(notice(clock, status, events), write(&store, waiting));
+}
+
+/// Makes an event of each change, until the control loop ends.
+async fn notice(
+    clock: Arc<dyn Clock>,
+    mut status: watch::Receiver<Arc<ControlStatus>>,
+    events: mpsc::UnboundedSender<DeviceEvent>,
+) {
+    let mut noticed = [LastCondition::default(), LastCondition::default()];
     loop {
         let now = Arc::clone(&status.borrow_and_update());
         let devices = [
@@ -85,23 +67,42 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
             ("lens", (now.lens.working, now.lens.caution), &now.lens.message),
         ];
 
-        for (recorded, (device, condition, message)) in recorded.iter_mut().zip(devices) {
+        for (noticed, (device, condition, message)) in noticed.iter_mut().zip(devices) {
             let wall = clock.wall();
             let at = clock.now();
-            if !recorded.is_news(condition, at) {
+            if !noticed.is_news(condition, at) {
                 continue;
             }
 
             tracing::info!("{device}: {message}");
             let (working, _) = condition;
             let message = message.to_string();
-            events.waiting.push_back(DeviceEvent { wall, at, device: device.to_owned(), working, message });
+            // The receiver lives as long as this loop.
+            let _ = events.send(DeviceEvent { wall, at, device: device.to_owned(), working, message });
         }
-        events.write(&store, clock.now()).await;
 
         if status.changed().await.is_err() {
             return;
         }
+    }
+}
+
+/// Records events in order, until there will be no more. While the disk refuses one, tries it again; the last time when
+/// the control loop has ended.
+async fn write(store: &Store, mut waiting: mpsc::UnboundedReceiver<DeviceEvent>) {
+    let mut is_refused = false;
+    while let Some(event) = waiting.recv().await {
+        while let Err(error) = store.device_event(&event).await {
+            if !is_refused {
+                tracing::error!(%error, "cannot record the state of a device; it is tried again");
+            }
+            if waiting.is_closed() {
+                return;
+            }
+            is_refused = true;
+            sleep(RETRY).await;
+        }
+        is_refused = false;
     }
 }
 
