@@ -9,17 +9,6 @@ ARGS ?=
 # the command, because .ci/setup may install the libraries just before.
 FEATURES := $$(.ci/features)
 
-# What a release consists of, in target/: a Debian package, the Python package (wheel and source archive), an SBOM, checksums.
-# The program tells what it is made of: `cargo audit bin target/release/parfocal`.
-package:
-	@.ci/setup package
-	@cargo auditable build --release --locked $(FEATURES)
-	@FEATURES="$(FEATURES)" deploy/release
-
-# A container image of that package, as root: deploy/container/README.md.
-container: package
-	@deploy/container/build
-
 .PHONY: run test package container check lint web web-types compiled unit cameras interface python python-interface readme packaged bench screenshots fuzz endurance
 
 run:
@@ -30,6 +19,17 @@ run:
 test:
 	@.ci/setup test
 	@$(MAKE) --no-print-directory check
+
+# What a release consists of, in target/: a Debian package, the Python package (wheel and source archive), an SBOM, checksums.
+# The program tells what it is made of: `cargo audit bin target/release/parfocal`.
+package:
+	@.ci/setup package
+	@cargo auditable build --release --locked $(FEATURES)
+	@FEATURES="$(FEATURES)" deploy/release
+
+# A container image of that package, as root: deploy/container/README.md.
+container: package
+	@deploy/container/build
 
 # The checks alone, on a machine that is already set up. Two run at a time where one waits now and then: for a program,
 # a browser or a disk.
