@@ -1,13 +1,12 @@
 //! After the trial: what the researcher sees, what is in the database, and what is exported.
 
-use std::process::Command;
-
 use serde_json::json;
 use sqlx::Row;
 
 use super::screenshots::shoot;
 use super::theatre::Theatre;
 use super::wait::until;
+use crate::support::parfocal;
 
 /// The researcher reads the session and unblinds it. Returns its id.
 pub async fn researcher(theatre: &Theatre) -> String {
@@ -70,7 +69,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
 
 /// Reads the database with another program than the server.
 pub async fn database(theatre: &Theatre, session: &str) {
-    let pool = super::theatre::database(theatre.server.data.path()).await;
+    let pool = theatre.server.database().await;
     let rows = sqlx::query(
         "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment)
          WHERE comments.session = ? ORDER BY comments.number",
@@ -141,18 +140,11 @@ pub async fn database(theatre: &Theatre, session: &str) {
 pub fn export(theatre: &Theatre, session: &str) {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("export");
-    let parfocal = || Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    let exported = parfocal()
-        .args(["export", session, "--unblinded", "--out"])
-        .arg(&folder)
-        .arg("--data-dir")
-        .arg(theatre.server.data.path())
-        .output()
-        .unwrap();
-
-    assert!(exported.status.success(), "{}", String::from_utf8_lossy(&exported.stderr));
-    let verified = parfocal().arg("verify").arg(&folder).output().unwrap();
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let export = ["export", session, "--unblinded", "--out", folder.to_str().unwrap(), "--data-dir"];
+    let (exported, said) = parfocal(&export, theatre.server.data.path());
+    assert!(exported, "{said}");
+    let (verified, said) = parfocal(&["verify"], &folder);
+    assert!(verified, "{said}");
     let comments = std::fs::read_to_string(folder.join("comments.csv")).unwrap();
     assert!(comments.contains("Follows me well 🧠") && comments.contains("Said while it was away"), "{comments}");
 }

@@ -7,26 +7,22 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 
 use parfocal_base::clock::SystemClock;
 use parfocal_devices::lens::emulator::{Emulator, Model};
-use reqwest::Method;
-use serde_json::{Value, json};
+use serde_json::json;
 use sha2::{Digest, Sha256};
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions, Connection, SqliteConnection};
+use sqlx::{Connection, SqliteConnection};
 use tempfile::TempDir;
 
 use super::blinding;
 use super::driver::Driver;
 use super::proxy::Proxy;
-use super::theatre::{Theatre, database, kill};
+use super::theatre::{Theatre, kill};
 use super::wait::until;
-use crate::http::studies::{ask, post};
 use crate::support::disk::SmallDisk;
-use crate::support::{PASSPHRASE, Server};
+use crate::support::{PASSPHRASE, Server, parfocal};
 
 /// Comments per setting: two, each interrupted by a kill, so that the day reaches the next setting.
 const COMMENTS_A_SETTING: usize = 2;
@@ -134,10 +130,9 @@ impl Day {
         let token = server.sign_in("lead").await;
         show(&mut server, &token);
         let definition = definition();
-        post(&server, "researcher", "/api/researcher/studies", json!({"definition": definition, "reason": "approved"}))
-            .await;
+        server.post("/api/researcher/studies", json!({"definition": definition, "reason": "approved"})).await;
         let opening = json!({"change": "open", "reason": "the first surgeon comes"});
-        post(&server, "researcher", "/api/researcher/studies/bad-day/changes", opening).await;
+        server.post("/api/researcher/studies/bad-day/changes", opening).await;
 
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
@@ -170,7 +165,7 @@ impl Day {
             self.theatre.finish_setting(4).await;
             if *begun == 2 {
                 self.theatre.surgeon.sees("#panel", "Thank you").await;
-                post(&self.theatre.server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+                self.theatre.server.post("/api/operator/dismissals", json!({"session": session})).await;
                 under_way = None;
             }
         }
@@ -187,18 +182,17 @@ impl Day {
     async fn prepare(&mut self) -> String {
         let server = &self.theatre.server;
         let participant = format!("S-{:02}", self.said.len() + 1);
-        post(server, "operator", "/api/operator/participants", json!({"code": participant})).await;
+        server.post("/api/operator/participants", json!({"code": participant})).await;
         let study = json!({"study": "bad-day", "site": "leeds"});
         let new = json!({"participant": participant, "protocol": "bad-day", "study": study});
-        let made = post(server, "operator", "/api/operator/sessions", new).await;
+        let made = server.post("/api/operator/sessions", new).await;
         let session = made["session"].as_str().unwrap().to_owned();
 
-        let (_, said) = ask(server, "operator", Method::GET, "/api/operator/surgeon-link", &Value::Null).await;
-        let link: Value = serde_json::from_str(&said).unwrap();
+        let link = server.read("/api/operator/surgeon-link").await;
         let (_, key) = link["link"].as_str().unwrap().split_once("key=").unwrap();
         self.theatre.surgeon.open(&format!("http://{}/enter?key={key}", self.theatre.proxy.address)).await;
         self.theatre.surgeon.sees("#panel", "You will look at 2 settings").await;
-        post(server, "operator", "/api/operator/actions", json!({"session": session, "action": "start"})).await;
+        server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
         self.said.insert(session.clone(), Vec::new());
         session
     }
@@ -228,7 +222,7 @@ impl Day {
 
         // The session is paused where it was.
         let resume = json!({"session": session, "action": "resume"});
-        post(&self.theatre.server, "operator", "/api/operator/actions", resume).await;
+        self.theatre.server.post("/api/operator/actions", resume).await;
         self.theatre.sees_saved(total).await;
         self.theatre.surgeon.sees("#remaining", "left").await;
     }
@@ -242,17 +236,13 @@ impl Day {
                     disk.fill();
                 }
             }
-            Trouble::LockedDatabase => {
-                let file = SqliteConnectOptions::new().filename(self.folder().join("parfocal.db"));
-                let mut other_program = file.connect().await.unwrap();
-                sqlx::query("BEGIN IMMEDIATE").execute(&mut other_program).await.unwrap();
-                return Some(other_program);
-            }
+            Trouble::LockedDatabase => return Some(self.theatre.server.lock_database().await),
             Trouble::Network => self.theatre.proxy.break_silently(),
             Trouble::Lens => self.lens.unplug(),
             Trouble::Camera => self.camera.stall(),
             Trouble::Backup => {
-                let said = succeeds(&["backup", "--out", self.backup(number).to_str().unwrap()], self.folder());
+                let said =
+                    succeeds(&["backup", "--out", self.backup(number).to_str().unwrap(), "--data-dir"], self.folder());
                 assert!(said.contains("verified"), "{said}");
             }
             Trouble::Both => {
@@ -282,7 +272,7 @@ impl Day {
 
     /// The seed from which all orders are drawn.
     async fn drawn(&self) -> String {
-        let pool = database(self.folder()).await;
+        let pool = self.theatre.server.database().await;
         let seed = sqlx::query_scalar("SELECT seed FROM study_seeds").fetch_one(&pool).await.unwrap();
         pool.close().await;
         seed
@@ -292,10 +282,10 @@ impl Day {
     async fn end(mut self) {
         let (session, _) = self.session.take().unwrap();
         let abort = json!({"session": session, "action": "abort", "reason": "the day is over"});
-        post(&self.theatre.server, "operator", "/api/operator/actions", abort).await;
-        post(&self.theatre.server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+        self.theatre.server.post("/api/operator/actions", abort).await;
+        self.theatre.server.post("/api/operator/dismissals", json!({"session": session})).await;
 
-        let pool = database(self.folder()).await;
+        let pool = self.theatre.server.database().await;
         for (session, said) in &self.said {
             let kept: Vec<String> = sqlx::query_scalar("SELECT text FROM comments WHERE session = ? ORDER BY number")
                 .bind(session)
@@ -317,7 +307,7 @@ impl Day {
         // The chain is complete, and each session had the order that was drawn for its place.
         for change in ["close", "lock", "unblind"] {
             let signed = json!({"change": change, "reason": "it is over", "passphrase": PASSPHRASE, "despite_outstanding": true});
-            post(&self.theatre.server, "researcher", "/api/researcher/studies/bad-day/changes", signed).await;
+            self.theatre.server.post("/api/researcher/studies/bad-day/changes", signed).await;
         }
         let said = succeeds(&["verify"], self.folder());
         assert!(said.contains("order"), "the orders were looked at: {said}");
@@ -326,22 +316,16 @@ impl Day {
         let restored = tempfile::tempdir().unwrap();
         if let Some(backup) = std::fs::read_dir(self.elsewhere.path()).unwrap().next() {
             let backup = backup.unwrap().path();
-            succeeds(&["restore", backup.to_str().unwrap()], restored.path());
+            succeeds(&["restore", backup.to_str().unwrap(), "--data-dir"], restored.path());
             succeeds(&["verify"], restored.path());
         }
     }
 }
 
-/// Runs `parfocal` with `arguments` on data folder `folder`, and returns its output.
+/// Runs `parfocal` with `arguments` and `folder`, and returns its output.
 fn succeeds(arguments: &[&str], folder: &Path) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    command.args(arguments);
-    if arguments[0] != "verify" {
-        command.arg("--data-dir");
-    }
-    let output = command.arg(folder).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {said}");
+    let (succeeded, said) = parfocal(arguments, folder);
+    assert!(succeeded, "{arguments:?}: {said}");
     said
 }
 

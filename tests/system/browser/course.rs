@@ -8,7 +8,6 @@ use super::blinding;
 use super::driver::Driver;
 use super::screenshots::shoot;
 use super::theatre::Theatre;
-use crate::support::client;
 
 /// A reason that a researcher might write. It names a policy, so only the researcher may see it.
 const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
@@ -99,19 +98,12 @@ async fn beside_another_operator(theatre: &Theatre) {
     operator.click_labelled("#session-actions", "Abort").await;
     operator.sees("#reason-heading", "Abort the session").await;
 
-    let other = async |path: &str, body: Value| {
-        let request = client().post(theatre.server.url(path)).bearer_auth(theatre.server.key("operator"));
-        request.json(&body).send().await.unwrap().error_for_status().unwrap().text().await.unwrap()
-    };
-
-    other("/api/operator/participants", json!({ "code": "S-08" })).await;
-
-    let view = client().get(theatre.server.url("/api/operator/session")).bearer_auth(theatre.server.key("operator"));
-    let session = view.send().await.unwrap().json::<Value>().await.unwrap()["session"].clone();
-
+    let server = &theatre.server;
+    server.post("/api/operator/participants", json!({ "code": "S-08" })).await;
+    let session = server.read("/api/operator/session").await["session"].clone();
     let abort = json!({ "session": session, "action": "abort", "reason": "By the other" });
-    other("/api/operator/actions", abort).await;
-    other("/api/operator/dismissals", json!({ "session": session })).await;
+    server.post("/api/operator/actions", abort).await;
+    server.post("/api/operator/dismissals", json!({ "session": session })).await;
 
     // This operator gives the reason to abort only now.
     operator.sees("#new-session", "Prepare session").await;
@@ -221,7 +213,7 @@ async fn practice_stays_apart(theatre: &Theatre, researcher: &str) {
 }
 
 async fn database(theatre: &Theatre) {
-    let pool = super::theatre::database(theatre.server.data.path()).await;
+    let pool = theatre.server.database().await;
     let sql = "SELECT protocol, practice, (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments
                FROM sessions AS s ORDER BY rowid";
     let sessions = sqlx::query(sql).fetch_all(&pool).await.unwrap();

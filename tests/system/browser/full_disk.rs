@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions, Connection};
+use sqlx::Connection;
 
 use super::driver::Driver;
 use super::screenshots::shoot;
@@ -44,7 +43,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     disk.empty();
     theatre.sees_saved(said.len()).await;
 
-    let pool = super::theatre::database(disk.folder.path()).await;
+    let pool = theatre.server.database().await;
     let kept: Vec<String> =
         sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
     assert_eq!(kept, said, "each once, in the order said");
@@ -59,9 +58,7 @@ async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
     let operator = &theatre.operator;
     theatre.begin("S-07", "short").await;
     theatre.tap_notice(1).await;
-    let file = SqliteConnectOptions::new().filename(theatre.server.data.path().join("parfocal.db"));
-    let mut other_program = file.connect().await.unwrap();
-    sqlx::query("BEGIN IMMEDIATE").execute(&mut other_program).await.unwrap();
+    let other_program = theatre.server.lock_database().await;
 
     operator.sees("#session-actions", "Pause").await;
     operator.click_labelled("#session-actions", "Pause").await;
@@ -86,7 +83,7 @@ async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
     operator.click("#reason-wanted [type=submit]").await;
     operator.sees_no("#reason-wanted").await;
     operator.sees("#log", ": The phone").await;
-    let pool = super::theatre::database(theatre.server.data.path()).await;
+    let pool = theatre.server.database().await;
     let paused = "SELECT given.payload ->> 'reason' FROM events AS paused LEFT JOIN events AS given
         ON given.session = paused.session AND given.payload ->> 'about' = paused.number WHERE paused.kind = 'paused'";
     let reasons: Vec<String> = sqlx::query_scalar(paused).fetch_all(&pool).await.unwrap();

@@ -1,12 +1,11 @@
 //! A server that is killed, as by a power cut, right after it acknowledged a comment, at every point of a session. It
 //! continues at the same place, and loses nothing that it acknowledged.
 
-use reqwest::StatusCode;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
 use super::theatre;
-use crate::support::{Server, client};
+use crate::support::Server;
 
 /// A session driven by plain requests as surgeon and operator.
 struct Trial {
@@ -45,12 +44,9 @@ async fn a_killed_server_loses_nothing_that_it_acknowledged() {
 impl Trial {
     async fn begin() -> Self {
         let server = theatre::server();
-        let mut trial = Self { server, session: String::new(), acknowledged: Vec::new() };
-        trial.post("operator", "participants", json!({ "code": "S-02" })).await;
-        let made = trial.post("operator", "sessions", json!({ "participant": "S-02", "protocol": "short" })).await;
-        trial.session = made["session"].as_str().unwrap().to_owned();
-        trial.post("operator", "actions", json!({ "session": trial.session, "action": "start" })).await;
-        trial
+        let session = server.prepare("S-02", "short").await;
+        server.post("/api/operator/actions", json!({ "session": session, "action": "start" })).await;
+        Self { server, session, acknowledged: Vec::new() }
     }
 
     /// Sends a comment, waits for the acknowledgement, and cuts the power. Then checks that the session is where it
@@ -64,12 +60,12 @@ impl Trial {
             "session": self.session, "segment": before["segment"], "kind": "text", "text": text,
         });
 
-        self.post("surgeon", "comments", comment.clone()).await;
+        self.server.post("/api/surgeon/comments", comment.clone()).await;
         self.acknowledged.push(text);
         theatre::kill(&mut self.server);
         theatre::start_again(&mut self.server);
         // A tablet that never got the answer sends the comment again.
-        self.post("surgeon", "comments", comment).await;
+        self.server.post("/api/surgeon/comments", comment).await;
         let after = self.view().await;
         assert_eq!((&after["phase"], &after["segment"]), (&before["phase"], &before["segment"]));
         assert_eq!((&after["paused"], &after["may_resume"]), (&json!(true), &json!(true)));
@@ -77,15 +73,14 @@ impl Trial {
     }
 
     async fn view(&self) -> Value {
-        let request = client().get(self.server.url("/api/surgeon/session")).bearer_auth(self.server.key("surgeon"));
-        request.send().await.unwrap().json().await.unwrap()
+        self.server.read("/api/surgeon/session").await
     }
 
     /// The surgeon acts on the session under way.
     async fn act(&self, mut action: Value) {
         action["session"] = json!(self.session);
         action["segment"] = self.view().await["segment"].clone();
-        self.post("surgeon", "actions", action).await;
+        self.server.post("/api/surgeon/actions", action).await;
     }
 
     async fn answer(&self, question: &str, value: Value) {
@@ -93,21 +88,12 @@ impl Trial {
         let key = Uuid::parse_str(segment.as_str().unwrap()).unwrap();
         let answer =
             json!({ "key": key, "session": self.session, "segment": segment, "question": question, "value": value });
-        self.post("surgeon", "answers", answer).await;
-    }
-
-    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
-        let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
-        let answer = request.json(&body).send().await.unwrap();
-        let status = answer.status();
-        let text = answer.text().await.unwrap();
-        assert!(status.is_success(), "{what} {body}: {status} {text}");
-        if status == StatusCode::NO_CONTENT { Value::Null } else { serde_json::from_str(&text).unwrap() }
+        self.server.post("/api/surgeon/answers", answer).await;
     }
 
     /// The comments in the database.
     async fn kept(&self) -> Vec<String> {
-        let pool = super::theatre::database(self.server.data.path()).await;
+        let pool = self.server.database().await;
         let comments = sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
         pool.close().await;
         comments

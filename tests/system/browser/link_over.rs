@@ -2,20 +2,18 @@
 //! is told that nothing is left.
 
 use serde_json::json;
-use sqlx::SqlitePool;
-use sqlx::sqlite::SqliteConnectOptions;
 
 use super::driver::Driver;
 use super::wait::until;
-use crate::http::studies::{act, new_session, open, post, server_within, sign_in_as_lead, take_session_link};
+use crate::http::studies::{act, new_session, open, server_within, sign_in_as_lead, take_session_link};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_half_written_when_the_link_ended_is_sent_and_nothing_stays_outstanding() {
     let (_protocols, mut server) = server_within();
     sign_in_as_lead(&mut server).await;
     open(&server).await;
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-01")).await;
     let session = &made["session"];
     take_session_link(&mut server).await;
 
@@ -34,14 +32,13 @@ async fn what_was_half_written_when_the_link_ended_is_sent_and_nothing_stays_out
     // The tablet is away while the session is aborted and closed.
     tablet.open("about:blank").await;
     act(&server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
-    post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    server.post("/api/operator/dismissals", json!({"session": session})).await;
     tablet.open(&server.url("/surgeon")).await;
     tablet.sees("main", "which has ended").await;
     tablet.sees("#held", "Everything on this tablet has been saved.").await;
     super::screenshots::shoot(&tablet, "surgeon-link-over").await;
 
-    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
-    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let pool = server.database().await;
     let texts: Vec<String> = sqlx::query_scalar("SELECT text FROM comments").fetch_all(&pool).await.unwrap();
     assert_eq!(texts, ["Half a thought"]);
     until("the server to know that nothing is left", || async {

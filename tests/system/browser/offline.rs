@@ -76,7 +76,7 @@ impl Theatre {
     /// Time of each row of `sql`, minus its wait on the tablet, minus the tablet's own time, in milliseconds. The
     /// tablet's clock is the server's in these tests. Read from the database.
     async fn time_errors(&self, sql: &'static str) -> Vec<f64> {
-        let pool = super::theatre::database(self.server.data.path()).await;
+        let pool = self.server.database().await;
         let errors = sqlx::query_scalar::<_, f64>(sql).fetch_all(&pool).await.unwrap();
         pool.close().await;
         errors

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::accessible;
 use super::driver::{Browser, Driver};
 use super::screenshots::{resize, shoot};
-use super::theatre::{Theatre, database, kill, operator, seeing_server, start_again};
+use super::theatre::{Theatre, kill, operator, seeing_server, start_again};
 use super::wait::until;
 use crate::support::Server;
 
@@ -87,7 +87,7 @@ async fn centre(browser: &Browser, other: &Browser) {
 
 /// The kinds of the session's events about the focus, with the frames that were on screen.
 async fn events(server: &Server) -> Vec<(String, Option<i64>)> {
-    let pool = database(server.data.path()).await;
+    let pool = server.database().await;
     let sql =
         "SELECT kind, payload ->> 'frame' FROM events WHERE kind LIKE 'patch-%' OR kind LIKE 'focus-%' ORDER BY number";
     let events = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();

@@ -17,7 +17,7 @@ use super::driver::{Browser, Driver};
 use super::playback::{drawn, press, unblind, until_drawn};
 use super::pointing;
 use super::screenshots::{resize, shoot};
-use super::theatre::{Theatre, database, operator};
+use super::theatre::{Theatre, operator};
 use super::wait::until;
 use crate::support::{BRAIN, Server};
 
@@ -140,7 +140,7 @@ async fn recorded(theatre: &Theatre) {
     theatre.tap_notice(1).await;
     pointing::point(&theatre.surgeon).await;
     until("the place", || async {
-        let pool = database(theatre.server.data.path()).await;
+        let pool = theatre.server.database().await;
         let sql = "SELECT count(*) FROM events WHERE kind = 'patch-placed'";
         let placed: i64 = sqlx::query_scalar(sql).fetch_one(&pool).await.unwrap();
         pool.close().await;
@@ -312,7 +312,7 @@ async fn corners(theatre: &Theatre, page: &Browser, recording: &Recording) {
     }
     let frame = usize::try_from(drawn(page).await).unwrap();
     let number = recording.rows()[frame].number;
-    let pool = database(theatre.server.data.path()).await;
+    let pool = theatre.server.database().await;
     let sql = format!("SELECT patch_x, patch_y FROM telemetry WHERE frame = {number}");
     let (x, y): (i64, i64) = sqlx::query_as(sqlx::AssertSqlSafe(sql)).fetch_one(&pool).await.unwrap();
     pool.close().await;

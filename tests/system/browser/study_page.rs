@@ -9,7 +9,7 @@ use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
 use super::theatre::operator;
 use super::wait::until;
-use crate::http::studies::{act, definition, new_session, post, server};
+use crate::http::studies::{act, definition, new_session, server};
 use crate::support::{PASSPHRASE, Server};
 
 async fn researcher(driver: &Driver, server: &Server) -> Browser {
@@ -81,11 +81,11 @@ async fn a_session(operator: &Browser) {
 async fn another_session(server: &mut Server) {
     let token = server.sign_in("operator").await;
     server.use_key("operator", &token);
-    post(server, "operator", "/api/operator/participants", json!({"code": "S-02"})).await;
-    let made = post(server, "operator", "/api/operator/sessions", new_session("S-02")).await;
+    server.post("/api/operator/participants", json!({"code": "S-02"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-02")).await;
     let session = made["session"].clone();
     act(server, "operator", json!({"session": session, "action": "abort", "reason": "The light failed again"})).await;
-    post(server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    server.post("/api/operator/dismissals", json!({"session": session})).await;
 }
 
 /// Exports the unblinded study, whose page is open, with its policies.

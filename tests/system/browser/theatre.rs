@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rustix::process::Signal;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
 use super::driver::{Area, Browser, Driver};
@@ -34,12 +33,6 @@ pub fn server() -> Server {
 /// The same with a camera that looks at the brain.
 pub fn seeing_server() -> Server {
     start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0", BRAIN)
-}
-
-/// The database in a server's data folder, opened by another program than the server.
-pub async fn database(folder: &Path) -> SqlitePool {
-    let file = SqliteConnectOptions::new().filename(folder.join("parfocal.db")).read_only(true);
-    SqlitePool::connect_with(file).await.unwrap()
 }
 
 /// A browser on the operator's page of `server`.

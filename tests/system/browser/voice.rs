@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
-use super::theatre::{Theatre, database, kill, start_again};
+use super::theatre::{Theatre, kill, start_again};
 use super::wait::until;
 
 /// Options of a browser that lets every page use a microphone, which receives `tone`.
@@ -86,7 +86,7 @@ async fn key(page: &Browser, kind: &str, key: &str, repeat: bool) {
 /// The recordings in the database: the numbers of their pieces, the number of pieces, whether the end is there, and the
 /// length in milliseconds.
 async fn recorded(theatre: &Theatre) -> Vec<(String, i64, bool, i64)> {
-    let pool = database(theatre.server.data.path()).await;
+    let pool = theatre.server.database().await;
     let rows = sqlx::query_as(
         "SELECT group_concat(piece, ' '), count(*), max(ended IS NOT NULL), max(through_ms)
          FROM (SELECT * FROM voice_pieces ORDER BY comment, piece) GROUP BY comment ORDER BY min(number)",

@@ -32,7 +32,7 @@ impl Theatre {
 
     /// Waits until the result of `sql` in the database is `expected`.
     pub async fn keeps(&self, sql: &'static str, expected: &[&str]) {
-        let pool = super::theatre::database(self.server.data.path()).await;
+        let pool = self.server.database().await;
         until(&format!("{sql} to give {expected:?}"), || async {
             sqlx::query_scalar::<_, String>(sql).fetch_all(&pool).await.unwrap() == expected
         })

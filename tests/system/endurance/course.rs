@@ -2,15 +2,13 @@
 
 use std::time::Duration;
 
-use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::support::{Server, client};
+use crate::support::Server;
 
 /// Conducts sessions on a server, one after another.
 pub struct Conductor<'a> {
     server: &'a Server,
-    client: Client,
     /// Number of sessions conducted so far.
     pub sessions: usize,
     /// Number of comments that the server acknowledged.
@@ -30,17 +28,17 @@ pub struct Pace {
 impl<'a> Conductor<'a> {
     /// Prepares to conduct sessions on `server`; adds their participant.
     pub async fn new(server: &'a Server) -> Self {
-        let conductor = Self { server, client: client(), sessions: 0, comments: 0, keys: 0 };
-        conductor.post("operator", "participants", json!({"code": "S-07"})).await;
+        let conductor = Self { server, sessions: 0, comments: 0, keys: 0 };
+        conductor.server.post("/api/operator/participants", json!({"code": "S-07"})).await;
         conductor
     }
 
     /// Conducts one session from preparing to closing it. Every fourth is aborted in its first setting.
     pub async fn conduct(&mut self, pace: Pace) {
         let made = json!({"participant": "S-07", "protocol": "long-day"});
-        let view = self.post("operator", "sessions", made).await;
+        let view = self.server.post("/api/operator/sessions", made).await;
         let session = view["session"].clone();
-        self.post("operator", "actions", json!({"session": session, "action": "start"})).await;
+        self.server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
 
         let aborted = self.sessions % 4 == 3;
         let settings = if aborted { 1 } else { view["settings"].as_u64().unwrap() };
@@ -50,12 +48,12 @@ impl<'a> Conductor<'a> {
 
         if aborted {
             let abort = json!({"session": session, "action": "abort", "reason": "every fourth session is"});
-            self.post("operator", "actions", abort).await;
+            self.server.post("/api/operator/actions", abort).await;
         } else {
             self.answer(&session).await;
             assert_eq!(self.view().await["phase"], "completed");
         }
-        self.post("operator", "dismissals", json!({"session": session})).await;
+        self.server.post("/api/operator/dismissals", json!({"session": session})).await;
         self.sessions += 1;
     }
 
@@ -63,20 +61,20 @@ impl<'a> Conductor<'a> {
     async fn inspect(&mut self, session: &Value, pace: Pace) {
         let segment = self.view().await["segment"].clone();
         let act = |action: &str| json!({"session": session, "action": action, "segment": segment});
-        self.post("surgeon", "actions", act("acknowledge")).await;
+        self.server.post("/api/surgeon/actions", act("acknowledge")).await;
 
         for _ in 0..pace.comments {
             tokio::time::sleep(pace.setting / pace.comments).await;
             let comment = json!({"key": self.key(), "session": session, "segment": segment, "frame": 1,
                 "client_millis": 0, "kind": "text", "text": "as sharp as before, at the edge of the picture too"});
-            self.post("surgeon", "comments", comment).await;
+            self.server.post("/api/surgeon/comments", comment).await;
             self.comments += 1;
         }
 
         let pause = json!({"session": session, "action": "pause", "reason": "a question"});
-        self.post("operator", "actions", pause).await;
-        self.post("operator", "actions", json!({"session": session, "action": "resume"})).await;
-        self.post("surgeon", "actions", act("finish-segment")).await;
+        self.server.post("/api/operator/actions", pause).await;
+        self.server.post("/api/operator/actions", json!({"session": session, "action": "resume"})).await;
+        self.server.post("/api/surgeon/actions", act("finish-segment")).await;
         if self.view().await["phase"] == "questions" {
             self.answer(session).await;
         }
@@ -90,11 +88,11 @@ impl<'a> Conductor<'a> {
             let value = if question["kind"] == "sus" { json!(vec![3; 10]) } else { json!(4) };
             let answer = json!({"key": self.key(), "session": session, "segment": segment,
                 "question": question["id"], "value": value});
-            self.post("surgeon", "answers", answer).await;
+            self.server.post("/api/surgeon/answers", answer).await;
         }
 
         let done = json!({"session": session, "action": "finish-questions", "segment": segment});
-        self.post("surgeon", "actions", done).await;
+        self.server.post("/api/surgeon/actions", done).await;
     }
 
     /// A key that no other record has.
@@ -105,19 +103,6 @@ impl<'a> Conductor<'a> {
 
     /// The session as the surgeon sees it.
     async fn view(&self) -> Value {
-        self.ask(Method::GET, "surgeon", "session", &Value::Null).await
-    }
-
-    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
-        self.ask(Method::POST, role, what, &body).await
-    }
-
-    async fn ask(&self, method: Method, role: &str, what: &str, body: &Value) -> Value {
-        let request = self.client.request(method, self.server.url(&format!("/api/{role}/{what}")));
-        let response = request.bearer_auth(self.server.key(role)).json(body).send().await.unwrap();
-        let status = response.status();
-        let said = response.text().await.unwrap();
-        assert!(status.is_success(), "{role} {what} {body}: {status} {said}");
-        if status == StatusCode::NO_CONTENT { Value::Null } else { serde_json::from_str(&said).unwrap() }
+        self.server.read("/api/surgeon/session").await
     }
 }

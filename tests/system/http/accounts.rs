@@ -10,17 +10,14 @@ use reqwest::header::{COOKIE, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::{connect_async, tungstenite};
 use uuid::Uuid;
 
 use super::live::{Page, upgrade};
-use super::studies::{
-    act, ask, new_session, open, post, refused, server, server_within, sign_in_as_lead, take_session_link,
-};
-use crate::support::{PASSPHRASE, Server, account, client};
+use super::studies::{act, new_session, open, refused, server, server_within, sign_in_as_lead, take_session_link};
+use crate::support::{PASSPHRASE, Server, account, client, parfocal};
 
 async fn sign_in(server: &Server, name: &str, passphrase: &str) -> Response {
     let body = json!({"name": name, "passphrase": passphrase});
@@ -149,8 +146,8 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
     let links = ["operator", "researcher"].map(|role| (role, server.key(role).to_owned()));
     sign_in_as_lead(&mut server).await;
     open(&server).await;
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-01")).await;
     let session = made["session"].as_str().unwrap().to_owned();
 
     let through = async |server: &Server, role: &str| {
@@ -158,7 +155,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
         for (of, path, body) in doors(&session) {
             let method = if body.is_some() { Method::POST } else { Method::GET };
             let changes = body.is_some();
-            let (status, said) = ask(server, of, method, &path, &body.unwrap_or_default()).await;
+            let (status, said) = server.ask(of, method, &path, &body.unwrap_or_default()).await;
             let said: Value = serde_json::from_str(&said).unwrap_or_default();
             let asks = said["sign_in"] == json!(true);
             assert!(!asks || status == StatusCode::FORBIDDEN, "{role}: {path}");
@@ -205,9 +202,8 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
     server.add_account("operator", "operator", "Nurse Op");
     let token = server.sign_in("operator").await;
     server.use_key("operator", &token);
-    post(&server, "operator", "/api/operator/actions", json!({"session": session, "action": "start"})).await;
-    let view = ask(&server, "operator", Method::GET, "/api/operator/session", &Value::Null).await.1;
-    let view: Value = serde_json::from_str(&view).unwrap();
+    server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
+    let view = server.read("/api/operator/session").await;
     let started = view["log"].as_array().unwrap().iter().find(|line| line["text"] == "Session started").unwrap();
     assert_eq!((started["account"].as_str(), view["study"].as_str()), (Some("operator"), Some("scope-2026")));
 }
@@ -218,22 +214,20 @@ async fn locking_and_unblinding_ask_for_the_passphrase_once_more() {
     sign_in_as_lead(&mut server).await;
     open(&server).await;
     let changes = "/api/researcher/studies/scope-2026/changes";
-    post(&server, "researcher", changes, json!({"change": "close", "reason": "over"})).await;
+    server.post(changes, json!({"change": "close", "reason": "over"})).await;
 
     let (code, said) = refused(&server, "researcher", changes, json!({"change": "lock", "reason": "over"})).await;
     assert!(code == 422 && said.contains("passphrase"), "{said}");
     let wrong = json!({"change": "lock", "reason": "over", "passphrase": "not this one"});
     let (code, said) = refused(&server, "researcher", changes, wrong).await;
     assert!(code == 403 && said.contains("This is not your passphrase. Nothing was changed"), "{said}");
-    let study =
-        post(&server, "researcher", changes, json!({"change": "lock", "reason": "over", "passphrase": PASSPHRASE}))
-            .await;
+    let study = server.post(changes, json!({"change": "lock", "reason": "over", "passphrase": PASSPHRASE})).await;
     assert_eq!(study["stage"], "locked");
     let last = study["log"].as_array().unwrap().last().unwrap().clone();
     assert_eq!((last["person"].as_str(), last["by"].as_str()), (Some("Dr Lead"), Some("researcher")));
 
-    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(server.data.path()).output().unwrap();
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let (verified, said) = parfocal(&["verify"], server.data.path());
+    assert!(verified, "{said}");
 }
 
 #[tokio::test]
@@ -244,13 +238,13 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     sign_in_as_lead(&mut server).await;
     open(&server).await;
     let mut shared_page = Page::open(&server, "surgeon").await;
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-01")).await;
     let session = made["session"].clone();
 
     // The shared link gives no access to a study, and a page that was open is closed.
     assert_eq!(closed(&mut shared_page).await, CloseCode::from(4403));
-    let (status, said) = ask(&server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
+    let (status, said) = server.look("surgeon", "/api/surgeon/session").await;
     assert!(status == 403 && said.contains("has its own link"), "{said}");
 
     take_session_link(&mut server).await;
@@ -261,8 +255,7 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     assert!(!cookie.contains(&link), "the cookie gives no link away");
     assert_eq!(self::status(&server, "/api/surgeon/session", &cookie).await, 200);
     let mut page = Page::open(&server, "surgeon").await;
-    let (_, said) = ask(&server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
-    assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["session"], session);
+    assert_eq!(server.read("/api/surgeon/session").await["session"], session);
 
     // After the session the link gives no access any more. The tablet may still learn that the session has ended.
     act(&server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
@@ -277,11 +270,11 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     let by_hand = json!({"focal_power": 0.3});
     let focus = client().post(server.url("/api/operator/focus")).bearer_auth(operators_link).json(&by_hand);
     assert_eq!(focus.send().await.unwrap().status(), StatusCode::FORBIDDEN);
-    let (status, said) = ask(&server, "operator", Method::POST, "/api/operator/focus", &by_hand).await;
+    let (status, said) = server.ask("operator", Method::POST, "/api/operator/focus", &by_hand).await;
     assert!(status.is_success(), "{said}");
 
     // After the operator has closed the session, the tablet has no access, but the server accepts what it still holds.
-    post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    server.post("/api/operator/dismissals", json!({"session": session})).await;
     assert_eq!(closed(&mut page).await, CloseCode::from(4403));
     for path in ["/api/surgeon/session", "/stream.mjpeg", "/api/openapi.json"] {
         assert_eq!(self::status(&server, path, &cookie).await, 403, "{path}");
@@ -292,9 +285,9 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     assert!(over.contains("which has ended") && over.contains("surgeon/over.js"), "{over}");
 
     let comment = json!({"key": Uuid::from_u128(5), "session": session, "kind": "text", "text": "said before the end"});
-    post(&server, "surgeon", "/api/surgeon/comments", comment).await;
+    server.post("/api/surgeon/comments", comment).await;
     let detail = format!("/api/researcher/sessions/{}/course", session.as_str().unwrap());
-    let (_, said) = ask(&server, "researcher", Method::GET, &detail, &Value::Null).await;
+    let (_, said) = server.look("researcher", &detail).await;
     assert!(said.contains("said before the end"), "{said}");
 }
 
@@ -311,7 +304,7 @@ async fn closed(page: &mut Page) -> CloseCode {
 async fn change(server: &Server, name: &str, mut change: Value, passphrase: &str) -> (u16, Value) {
     change["passphrase"] = json!(passphrase);
     let path = format!("/api/researcher/accounts/{name}/changes");
-    let (status, said) = ask(server, "researcher", Method::POST, &path, &change).await;
+    let (status, said) = server.ask("researcher", Method::POST, &path, &change).await;
     (status.as_u16(), serde_json::from_str(&said).unwrap())
 }
 
@@ -340,7 +333,7 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
         assert_eq!(status, code, "{field}: {said}");
         assert!(said.contains(expected), "{field}: {said}");
     }
-    post(&server, "researcher", accounts, new).await;
+    server.post(accounts, new).await;
 
     // The passphrase that the lead set gives no access until the person has chosen another.
     let given = json!({"name": "n.op", "passphrase": "given by the lead", "as_bearer": true});
@@ -359,15 +352,14 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
     assert_eq!(sign_in(&server, "n.op", "given by the lead").await.status(), StatusCode::FORBIDDEN);
     assert_eq!(sign_in(&server, "n.op", "only I know this").await.status(), StatusCode::OK);
 
-    let (_, said) = ask(&server, "researcher", Method::GET, accounts, &Value::Null).await;
+    let (_, said) = server.look("researcher", accounts).await;
     let lines: Value = serde_json::from_str(&said).unwrap();
     assert!(!said.contains("hash") && !said.contains("salt"), "{said}");
     assert_eq!((lines[1]["account"].as_str(), lines[1]["set_by_another"].as_bool()), (Some("n.op"), Some(false)));
     assert!(lines[1]["last_signed_in"].is_string(), "{said}");
 
     // The chain records who made the account, and who chose the passphrase.
-    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
-    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let pool = server.database().await;
     let sql = "SELECT kind, done_by FROM account_events WHERE account = 'n.op' ORDER BY number LIMIT 2";
     let events: Vec<(String, String)> = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
     pool.close().await;
@@ -418,7 +410,7 @@ async fn a_lead_changes_accounts_and_nobody_else_does() {
     for (key, expected) in [(link, "acts under a personal account"), (researcher, "Only a lead may do this")] {
         server.use_key("researcher", &key);
         for path in ["/researcher/accounts", "/api/researcher/accounts"] {
-            let (status, said) = ask(&server, "researcher", Method::GET, path, &Value::Null).await;
+            let (status, said) = server.look("researcher", path).await;
             assert!(status == StatusCode::FORBIDDEN && said.contains(expected), "{path}: {said}");
         }
         let (status, said) = change(&server, "m", json!({"change": "disable"}), PASSPHRASE).await;
@@ -471,7 +463,7 @@ async fn a_live_view_ends_when_its_account_no_longer_has_the_role() {
 /// returns what the terminal showed.
 fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> String {
     let program = env!("CARGO_BIN_EXE_parfocal");
-    let command = format!("{program} account {arguments} --data-dir {}", server.data.path().display());
+    let command = format!("'{program}' account {arguments} --data-dir '{}'", server.data.path().display());
     let mut terminal = Command::new("script")
         .args(["--quiet", "--return", "--flush", "--command", &command, "/dev/null"])
         .stdin(Stdio::piped())
@@ -513,15 +505,12 @@ async fn a_restored_database_signs_nobody_in() {
     let token = server.key("researcher").to_owned();
     let elsewhere = tempfile::tempdir().unwrap();
     let backup = elsewhere.path().join("backup.db");
-    let run = |arguments: &[&str]| {
-        let program = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap();
-        assert!(program.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&program.stderr));
-    };
-
-    let (backup, folder) = (backup.to_str().unwrap(), server.data.path().to_str().unwrap().to_owned());
-    run(&["backup", "--out", backup, "--data-dir", &folder]);
+    let backup = backup.to_str().unwrap();
+    let (made, said) = parfocal(&["backup", "--out", backup, "--data-dir"], server.data.path());
+    assert!(made, "{said}");
     assert!(server.end(Signal::TERM));
-    run(&["restore", backup, "--data-dir", &folder]);
+    let (restored, said) = parfocal(&["restore", backup, "--data-dir"], server.data.path());
+    assert!(restored, "{said}");
 
     let server = Server::on(Arc::clone(&server.data), &["--bind", "127.0.0.1:0"]);
     let status = server.get("/researcher").bearer_auth(&token).send().await.unwrap().status();

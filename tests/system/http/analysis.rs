@@ -7,16 +7,15 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 use uuid::Uuid;
 
 use super::live::Page;
-use super::studies::take_session_link;
-use crate::support::{BRAIN, PASSPHRASE, Server, client};
+use super::studies::{act, take_session_link};
+use crate::support::{BRAIN, PASSPHRASE, Server, database};
 
 const PROTOCOL: &str = include_str!("analysed.toml");
 /// Name of the study.
@@ -68,25 +67,9 @@ impl Study {
 
         let study = Self { _protocols: protocols, keys: AtomicU64::new(0), server };
         let plan = json!({"definition": definition(), "reason": "ethics approved it"});
-        study.post("researcher", "/api/researcher/studies", plan).await;
+        study.server.post("/api/researcher/studies", plan).await;
         study.change("open").await;
         study
-    }
-
-    async fn ask(&self, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
-        let request = client().request(method, self.server.url(path)).bearer_auth(self.server.key(role)).json(body);
-        let response = request.send().await.unwrap();
-        (response.status(), response.text().await.unwrap())
-    }
-
-    async fn get(&self, role: &str, path: &str) -> (StatusCode, String) {
-        self.ask(role, Method::GET, path, &Value::Null).await
-    }
-
-    async fn post(&self, role: &str, path: &str, body: Value) -> Value {
-        let (status, said) = self.ask(role, Method::POST, path, &body).await;
-        assert!(status.is_success(), "{path} {body}: {status} {said}");
-        serde_json::from_str(&said).unwrap_or_default()
     }
 
     /// Changes the study.
@@ -101,16 +84,11 @@ impl Study {
         if ["lock", "unblind"].contains(&change) {
             body["passphrase"] = PASSPHRASE.into();
         }
-        self.post("researcher", &format!("/api/researcher/studies/{STUDY}/changes"), body).await;
-    }
-
-    async fn act(&self, role: &str, action: Value) {
-        self.post(role, &format!("/api/{role}/actions"), action).await;
+        self.server.post(&format!("/api/researcher/studies/{STUDY}/changes"), body).await;
     }
 
     async fn view(&self) -> Value {
-        let (_, said) = self.get("surgeon", "/api/surgeon/session").await;
-        serde_json::from_str(&said).unwrap()
+        self.server.read("/api/surgeon/session").await
     }
 
     /// A key that no other record has.
@@ -122,13 +100,12 @@ impl Study {
         let key = self.key();
         let body = json!({"key": key, "session": view["session"], "segment": view["segment"], "question": question,
             "value": value});
-        self.post("surgeon", "/api/surgeon/answers", body).await;
+        self.server.post("/api/surgeon/answers", body).await;
     }
 
     /// The policies of a session, in order. No page shows them, so they are read from the database.
     async fn order(&self, session: &str) -> Vec<String> {
-        let file = SqliteConnectOptions::new().filename(self.server.data.path().join("parfocal.db")).read_only(true);
-        let pool = SqlitePool::connect_with(file).await.unwrap();
+        let pool = self.server.database().await;
         let sql = "SELECT policy FROM segments WHERE session = ? ORDER BY setting";
         let order = sqlx::query_scalar(sql).bind(session).fetch_all(&pool).await.unwrap();
         pool.close().await;
@@ -136,18 +113,19 @@ impl Study {
     }
 
     async fn prepare(&self, surgeon: &str) -> String {
-        self.post("operator", "/api/operator/participants", json!({"code": surgeon})).await;
+        self.server.post("/api/operator/participants", json!({"code": surgeon})).await;
         let place = json!({"study": STUDY, "site": "leeds"});
         let new = json!({"participant": surgeon, "protocol": "analysed", "study": place});
-        let made = self.post("operator", "/api/operator/sessions", new).await;
+        let made = self.server.post("/api/operator/sessions", new).await;
         made["session"].as_str().unwrap().to_owned()
     }
 
     /// Makes a session of `surgeon` and aborts it before it starts.
     pub async fn aborted(&self, surgeon: &str) {
         let session = self.prepare(surgeon).await;
-        self.act("operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
-        self.post("operator", "/api/operator/dismissals", json!({"session": session})).await;
+        act(&self.server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"}))
+            .await;
+        self.server.post("/api/operator/dismissals", json!({"session": session})).await;
     }
 
     /// Runs a session of `surgeon`, who answers for each policy as in `answers`.
@@ -156,19 +134,19 @@ impl Study {
         take_session_link(&mut self.server).await;
         let order = self.order(&session).await;
         let mut page = Page::open(&self.server, "surgeon").await;
-        self.act("operator", json!({"session": session, "action": "start"})).await;
+        act(&self.server, "operator", json!({"session": session, "action": "start"})).await;
 
         let mut ran: BTreeMap<&str, usize> = BTreeMap::new();
         for policy in &order {
             let repeat = ran.entry(policy).or_default();
             let segment = self.view().await["segment"].clone();
             let tap = |action: &str| json!({"session": session, "action": action, "segment": segment});
-            self.act("surgeon", tap("acknowledge")).await;
+            act(&self.server, "surgeon", tap("acknowledge")).await;
             page.watch(12).await;
             let comment = json!({"key": self.key(), "session": session, "segment": segment, "kind": "text",
                 "text": format!("{surgeon} sees <{}> for the {}. time", policy.to_uppercase(), *repeat + 1)});
-            self.post("surgeon", "/api/surgeon/comments", comment).await;
-            self.act("surgeon", tap("finish-segment")).await;
+            self.server.post("/api/surgeon/comments", comment).await;
+            act(&self.server, "surgeon", tap("finish-segment")).await;
 
             let view = self.view().await;
             self.answer(&view, "sharp", answers[policy][*repeat].clone()).await;
@@ -177,7 +155,7 @@ impl Study {
                 self.answer(&view, "comfort", json!(40 + *repeat)).await;
             }
             self.answer(&view, "why", json!("because of the haze")).await;
-            self.act("surgeon", tap("finish-questions")).await;
+            act(&self.server, "surgeon", tap("finish-questions")).await;
             *repeat += 1;
         }
 
@@ -191,9 +169,9 @@ impl Study {
         let view = self.view().await;
         self.answer(&view, "preference", json!(ranking)).await;
         self.answer(&view, "usability", json!([4, 2, 3, 1, 4, 3, 2, 2, 4, 2])).await;
-        self.act("surgeon", json!({"session": session, "action": "finish-questions", "segment": null})).await;
+        act(&self.server, "surgeon", json!({"session": session, "action": "finish-questions", "segment": null})).await;
         assert_eq!(self.view().await["phase"], "completed");
-        self.post("operator", "/api/operator/dismissals", json!({"session": session})).await;
+        self.server.post("/api/operator/dismissals", json!({"session": session})).await;
     }
 
     /// Runs the whole study: three sessions that count, and an aborted one.
@@ -242,7 +220,7 @@ fn rows(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
 /// Before unblinding, the answer is a sentence that reveals no policy.
 async fn assert_refused_while_blinded(study: &Study) {
     for path in [API.to_owned(), PAGE.to_owned(), format!("{API}.zip")] {
-        let (status, said) = study.get("researcher", &path).await;
+        let (status, said) = study.server.look("researcher", &path).await;
         assert_eq!(status, StatusCode::CONFLICT, "{path}: {said}");
         assert!(
             said.contains("study 'focus-2026' is locked: it can be analysed once all of it is unblinded"),
@@ -252,7 +230,10 @@ async fn assert_refused_while_blinded(study: &Study) {
     }
     let (succeeded, said) = command(study.server.data.path(), &["--json"]);
     assert!(!succeeded && said.contains("is locked") && !said.contains("climber"), "{said}");
-    assert_eq!(study.get("researcher", "/api/researcher/studies/other/analysis").await.0, StatusCode::NOT_FOUND);
+    assert_eq!(
+        study.server.look("researcher", "/api/researcher/studies/other/analysis").await.0,
+        StatusCode::NOT_FOUND
+    );
 }
 
 fn outcome<'a>(protocol: &'a Value, name: &str) -> &'a Value {
@@ -339,8 +320,7 @@ fn assert_folder_tells(folder: &Path, analysis: &Value) {
 
 /// Number of recorded looks at the analysis.
 async fn looks(data: &Path) -> i64 {
-    let file = SqliteConnectOptions::new().filename(data.join("parfocal.db")).read_only(true);
-    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let pool = database(data).await;
     let sql = "SELECT count(*) FROM accesses WHERE kind = 'analysis-viewed' AND role = 'researcher' AND detail = ?";
     let looks = sqlx::query_scalar(sql).bind(STUDY).fetch_one(&pool).await.unwrap();
     pool.close().await;
@@ -362,14 +342,14 @@ async fn a_studys_analysis_has_scipys_figures_on_the_page_on_the_command_line_an
         }
     }
 
-    let (status, said) = study.get("researcher", API).await;
+    let (status, said) = study.server.look("researcher", API).await;
     assert_eq!(status, StatusCode::OK, "{said}");
     let analysis: Value = serde_json::from_str(&said).unwrap();
     let protocol = &analysis["protocols"][0];
     assert_ratings_are_scipys(protocol);
     assert_the_rest_is_as_by_hand(protocol);
 
-    let (status, html) = study.get("researcher", PAGE).await;
+    let (status, html) = study.server.look("researcher", PAGE).await;
     assert_eq!(status, StatusCode::OK);
     assert_page_tells(&html, protocol);
 

@@ -1,12 +1,9 @@
 //! The backup that a lead gets from the page: who may have it, and that it is a whole database.
 
-use std::path::Path;
-use std::process::Command;
-
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::support::{PASSPHRASE, Server, client};
+use crate::support::{PASSPHRASE, Server, client, parfocal};
 
 const API: &str = "/api/researcher/backup";
 const FILE: &str = "/api/researcher/backup.db";
@@ -21,12 +18,6 @@ async fn state(server: &Server, token: &str) -> Value {
     let (status, said) = ask(server, token, Method::GET, API, &Value::Null).await;
     assert_eq!(status, StatusCode::OK);
     serde_json::from_slice(&said).unwrap()
-}
-
-fn parfocal(arguments: &[&str], path: &Path) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).arg(path).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -81,13 +72,14 @@ async fn a_lead_who_confirms_gets_a_backup_and_nobody_else_does() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("backup.db");
     std::fs::write(&file, content).unwrap();
-    parfocal(&["verify", "--head", ready["head"].as_str().unwrap()], &file);
-    parfocal(&["restore", file.to_str().unwrap(), "--data-dir"], &folder.path().join("restored"));
+    let (verified, said) = parfocal(&["verify", "--head", ready["head"].as_str().unwrap()], &file);
+    assert!(verified, "{said}");
+    let restore = ["restore", file.to_str().unwrap(), "--data-dir"];
+    let (restored, said) = parfocal(&restore, &folder.path().join("restored"));
+    assert!(restored, "{said}");
 
     // It is recorded under the lead's account.
-    let accounts = server.data.path().join("parfocal.db");
-    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(accounts).read_only(true);
-    let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
+    let pool = server.database().await;
     let by: Vec<String> = sqlx::query_scalar(
         "SELECT account FROM actors JOIN accesses ON record = CAST(accesses.number AS TEXT) AND actors.kind = 'access'
          WHERE accesses.kind = 'backed-up'",

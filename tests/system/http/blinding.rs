@@ -231,14 +231,13 @@ async fn where_a_session_has_left_the_lens_is_hidden_until_something_else_has_mo
     page.watch_until(|header| header["measured"].is_number()).await;
 
     let session = begin(&server, "moving").await;
-    let view: Value = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().json().await.unwrap();
+    let view = server.read("/api/surgeon/session").await;
     let tap = json!({"session": session, "action": "acknowledge", "segment": view["segment"]});
-    let tapped = server.post_as("surgeon", "/api/surgeon/actions").json(&tap).send().await.unwrap();
-    assert!(tapped.status().is_success());
+    server.post("/api/surgeon/actions", tap).await;
     page.until(|told| told["view"]["phase"] == "inspecting").await;
     page.watch(10).await;
     abort(&server, &session).await;
-    post(&server, "/api/operator/dismissals", json!({ "session": session })).await;
+    server.post("/api/operator/dismissals", json!({ "session": session })).await;
     page.until(|told| told["type"] == "session" && told["view"].is_null()).await;
 
     page.heard.clear();

@@ -1,41 +1,13 @@
 //! The chain of records of a real server: complete after the server is killed while it writes, shown on the pages, and
 //! extended by everyone who looks.
 
-use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions, Connection};
 
-use crate::support::{Server, client};
-
-/// Runs `parfocal` with `arguments` and `path`. Returns whether it succeeded, and its output.
-fn parfocal(arguments: &[&str], path: &Path) -> (bool, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).arg(path).output().unwrap();
-    let said = [output.stdout, output.stderr].concat();
-    (output.status.success(), String::from_utf8(said).unwrap())
-}
-
-/// Posts `body` as `role` and returns the answer.
-async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
-    let answer = server.post_as(role, path).json(&body).send().await.unwrap();
-    let status = answer.status();
-    let said = answer.text().await.unwrap();
-    assert!(status.is_success(), "{path} {body}: {status} {said}");
-    serde_json::from_str(&said).unwrap_or_default()
-}
-
-/// Makes a session. Returns its id.
-async fn a_session(server: &Server) -> String {
-    post(server, "operator", "/api/operator/participants", json!({"code": "S-05"})).await;
-    let new = json!({"participant": "S-05", "protocol": "paper"});
-    let made = post(server, "operator", "/api/operator/sessions", new).await;
-    made["session"].as_str().unwrap().to_owned()
-}
+use crate::support::{Server, client, parfocal};
 
 async fn head(server: &Server) -> Value {
     server.get_as("operator", "/api/chain/head").send().await.unwrap().json().await.unwrap()
@@ -45,7 +17,7 @@ async fn head(server: &Server) -> Value {
 async fn after_a_kill_in_mid_writing_the_chain_is_whole_and_each_acknowledged_comment_is_there_once() {
     let data = Arc::new(tempfile::tempdir().unwrap());
     let mut server = Server::on(Arc::clone(&data), &["--bind", "127.0.0.1:0"]);
-    let session = a_session(&server).await;
+    let session = server.prepare("S-05", "paper").await;
     let mut kept: Vec<String> = Vec::new();
     let keys = Arc::new(AtomicUsize::new(1));
 
@@ -90,10 +62,9 @@ async fn after_a_kill_in_mid_writing_the_chain_is_whole_and_each_acknowledged_co
         assert!(verified, "while the server runs: {said}");
     }
 
-    let options = SqliteConnectOptions::new().filename(data.path().join("parfocal.db")).read_only(true);
-    let mut database = options.connect().await.unwrap();
-    let found: Vec<String> = sqlx::query_scalar("SELECT key FROM comments").fetch_all(&mut database).await.unwrap();
-    database.close().await.unwrap();
+    let pool = server.database().await;
+    let found: Vec<String> = sqlx::query_scalar("SELECT key FROM comments").fetch_all(&pool).await.unwrap();
+    pool.close().await;
     for key in &kept {
         assert_eq!(found.iter().filter(|found| *found == key).count(), 1, "{key}");
     }
@@ -102,7 +73,7 @@ async fn after_a_kill_in_mid_writing_the_chain_is_whole_and_each_acknowledged_co
 #[tokio::test]
 async fn the_head_stands_on_the_pages_and_grows_with_everyone_who_looks() {
     let mut server = Server::start();
-    let session = a_session(&server).await;
+    let session = server.prepare("S-05", "paper").await;
     let first = head(&server).await;
     let shown = first["head"].as_str().unwrap();
     assert!(first["hash"].as_str().unwrap().len() == 64 && shown.split(':').nth(1).unwrap().len() == 32, "{first}");

@@ -5,27 +5,17 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::Arc;
 
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
 use crate::support::disk::{SmallDisk, as_nobody};
-use crate::support::{Server, client, command, refusal, refused};
+use crate::support::{Server, command, refusal, refused};
 
 const LISTEN: [&str; 2] = ["--bind", "127.0.0.1:0"];
 
-async fn ask(server: &Server, role: &str, path: &str, body: Value) -> (StatusCode, String) {
-    let request = client().post(server.url(path)).bearer_auth(server.key(role)).json(&body);
-    let response = request.send().await.unwrap();
-    (response.status(), response.text().await.unwrap())
-}
-
-/// Makes a session. Returns its id.
-async fn begin(server: &Server) -> String {
-    ask(server, "operator", "/api/operator/participants", json!({"code": "S-05"})).await;
-    let session = json!({"participant": "S-05", "protocol": "practice"});
-    let (status, made) = ask(server, "operator", "/api/operator/sessions", session).await;
-    assert!(status.is_success(), "{made}");
-    serde_json::from_str::<Value>(&made).unwrap()["session"].as_str().unwrap().to_owned()
+/// The surgeon sends a comment.
+async fn send(server: &Server, comment: Value) -> (StatusCode, String) {
+    server.ask("surgeon", Method::POST, "/api/surgeon/comments", &comment).await
 }
 
 fn comment(session: &str, number: u32, text: &str) -> Value {
@@ -33,16 +23,15 @@ fn comment(session: &str, number: u32, text: &str) -> Value {
 }
 
 async fn comments(server: &Server) -> Value {
-    let request = client().get(server.url("/api/surgeon/session")).bearer_auth(server.key("surgeon"));
-    request.send().await.unwrap().json::<Value>().await.unwrap()["comments"].clone()
+    server.read("/api/surgeon/session").await["comments"].clone()
 }
 
 #[tokio::test]
 async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
     let Some(disk) = SmallDisk::mount() else { return };
     let server = Server::on(Arc::clone(&disk.folder), &LISTEN);
-    let session = begin(&server).await;
-    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "there is room")).await;
+    let session = server.prepare("S-05", "practice").await;
+    let (status, _) = send(&server, comment(&session, 1, "there is room")).await;
     assert_eq!(status, StatusCode::NO_CONTENT);
     disk.fill();
     // There may be space left within the files: send comments until it is used up.
@@ -50,7 +39,7 @@ async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
     let told = loop {
         number += 1;
         let long = "no room ".repeat(1500);
-        let (status, told) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, number, &long)).await;
+        let (status, told) = send(&server, comment(&session, number, &long)).await;
         if status != StatusCode::NO_CONTENT {
             assert_eq!(status, StatusCode::INSUFFICIENT_STORAGE, "{told}");
             break told;
@@ -62,7 +51,7 @@ async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
     assert!(told.contains("the disk is full; make room"), "{told}");
     assert_eq!(comments(&server).await, number - 1, "what was refused does not count");
     disk.empty();
-    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, number, "again")).await;
+    let (status, _) = send(&server, comment(&session, number, "again")).await;
     assert_eq!(status, StatusCode::NO_CONTENT);
     assert_eq!(comments(&server).await, number);
 }
@@ -110,13 +99,13 @@ async fn a_user_without_write_permission_learns_it_at_the_start_and_loses_nothin
 
     allow(data.path(), 0o777);
     let server = Server::run(Arc::clone(&data), as_nobody(&command(data.path(), &LISTEN)).unwrap());
-    let session = begin(&server).await;
+    let session = server.prepare("S-05", "practice").await;
     for file in ["parfocal.db", "parfocal.db-wal", "parfocal.db-shm"] {
         allow(&data.path().join(file), 0o444);
     }
     allow(data.path(), 0o555);
     // The files are already open, so what the server acknowledges from here on is in them.
-    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "still kept")).await;
+    let (status, _) = send(&server, comment(&session, 1, "still kept")).await;
     assert_eq!(status, StatusCode::NO_CONTENT);
     drop(server);
     let (code, said) = refusal(as_nobody(&command(data.path(), &LISTEN)).unwrap());

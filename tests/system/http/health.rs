@@ -6,8 +6,7 @@ use parfocal_base::clock::SystemClock;
 use parfocal_devices::lens::emulator::{Emulator, Model};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions, Connection};
+use sqlx::Connection;
 
 use crate::browser::wait::until;
 use crate::support::Server;
@@ -52,15 +51,12 @@ async fn a_lens_that_is_unplugged_degrades_the_server_and_costs_no_restart() {
 #[tokio::test]
 async fn a_locked_database_is_reported_while_it_is_locked() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
-    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db"));
-    let mut other = file.connect().await.unwrap();
-    sqlx::query("BEGIN IMMEDIATE").execute(&mut other).await.unwrap();
+    let other_program = server.lock_database().await;
 
     // SQLite gives up after 5 seconds. Until then the state is unknown, and the server answers anyway.
     assert_eq!(health(&server).await.0, StatusCode::OK);
     becomes(&server, StatusCode::OK, "degraded", &["database-troubled"]).await;
-    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
-    other.close().await.unwrap();
+    other_program.close().await.unwrap();
     becomes(&server, StatusCode::OK, "ok", &[]).await;
 }
 
@@ -68,9 +64,7 @@ async fn a_locked_database_is_reported_while_it_is_locked() {
 #[ignore = "takes more than a minute"]
 async fn a_database_that_takes_nothing_for_a_minute_is_a_failure() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
-    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db"));
-    let mut other = file.connect().await.unwrap();
-    sqlx::query("BEGIN IMMEDIATE").execute(&mut other).await.unwrap();
+    let other_program = server.lock_database().await;
     let failing = async {
         while health(&server).await.0 == StatusCode::OK {
             tokio::time::sleep(std::time::Duration::from_secs(1)).await;
@@ -82,7 +76,7 @@ async fn a_database_that_takes_nothing_for_a_minute_is_a_failure() {
         (StatusCode::SERVICE_UNAVAILABLE, json!("failing"), vec!["database-unwritable".to_owned()])
     );
 
-    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+    other_program.close().await.unwrap();
     becomes(&server, StatusCode::OK, "ok", &[]).await;
 }
 

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
+use reqwest::Method;
 use reqwest::header::AUTHORIZATION;
 use serde_json::{Value, json};
 use tokio::net::TcpStream;
@@ -279,8 +280,7 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
 #[tokio::test]
 async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
     let server = Server::seeing();
-    let focus = crate::support::client().post(server.url("/api/operator/focus")).bearer_auth(server.key("operator"));
-    assert!(focus.json(&json!({"policy": "parfocal"})).send().await.unwrap().status().is_success());
+    server.post("/api/operator/focus", json!({"policy": "parfocal"})).await;
     let mut surgeon = Page::open(&server, "surgeon").await;
     let mut operator = Page::open(&server, "operator").await;
     let belief = operator.until_belief().await;
@@ -300,7 +300,7 @@ async fn depth_maps_go_to_an_operator_who_asks_outside_sessions_and_never_to_a_s
     operator.watch_until(|header| header["depths"].is_null()).await;
     operator.say(json!({"type": "depths", "wanted": true})).await;
     // It learns while the lens moves.
-    post(&server, "operator", "/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
+    server.post("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
     let is_sure = |header: &Value| {
         let places = header["depths"]["places"].as_array();
         places.is_some_and(|places| places.iter().filter(|place| place["side"] == "in-focus").count() >= 3)
@@ -387,12 +387,6 @@ async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
     image::load_from_memory_with_format(first, image::ImageFormat::Jpeg).unwrap();
 }
 
-async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
-    let answer = server.post_as(role, path).json(&body).send().await.unwrap();
-    assert!(answer.status().is_success(), "{path} {body}: {}", answer.status());
-    answer.json().await.unwrap_or_default()
-}
-
 #[tokio::test]
 async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers_setting() {
     let server = Server::seeing();
@@ -402,23 +396,17 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
     surgeon.say(json!({"type": "visible", "visible": true})).await;
     operator.until(|told| told["tablet"]["presence"] == "present").await;
 
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let new = json!({"participant": "S-01", "protocol": "paper"});
-    let view = post(&server, "operator", "/api/operator/sessions", new).await;
-    let session = &view["session"];
-    post(&server, "operator", "/api/operator/actions", json!({"session": session, "action": "start"})).await;
-    let started = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().json::<Value>().await.unwrap();
+    let session = server.prepare("S-01", "paper").await;
+    server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
+    let started = server.read("/api/surgeon/session").await;
     let tap = json!({"session": session, "action": "acknowledge", "segment": started["segment"]});
-    post(&server, "surgeon", "/api/surgeon/actions", tap).await;
+    server.post("/api/surgeon/actions", tap).await;
     surgeon.watch(20).await;
 
     drop(surgeon);
     operator.until(|told| told["tablet"]["presence"] == "silent" && told["tablet"]["away_seconds"].is_u64()).await;
     // The session may have followed before the sign was sent, so the server is asked, at each status.
-    let view = async || {
-        let answer = server.get_as("operator", "/api/operator/session").send().await.unwrap();
-        answer.json::<Value>().await.unwrap()
-    };
+    let view = async || server.read("/api/operator/session").await;
     while view().await["paused_by"] != "tablet-away" {
         operator.until(|told| told["type"] == "status").await;
     }
@@ -441,9 +429,7 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
     let shown = texts(&view().await);
     assert!(!seen(&shown) && shown.contains(&"Paused: the surgeon’s tablet is away".to_owned()), "{shown:?}");
 
-    let record = format!("/api/researcher/sessions/{}", session.as_str().unwrap());
-    let record = server.get_as("researcher", &record).send().await.unwrap().json::<Value>().await.unwrap();
-    let recorded = texts(&record);
+    let recorded = texts(&server.read(&format!("/api/researcher/sessions/{session}")).await);
     assert!(seen(&recorded), "{recorded:?}");
 }
 
@@ -451,21 +437,18 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
 #[tokio::test]
 async fn two_requests_lead_from_a_running_setting_to_focus_by_hand() {
     let server = Server::seeing();
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let new = json!({"participant": "S-01", "protocol": "practice"});
-    let view = post(&server, "operator", "/api/operator/sessions", new).await;
-    let session = &view["session"];
-    let act = async |body: Value| post(&server, "operator", "/api/operator/actions", body).await;
+    let session = server.prepare("S-01", "practice").await;
+    let act = async |body: Value| server.post("/api/operator/actions", body).await;
     act(json!({"session": session, "action": "start"})).await;
     let focus = async || {
-        let answer = server.post_as("operator", "/api/operator/focus").json(&json!({"focal_power": 0.8})).send().await;
-        answer.unwrap().status().as_u16()
+        let by_hand = json!({"focal_power": 0.8});
+        server.ask("operator", Method::POST, "/api/operator/focus", &by_hand).await.0.as_u16()
     };
     assert_eq!(focus().await, 409);
 
     act(json!({"session": session, "action": "pause"})).await;
     assert_eq!(focus().await, 204);
-    let view = server.get_as("operator", "/api/operator/session").send().await.unwrap().json::<Value>().await.unwrap();
+    let view = server.read("/api/operator/session").await;
     assert_eq!((&view["by_hand"], &view["may_focus_by_hand"]), (&json!(0.8), &json!(true)));
     let event = &view["reason_wanted"]["event"];
     let view = act(json!({"session": session, "action": "give-reason", "event": event, "reason": "bleeding"})).await;

@@ -3,21 +3,12 @@
 use std::fs::File;
 use std::sync::Arc;
 
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use rustix::process::Signal;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::live::Page;
 use crate::support::{PASSPHRASE, Server, client, command};
-
-async fn post(server: &Server, role: &str, what: &str, body: Value) -> Value {
-    let request = client().post(server.url(&format!("/api/{role}/{what}"))).bearer_auth(server.key(role)).json(&body);
-    let answer = request.send().await.unwrap();
-    let status = answer.status();
-    let said = answer.text().await.unwrap();
-    assert!(status.is_success(), "{what} {body}: {status} {said}");
-    serde_json::from_str(&said).unwrap_or_default()
-}
 
 #[tokio::test]
 async fn nothing_personal_and_no_key_stands_in_the_log() {
@@ -38,23 +29,21 @@ async fn nothing_personal_and_no_key_stands_in_the_log() {
         server.get(&format!("/enter?key={key}")).send().await.unwrap();
     }
 
-    post(&server, "operator", "participants", json!({"code": "QX-93"})).await;
-    let made = json!({"participant": "QX-93", "protocol": "practice"});
-    let session = post(&server, "operator", "sessions", made).await["session"].clone();
-    post(&server, "operator", "actions", json!({"session": session, "action": "start"})).await;
+    let session = server.prepare("QX-93", "practice").await;
+    server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
     let mut page = Page::open(&server, "surgeon").await;
     page.watch(2).await;
 
     let key = "00000000-0000-4000-8000-000000000001";
     let text = "the zebrafish swims sideways";
     let comment = json!({"key": key, "session": session, "kind": "text", "text": text});
-    post(&server, "surgeon", "comments", comment).await;
+    server.post("/api/surgeon/comments", comment).await;
     let reason = "the patient Zacharias coughed";
-    post(&server, "operator", "actions", json!({"session": session, "action": "abort", "reason": reason})).await;
+    server.post("/api/operator/actions", json!({"session": session, "action": "abort", "reason": reason})).await;
     // A refused request with the words in its body.
     let unknown = json!({"session": key, "action": "abort", "reason": reason});
-    let request = client().post(server.url("/api/operator/actions")).bearer_auth(server.key("operator"));
-    assert_eq!(request.json(&unknown).send().await.unwrap().status(), StatusCode::NOT_FOUND);
+    let (status, _) = server.ask("operator", Method::POST, "/api/operator/actions", &unknown).await;
+    assert_eq!(status, StatusCode::NOT_FOUND);
     assert!(server.end(Signal::TERM));
 
     let written = std::fs::read_to_string(&log).unwrap();

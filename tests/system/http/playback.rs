@@ -10,11 +10,10 @@ use parfocal_imaging::{Developer, GrayImage, RgbImage, Size};
 use parfocal_recording::{Recording, ViewRecording};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{AssertSqlSafe, ConnectOptions, Connection};
+use sqlx::AssertSqlSafe;
 
 use super::recordings::{abort, begin, recordings, start, until};
-use crate::support::Server;
+use crate::support::{Server, parfocal};
 
 /// A recorded session by `protocol` that has ended. Returns its id.
 async fn recorded(server: &Server, protocol: &str) -> String {
@@ -51,10 +50,9 @@ async fn unblind(server: &Server, session: &str) {
 
 /// The number in the only row that `sql` selects from the server's database.
 async fn number(server: &Server, sql: &str) -> i64 {
-    let file = server.data.path().join("parfocal.db");
-    let mut database = SqliteConnectOptions::new().filename(file).read_only(true).connect().await.unwrap();
-    let number = sqlx::query_scalar(AssertSqlSafe(sql.to_owned())).fetch_one(&mut database).await.unwrap();
-    database.close().await.unwrap();
+    let pool = server.database().await;
+    let number = sqlx::query_scalar(AssertSqlSafe(sql.to_owned())).fetch_one(&pool).await.unwrap();
+    pool.close().await;
     number
 }
 
@@ -215,12 +213,11 @@ async fn a_session_that_asks_for_no_recording_has_nothing_to_play() {
 
 /// Exports `session`, checks the export with `parfocal verify`, and returns the rows of its `recordings.csv`.
 fn exported(server: &Server, session: &str, out: &Path) -> Vec<BTreeMap<String, String>> {
-    let parfocal = || Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    let data = server.data.path();
-    let exported = parfocal().args(["export", session, "--out"]).arg(out).arg("--data-dir").arg(data).output().unwrap();
-    assert!(exported.status.success(), "{}", String::from_utf8_lossy(&exported.stderr));
-    let verified = parfocal().arg("verify").arg(out).output().unwrap();
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let export = ["export", session, "--out", out.to_str().unwrap(), "--data-dir"];
+    let (exported, said) = parfocal(&export, server.data.path());
+    assert!(exported, "{said}");
+    let (verified, said) = parfocal(&["verify"], out);
+    assert!(verified, "{said}");
 
     let mut table = csv::Reader::from_path(out.join("recordings.csv")).unwrap();
     table.deserialize().map(Result::unwrap).collect()
@@ -252,6 +249,5 @@ async fn an_export_names_the_recordings_and_a_broken_one_keeps_nobody_from_expor
     let table = out.path().join("blinded/recordings.csv");
     let text = std::fs::read_to_string(&table).unwrap();
     std::fs::write(&table, text.replace(",stopped,", ",lost,")).unwrap();
-    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(out.path().join("blinded")).output();
-    assert!(!verified.unwrap().status.success());
+    assert!(!parfocal(&["verify"], &out.path().join("blinded")).0);
 }

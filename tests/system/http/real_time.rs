@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use serde_json::json;
 
 use super::live::Page;
-use crate::support::{Server, client, command};
+use crate::support::{Server, command};
 
 const OTHER: u32 = 0;
 const FIFO: u32 = 1;
@@ -25,9 +25,7 @@ async fn server(refused: bool) -> Server {
     let usual = command(data.path(), &["--bind", "127.0.0.1:0", "--lens", "emulated"]);
     let command = if refused { without_rights(&usual) } else { usual };
     let server = Server::run(data, command);
-    let policy = json!({ "policy": "mgm-hill-climber" });
-    let request = client().post(server.url("/api/operator/focus")).bearer_auth(server.key("operator")).json(&policy);
-    assert!(request.send().await.unwrap().status().is_success());
+    server.post("/api/operator/focus", json!({ "policy": "mgm-hill-climber" })).await;
     server
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_recording::{Ended, Recording, ViewRecording, ViewRow};
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use rustix::process::Signal;
 use serde_json::{Value, json};
 
@@ -23,9 +23,8 @@ pub fn start(data: Arc<tempfile::TempDir>) -> Server {
 }
 
 pub async fn post(server: &Server, path: &str, body: Value) -> (StatusCode, Value) {
-    let answer = server.post_as("operator", path).json(&body).send().await.unwrap();
-    let status = answer.status();
-    (status, serde_json::from_str(&answer.text().await.unwrap()).unwrap_or_default())
+    let (status, said) = server.ask("operator", Method::POST, path, &body).await;
+    (status, serde_json::from_str(&said).unwrap_or_default())
 }
 
 pub async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
@@ -36,7 +35,7 @@ pub async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
 pub async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
     let limit = SystemClock.now() + Duration::from_mins(1);
     loop {
-        let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
+        let status = server.read(PATH).await;
         if wanted(&status) {
             return status;
         }
@@ -47,18 +46,14 @@ pub async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
 
 /// Makes and starts a session by `protocol`. Returns its id.
 pub async fn begin(server: &Server, protocol: &str) -> String {
-    post(server, "/api/operator/participants", json!({"code": "S-05"})).await;
-    let (_, made) = post(server, "/api/operator/sessions", json!({"participant": "S-05", "protocol": protocol})).await;
-    let session = made["session"].as_str().unwrap().to_owned();
-    let (status, said) = post(server, "/api/operator/actions", json!({"session": session, "action": "start"})).await;
-    assert_eq!(status, StatusCode::OK, "{said}");
+    let session = server.prepare("S-05", protocol).await;
+    server.post("/api/operator/actions", json!({"session": session, "action": "start"})).await;
     session
 }
 
 pub async fn abort(server: &Server, session: &str) {
     let action = json!({"session": session, "action": "abort", "reason": "the test is over"});
-    let (status, said) = post(server, "/api/operator/actions", action).await;
-    assert_eq!(status, StatusCode::OK, "{said}");
+    server.post("/api/operator/actions", action).await;
 }
 
 pub fn recordings(server: &Server) -> PathBuf {
@@ -268,11 +263,11 @@ async fn the_operator_may_stop_a_protocols_recording_and_the_session_continues()
     assert_eq!(said["notice_warns"], false, "it ended as it was meant to: {said}");
 
     // Recording is checked every second: by now a recording that starts again would have started.
-    let view: Value = server.get_as("operator", "/api/operator/session").send().await.unwrap().json().await.unwrap();
+    let view = server.read("/api/operator/session").await;
     assert_eq!((&view["phase"], &view["session"]), (&"notice".into(), &session.clone().into()));
     let acknowledge = json!({"session": session, "action": "acknowledge", "segment": view["segment"]});
-    let told = server.post_as("surgeon", "/api/surgeon/actions").json(&acknowledge).send().await.unwrap();
-    assert!(told.status().is_success(), "the trial goes on");
+    // The trial goes on.
+    server.post("/api/surgeon/actions", acknowledge).await;
     abort(&server, &session).await;
     until(&server, |status| status["recording"].is_null() && status["seconds_left"].is_number()).await;
 
@@ -296,9 +291,8 @@ async fn on_a_nearly_full_disk_recording_stops_by_itself_and_the_trial_continues
 
     let comment =
         json!({"key": "00000000-0000-4000-8000-000000000001", "session": session, "kind": "text", "text": "sharp"});
-    let kept = server.post_as("surgeon", "/api/surgeon/comments").json(&comment).send().await.unwrap();
-    assert_eq!(kept.status(), StatusCode::NO_CONTENT);
-    let view: Value = server.get_as("operator", "/api/operator/session").send().await.unwrap().json().await.unwrap();
+    server.post("/api/surgeon/comments", comment).await;
+    let view = server.read("/api/operator/session").await;
     assert_eq!(view["phase"], "notice");
 }
 
@@ -310,7 +304,7 @@ async fn a_camera_of_colour_pictures_cannot_be_recorded() {
     let camera = format!("footage:{}", still.display());
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--camera", &camera]);
 
-    let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
+    let status = server.read(PATH).await;
     assert!(status["unavailable"].as_str().unwrap().contains("colour pictures"));
     let (refused, said) = order(&server, true).await;
     assert_eq!(refused, StatusCode::CONFLICT, "{said}");

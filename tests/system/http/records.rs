@@ -1,17 +1,16 @@
 //! Corrections, consents, withdrawals and erasures over HTTP: who may make them, and what is refused with which
 //! message.
 
+use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::support::Server;
 
 /// Posts `body` as `role`. Returns the status, and the error message if it is refused.
 async fn post(server: &Server, role: &str, path: &str, body: &Value) -> (u16, String) {
-    let answer = server.post_as(role, path).json(body).send().await.unwrap();
-    let status = answer.status().as_u16();
-    let text = answer.text().await.unwrap();
+    let (status, text) = server.ask(role, Method::POST, path, body).await;
     let said = serde_json::from_str::<Value>(&text).unwrap_or_default();
-    (status, said["error"].as_str().unwrap_or_default().to_owned())
+    (status.as_u16(), said["error"].as_str().unwrap_or_default().to_owned())
 }
 
 /// Text of the session's second comment.
@@ -20,18 +19,14 @@ const OTHER: &str = "the edge of the liver is sharp";
 /// A session that was aborted after two comments. Returns its id and the first comment's key.
 async fn a_session(server: &Server) -> (String, &'static str) {
     const KEY: &str = "00000000-0000-4000-8000-000000000001";
-    post(server, "operator", "/api/operator/participants", &json!({"code": "S-05"})).await;
-    let new = json!({"participant": "S-05", "protocol": "practice"});
-    let made = server.post_as("operator", "/api/operator/sessions").json(&new).send().await.unwrap();
-    let made: Value = made.json().await.unwrap();
-    let session = made["session"].as_str().unwrap().to_owned();
+    let session = server.prepare("S-05", "practice").await;
     let comment = json!({"key": KEY, "session": session, "kind": "text", "text": "Mustermann"});
-    assert_eq!(post(server, "surgeon", "/api/surgeon/comments", &comment).await.0, 204);
+    server.post("/api/surgeon/comments", comment).await;
     let other =
         json!({"key": "00000000-0000-4000-8000-000000000002", "session": session, "kind": "text", "text": OTHER});
-    assert_eq!(post(server, "surgeon", "/api/surgeon/comments", &other).await.0, 204);
+    server.post("/api/surgeon/comments", other).await;
     let abort = json!({"session": session, "action": "abort", "reason": "enough"});
-    assert_eq!(post(server, "operator", "/api/operator/actions", &abort).await.0, 200);
+    server.post("/api/operator/actions", abort).await;
     (session, KEY)
 }
 

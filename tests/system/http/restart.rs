@@ -4,18 +4,16 @@ use std::sync::Arc;
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{ConnectOptions, Connection};
 
 use super::live::Page;
-use crate::support::{Server, client};
+use crate::support::Server;
 
 /// A step of the loop in the telemetry: run, policy, requested focal power.
 type Step = (i64, Option<String>, f64);
 
 struct Stage {
     server: Server,
-    session: Value,
+    session: String,
 }
 
 impl Stage {
@@ -24,34 +22,20 @@ impl Stage {
         Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "20", "--protocols", protocols])
     }
 
-    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
-        let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
-        let answer = request.json(&body).send().await.unwrap();
-        let status = answer.status();
-        let said = answer.text().await.unwrap();
-        assert!(status.is_success(), "{what} {body}: {status} {said}");
-        serde_json::from_str(&said).unwrap_or_default()
-    }
-
     async fn act(&self, role: &str, action: &str) -> Value {
-        let request = client().get(self.server.url("/api/surgeon/session")).bearer_auth(self.server.key("surgeon"));
-        let segment = request.send().await.unwrap().json::<Value>().await.unwrap()["segment"].clone();
-        self.post(role, "actions", json!({"session": self.session, "action": action, "segment": segment})).await
-    }
-
-    async fn database(&self) -> SqliteConnection {
-        let file = self.server.data.path().join("parfocal.db");
-        SqliteConnectOptions::new().filename(file).read_only(true).connect().await.unwrap()
+        let segment = self.server.read("/api/surgeon/session").await["segment"].clone();
+        let action = json!({"session": self.session, "action": action, "segment": segment});
+        self.server.post(&format!("/api/{role}/actions"), action).await
     }
 
     /// The steps in setting `setting` so far, oldest first.
     async fn steps(&self, setting: i64) -> Vec<Step> {
-        let mut database = self.database().await;
+        let pool = self.server.database().await;
         let sql = "SELECT run, name, asked FROM telemetry JOIN segments ON segments.number = telemetry.segment
                    LEFT JOIN policies ON policies.number = telemetry.policy
                    WHERE setting = ? ORDER BY telemetry.number";
-        let steps = sqlx::query_as(sql).bind(setting).fetch_all(&mut database).await.unwrap();
-        database.close().await.unwrap();
+        let steps = sqlx::query_as(sql).bind(setting).fetch_all(&pool).await.unwrap();
+        pool.close().await;
         steps
     }
 
@@ -71,10 +55,9 @@ impl Stage {
 #[tokio::test]
 async fn a_setting_continues_at_the_focal_power_last_commanded_in_it() {
     let data = Arc::new(tempfile::tempdir().unwrap());
-    let mut stage = Stage { server: Stage::start(data), session: Value::Null };
-    stage.post("operator", "participants", json!({"code": "S-05"})).await;
-    let made = stage.post("operator", "sessions", json!({"participant": "S-05", "protocol": "places"})).await;
-    stage.session = made["session"].clone();
+    let server = Stage::start(data);
+    let session = server.prepare("S-05", "places").await;
+    let mut stage = Stage { server, session };
     stage.act("operator", "start").await;
 
     let mut run = 1;

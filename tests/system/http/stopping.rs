@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use parfocal_base::clock::SystemClock;
 use parfocal_devices::lens::emulator::{Emulator, Model};
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use rustix::process::Signal;
 use serde_json::{Value, json};
+use sqlx::ConnectOptions;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{ConnectOptions, Connection};
 
 use super::live::Page;
+use crate::support::Server;
 use crate::support::disk::SmallDisk;
-use crate::support::{Server, client};
 
 /// Something that keeps the server from writing.
 enum Trouble {
@@ -66,7 +66,7 @@ struct Stage {
     server: Server,
     emulator: Emulator,
     page: Page,
-    session: Value,
+    session: String,
     comments: AtomicU32,
 }
 
@@ -75,43 +75,28 @@ impl Stage {
         let emulator = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
         let server = start(data, &emulator);
         let page = Page::open(&server, "operator").await;
-        let mut stage = Self { server, emulator, page, session: Value::Null, comments: AtomicU32::new(1) };
-        stage.post("operator", "participants", json!({"code": "S-05"})).await;
-        let made = stage.post("operator", "sessions", json!({"participant": "S-05", "protocol": "moving"})).await;
-        stage.session = made["session"].clone();
+        let session = server.prepare("S-05", "moving").await;
+        let stage = Self { server, emulator, page, session, comments: AtomicU32::new(1) };
         stage.act("operator", json!({"action": "start"})).await;
         stage
     }
 
-    async fn ask(&self, role: &str, what: &str, body: &Value) -> (StatusCode, String) {
-        let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
-        let answer = request.json(body).send().await.unwrap();
-        (answer.status(), answer.text().await.unwrap())
-    }
-
-    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
-        let (status, said) = self.ask(role, what, &body).await;
-        assert!(status.is_success(), "{what} {body}: {status} {said}");
-        serde_json::from_str(&said).unwrap_or_default()
-    }
-
     async fn act(&self, role: &str, mut action: Value) -> Value {
-        action["session"] = self.session.clone();
+        action["session"] = self.session.clone().into();
         if action["segment"].is_null() {
             action["segment"] = self.view().await["segment"].clone();
         }
-        self.post(role, "actions", action).await
+        self.server.post(&format!("/api/{role}/actions"), action).await
     }
 
     async fn view(&self) -> Value {
-        let request = client().get(self.server.url("/api/operator/session")).bearer_auth(self.server.key("operator"));
-        request.send().await.unwrap().json().await.unwrap()
+        self.server.read("/api/operator/session").await
     }
 
     async fn comment(&self, text: &str) -> StatusCode {
         let key = uuid::Uuid::from_u128(self.comments.fetch_add(1, Ordering::Relaxed).into());
         let comment = json!({"key": key, "session": self.session, "kind": "text", "text": text});
-        self.ask("surgeon", "comments", &comment).await.0
+        self.server.ask("surgeon", Method::POST, "/api/surgeon/comments", &comment).await.0
     }
 
     /// The surgeon taps the notice; waits until the policy drives the lens.
@@ -157,11 +142,10 @@ impl Stage {
     }
 
     async fn events(&self) -> Vec<(i64, String, String, Value)> {
-        let options = SqliteConnectOptions::new().filename(self.server.data.path().join("parfocal.db")).read_only(true);
-        let mut database = options.connect().await.unwrap();
+        let pool = self.server.database().await;
         let sql = "SELECT number, kind, role, payload FROM events ORDER BY number";
-        let events: Vec<(i64, String, String, String)> = sqlx::query_as(sql).fetch_all(&mut database).await.unwrap();
-        database.close().await.unwrap();
+        let events: Vec<(i64, String, String, String)> = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
+        pool.close().await;
         let whole = |(number, kind, role, payload): (_, _, _, String)| {
             (number, kind, role, serde_json::from_str(&payload).unwrap())
         };
@@ -214,9 +198,9 @@ async fn every_way_to_stop(mut stage: Stage, mut trouble: Trouble) {
     assert_eq!(view["phase"], "aborted");
     stage.rests().await;
     // The operator closes the session and moves the lens by hand.
-    stage.post("operator", "dismissals", json!({"session": stage.session})).await;
+    stage.server.post("/api/operator/dismissals", json!({"session": stage.session})).await;
     let before = stage.commanded();
-    stage.post("operator", "focus", json!({"focal_power": 0.9})).await;
+    stage.server.post("/api/operator/focus", json!({"focal_power": 0.9})).await;
     while stage.commanded() == before {
         stage.page.watch(1).await;
     }

@@ -1,18 +1,16 @@
 //! Studies on a real server: over HTTP, by the command line, and what operator and surgeon receive during a session.
 
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 
 use reqwest::{Method, StatusCode};
 use rustix::process::Signal;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
 use super::live::{Heard, Page};
-use crate::support::{PASSPHRASE, Server, client};
+use crate::support::{PASSPHRASE, Server, parfocal};
 
 const PROTOCOL: &str = include_str!("pair.toml");
 
@@ -55,21 +53,8 @@ pub fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
     Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", protocols.to_str().unwrap()])
 }
 
-/// Sends a request. Returns the status and the body.
-pub async fn ask(server: &Server, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
-    let request = client().request(method, server.url(path)).bearer_auth(server.key(role)).json(body);
-    let response = request.send().await.unwrap();
-    (response.status(), response.text().await.unwrap())
-}
-
-pub async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
-    let (status, said) = ask(server, role, Method::POST, path, &body).await;
-    assert!(status.is_success(), "{path} {body}: {status} {said}");
-    serde_json::from_str(&said).unwrap_or_default()
-}
-
 pub async fn refused(server: &Server, role: &str, path: &str, body: Value) -> (u16, String) {
-    let (status, said) = ask(server, role, Method::POST, path, &body).await;
+    let (status, said) = server.ask(role, Method::POST, path, &body).await;
     assert!(!status.is_success(), "{path} {body}: {said}");
     (status.as_u16(), said)
 }
@@ -84,8 +69,7 @@ pub async fn sign_in_as_lead(server: &mut Server) {
 
 /// The tablet opens the link to the session under way, which belongs to a study.
 pub async fn take_session_link(server: &mut Server) {
-    let (_, said) = ask(server, "operator", Method::GET, "/api/operator/surgeon-link", &Value::Null).await;
-    let link: Value = serde_json::from_str(&said).unwrap();
+    let link = server.read("/api/operator/surgeon-link").await;
     let (_, key) = link["link"].as_str().unwrap().split_once("key=").unwrap();
     server.use_key("surgeon", key);
 }
@@ -93,9 +77,9 @@ pub async fn take_session_link(server: &mut Server) {
 /// Plans and opens the study.
 pub async fn open(server: &Server) -> Value {
     let plan = json!({"definition": definition(), "reason": "ethics approved it"});
-    post(server, "researcher", "/api/researcher/studies", plan).await;
+    server.post("/api/researcher/studies", plan).await;
     let opening = json!({"change": "open", "despite_concerns": true, "reason": "the first surgeon comes"});
-    post(server, "researcher", "/api/researcher/studies/scope-2026/changes", opening).await
+    server.post("/api/researcher/studies/scope-2026/changes", opening).await
 }
 
 pub fn new_session(participant: &str) -> Value {
@@ -104,12 +88,12 @@ pub fn new_session(participant: &str) -> Value {
 }
 
 pub async fn act(server: &Server, role: &str, action: Value) {
-    post(server, role, &format!("/api/{role}/actions"), action).await;
+    server.post(&format!("/api/{role}/actions"), action).await;
 }
 
 /// The session under way as the surgeon sees it; also adds the answer to `heard`.
 async fn view(server: &Server, heard: &mut Vec<String>) -> Value {
-    let (_, said) = ask(server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
+    let (_, said) = server.look("surgeon", "/api/surgeon/session").await;
     let view = serde_json::from_str(&said).unwrap();
     heard.push(said);
     view
@@ -117,8 +101,7 @@ async fn view(server: &Server, heard: &mut Vec<String>) -> Value {
 
 /// The secrets of the orders in the database: seeds, and policies in the order in which they run.
 async fn secrets(server: &Server) -> Vec<String> {
-    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
-    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let pool = server.database().await;
     let sql = "SELECT seed FROM study_seeds UNION SELECT seed FROM sessions
                UNION SELECT group_concat(policy, ',') FROM segments GROUP BY session";
     let found: Vec<String> = sqlx::query_scalar(sql).fetch_all(&pool).await.unwrap();
@@ -135,8 +118,8 @@ async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
     let mut surgeon = Vec::new();
     let mut others = Vec::new();
 
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let (status, made) = ask(&server, "operator", Method::POST, "/api/operator/sessions", &new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let (status, made) = server.ask("operator", Method::POST, "/api/operator/sessions", &new_session("S-01")).await;
     assert_eq!(status, StatusCode::OK, "{made}");
     others.push(made);
     take_session_link(&mut server).await;
@@ -165,7 +148,7 @@ async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
             ("researcher", "/api/researcher/studies/scope-2026"),
             ("researcher", "/api/researcher/sessions"),
         ] {
-            let (status, said) = ask(&server, role, Method::GET, path, &Value::Null).await;
+            let (status, said) = server.look(role, path).await;
             assert_eq!(status, StatusCode::OK, "{path}");
             if role == "surgeon" { surgeon.push(said) } else { others.push(said) }
         }
@@ -221,34 +204,29 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     let hash = hex::encode(Sha256::digest(definition()));
     assert!(line.starts_with(&format!("parfocal study scope-2026 definition {hash} orders ")), "{line}");
     assert_eq!(refused(&server, "researcher", changes, signed("open")).await.0, 409);
-    let (_, page) = ask(&server, "researcher", Method::GET, "/researcher/studies/scope-2026", &Value::Null).await;
+    let (_, page) = server.look("researcher", "/researcher/studies/scope-2026").await;
     assert!(page.contains(&line), "the line stands on the page");
 
     // The operator can choose the study while it is open.
-    let choices = async || {
-        let (_, said) = ask(&server, "operator", Method::GET, "/api/operator/choices", &Value::Null).await;
-        serde_json::from_str::<Value>(&said).unwrap()["studies"].clone()
-    };
+    let choices = async || server.read("/api/operator/choices").await["studies"].clone();
     assert_eq!(choices().await[0]["sites"], json!(["leeds"]));
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-01")).await;
     let session = made["session"].clone();
-    post(&server, "researcher", changes, signed("close")).await;
+    server.post(changes, signed("close")).await;
     assert_eq!(choices().await, json!([]));
     assert_eq!(refused(&server, "researcher", changes, signed("lock")).await.0, 409);
 
     act(&server, "operator", json!({"session": session, "action": "abort", "reason": "a trial run"})).await;
-    post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    server.post("/api/operator/dismissals", json!({"session": session})).await;
     let (status, said) = refused(&server, "researcher", changes, signed("lock")).await;
     assert!(status == 409 && said.contains("despite_outstanding"), "{said}");
     let mut lock = signed("lock");
     lock["despite_outstanding"] = true.into();
-    let page = async || {
-        let path = format!("/researcher/sessions/{}", session.as_str().unwrap());
-        ask(&server, "researcher", Method::GET, &path, &Value::Null).await.1
-    };
+    let page =
+        async || server.look("researcher", &format!("/researcher/sessions/{}", session.as_str().unwrap())).await.1;
     assert!(page().await.contains("correct-answer"));
-    post(&server, "researcher", changes, lock).await;
+    server.post(changes, lock).await;
     let locked = page().await;
     assert!(locked.contains("The study is locked") && !locked.contains("correct-answer"), "{locked}");
     assert_eq!(refused(&server, "researcher", changes, signed("unblind")).await.0, 403);
@@ -258,21 +236,17 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     let token = server.sign_in("statistician").await;
     server.use_key("researcher", &token);
     let unblind = json!({"change": "unblind", "passphrase": PASSPHRASE, "reason": "the data are locked"});
-    let study = post(&server, "researcher", changes, unblind).await;
+    let study = server.post(changes, unblind).await;
     assert_eq!(study["stage"], "unblinded");
     let path = format!("/api/researcher/sessions/{}", session.as_str().unwrap());
-    let (_, detail) = ask(&server, "researcher", Method::GET, &path, &Value::Null).await;
-    let detail: Value = serde_json::from_str(&detail).unwrap();
+    let detail = server.read(&path).await;
     assert_eq!((detail["study"].as_str(), detail["emergency"].as_bool()), (Some("scope-2026"), Some(false)));
     assert_eq!(detail["unblinding"]["policies"].as_array().unwrap().len(), 2);
 }
 
 /// Runs `parfocal study` with `arguments` on `data`. Returns whether it succeeded, and its output.
 fn study(arguments: &[&str], data: &Path) -> (bool, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    let output = command.arg("study").args(arguments).arg("--data-dir").arg(data).output().unwrap();
-    let said = [output.stdout, output.stderr].concat();
-    (output.status.success(), String::from_utf8(said).unwrap())
+    parfocal(&[&["study"], arguments, &["--data-dir"]].concat(), data)
 }
 
 #[tokio::test]
@@ -320,8 +294,8 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     let mut server = on(Arc::clone(&data), none.path());
     let token = server.sign_in("lead").await;
     server.use_key("operator", &token);
-    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
-    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    server.post("/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = server.post("/api/operator/sessions", new_session("S-01")).await;
     assert_eq!(made["title"], "Comparison of two focus settings");
     let session = made["session"].clone();
     act(&server, "operator", json!({"session": session, "action": "abort", "reason": "over"})).await;
@@ -339,11 +313,9 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     let (done, said) = study(&[&["lock", "scope-2026", "--despite-outstanding"][..], &signature].concat(), data.path());
     assert!(done && said.starts_with("scope-2026: locked"), "{said}");
 
-    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(data.path()).output().unwrap();
-    let said = String::from_utf8(verified.stdout).unwrap();
+    let (verified, said) = parfocal(&["verify"], data.path());
     assert!(
-        verified.status.success()
-            && said.contains("studies as planned: 1; sessions with the next place and its order: 1"),
+        verified && said.contains("studies as planned: 1; sessions with the next place and its order: 1"),
         "{said}"
     );
 }

@@ -2,26 +2,22 @@
 
 use std::io::Cursor;
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
-use super::studies::{act, ask, new_session, on, open, post, protocols, refused, server, sign_in_as_lead};
-use crate::support::Server;
+use super::studies::{act, new_session, on, open, protocols, refused, server, sign_in_as_lead};
 use crate::support::disk::SmallDisk;
+use crate::support::{Server, database, parfocal};
 
 const EXPORT: &str = "/api/researcher/studies/scope-2026/export";
 const ZIP: &str = "/api/researcher/studies/scope-2026/export.zip";
 
 async fn state(server: &Server) -> Value {
-    let (status, said) = ask(server, "researcher", Method::GET, EXPORT, &Value::Null).await;
-    assert_eq!(status, StatusCode::OK, "{said}");
-    serde_json::from_str(&said).unwrap()
+    server.read(EXPORT).await
 }
 
 /// Waits until the export is no longer being made. Returns its state.
@@ -38,17 +34,16 @@ async fn ended(server: &Server) -> Value {
 
 /// Makes, aborts and closes a session of `participant` in the study.
 async fn a_session(server: &Server, participant: &str) {
-    post(server, "operator", "/api/operator/participants", json!({"code": participant})).await;
-    let made = post(server, "operator", "/api/operator/sessions", new_session(participant)).await;
+    server.post("/api/operator/participants", json!({"code": participant})).await;
+    let made = server.post("/api/operator/sessions", new_session(participant)).await;
     let session = made["session"].clone();
     act(server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
-    post(server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    server.post("/api/operator/dismissals", json!({"session": session})).await;
 }
 
 /// The session exports in the chain, each with the account that requested it.
 async fn recorded(data: &Path) -> Vec<(String, String)> {
-    let file = SqliteConnectOptions::new().filename(data.join("parfocal.db")).read_only(true);
-    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let pool = database(data).await;
     let sql = "SELECT detail, account FROM accesses JOIN actors ON actors.record = accesses.number
                WHERE accesses.kind = 'exported' AND actors.kind = 'access' ORDER BY accesses.number";
     let found = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
@@ -68,7 +63,7 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
 
     // A role's link is not enough.
     assert_eq!(refused(&server, "researcher", EXPORT, json!({})).await.0, 403);
-    assert_eq!(ask(&server, "researcher", Method::GET, EXPORT, &Value::Null).await.0, StatusCode::FORBIDDEN);
+    assert_eq!(server.look("researcher", EXPORT).await.0, StatusCode::FORBIDDEN);
 
     sign_in_as_lead(&mut server).await;
     assert_eq!(refused(&server, "researcher", EXPORT, json!({})).await.0, 404);
@@ -79,13 +74,13 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     a_session(&server, "S-02").await;
     let (status, said) = refused(&server, "researcher", EXPORT, json!({"unblinded": true})).await;
     assert!(status == 409 && said.contains("is not unblinded"), "{said}");
-    let (status, said) = ask(&server, "researcher", Method::GET, ZIP, &Value::Null).await;
+    let (status, said) = server.look("researcher", ZIP).await;
     assert!(status == StatusCode::NOT_FOUND && said.contains("Start one on the study's page"), "{said}");
     assert_eq!(state(&server).await, json!({"state": "none"}));
 
     // If it cannot be written, it fails with a reason, is not recorded, and can be tried again.
     std::fs::write(&exports, "").unwrap();
-    assert_eq!(post(&server, "researcher", EXPORT, json!({})).await["state"], "running");
+    assert_eq!(server.post(EXPORT, json!({})).await["state"], "running");
     let failed = ended(&server).await;
     assert!(failed["state"] == "failed" && failed["reason"].as_str().unwrap().contains("study-exports"), "{failed}");
     std::fs::remove_file(&exports).unwrap();
@@ -94,7 +89,7 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     server.add_account("monitor", "monitor", "Ms Monitor");
     let token = server.sign_in("monitor").await;
     server.use_key("researcher", &token);
-    let started = post(&server, "researcher", EXPORT, json!({"unblinded": false})).await;
+    let started = server.post(EXPORT, json!({"unblinded": false})).await;
     assert_eq!(started["state"], "running");
     assert_eq!(ended(&server).await, json!({"state": "ready", "unblinded": false, "sessions": 2}));
     let asked = ("blinded".to_owned(), "monitor".to_owned());
@@ -107,8 +102,8 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     zip::ZipArchive::new(Cursor::new(zip)).unwrap().extract(unpacked.path()).unwrap();
     let package = unpacked.path().join("parfocal-scope-2026");
     assert_eq!(in_folder(&package.join("sessions")), 2);
-    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(&package).output().unwrap();
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let (verified, said) = parfocal(&["verify"], &package);
+    assert!(verified, "{said}");
 
     // Only the finished package is kept, and only as long as the server runs.
     assert_eq!(in_folder(&exports), 1);
@@ -130,12 +125,12 @@ async fn an_export_leaves_room_for_the_trial() {
 
     // A twentieth of a small disk stays free, which is 2 MB here.
     disk.fill_but(1_500_000);
-    post(&server, "researcher", EXPORT, json!({})).await;
+    server.post(EXPORT, json!({})).await;
     let failed = ended(&server).await;
     assert!(failed["reason"].as_str().unwrap().contains("has no room for the export"), "{failed}");
     assert_eq!(in_folder(&disk.folder.path().join("study-exports")), 0, "nothing is left of it");
 
     disk.empty();
-    post(&server, "researcher", EXPORT, json!({})).await;
+    server.post(EXPORT, json!({})).await;
     assert_eq!(ended(&server).await["state"], "ready");
 }

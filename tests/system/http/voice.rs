@@ -16,22 +16,6 @@ fn server() -> Server {
     Server::within_by(Some(Path::new(protocols)))
 }
 
-async fn post(server: &Server, role: &str, path: &str, body: &Value) -> Value {
-    let answer = server.post_as(role, path).json(body).send().await.unwrap();
-    let status = answer.status();
-    let said = answer.text().await.unwrap();
-    assert!(status.is_success(), "{path} {body}: {status} {said}");
-    serde_json::from_str(&said).unwrap_or_default()
-}
-
-/// Makes a session by `protocol`, which is not started. Returns its id.
-async fn a_session(server: &Server, participant: &str, protocol: &str) -> String {
-    post(server, "operator", "/api/operator/participants", &json!({"code": participant})).await;
-    let new = json!({"participant": participant, "protocol": protocol});
-    let made = post(server, "operator", "/api/operator/sessions", &new).await;
-    made["session"].as_str().unwrap().to_owned()
-}
-
 /// Sends a piece. Returns the status, and the error message if it is refused.
 async fn send(server: &Server, role: &str, query: &str, media_type: &str, audio: Vec<u8>) -> (u16, String) {
     let path = format!("/api/surgeon/voice/{COMMENT}/{query}");
@@ -44,13 +28,13 @@ async fn send(server: &Server, role: &str, query: &str, media_type: &str, audio:
 #[tokio::test]
 async fn a_recording_comes_in_pieces_from_a_tablet_and_is_played_in_parts_to_the_researcher() {
     let server = server();
-    let session = a_session(&server, "S-05", "spoken").await;
+    let session = server.prepare("S-05", "spoken").await;
     let first = format!("1?session={session}&through_ms=1000");
     let (status, said) = send(&server, "surgeon", &first, OPUS, b"0123456789".to_vec()).await;
     assert!(status == 404 && said.contains("send the comment first"), "{status} {said}");
 
     let comment = json!({"key": COMMENT, "session": session, "kind": "voice"});
-    post(&server, "surgeon", "/api/surgeon/comments", &comment).await;
+    server.post("/api/surgeon/comments", comment).await;
     for _ in 0..2 {
         assert_eq!(send(&server, "surgeon", &first, OPUS, b"0123456789".to_vec()).await, (204, String::new()));
     }
@@ -116,9 +100,9 @@ async fn a_recording_of_either_format_tells_its_player_how_long_it_is() {
         };
 
         let server = server();
-        let session = a_session(&server, "S-05", "spoken").await;
+        let session = server.prepare("S-05", "spoken").await;
         let comment = json!({"key": COMMENT, "session": session, "kind": "voice"});
-        post(&server, "surgeon", "/api/surgeon/comments", &comment).await;
+        server.post("/api/surgeon/comments", comment).await;
         let half = sound.len() / 2;
         let first = format!("1?session={session}&through_ms=1700");
         assert_eq!(send(&server, "surgeon", &first, media_type, sound[..half].to_vec()).await.0, 204);
@@ -145,12 +129,12 @@ async fn only_the_pages_that_need_it_may_use_the_microphone_or_play_sound() {
     };
 
     assert!(!headers("surgeon", "/surgeon").await.0, "no session");
-    let silent = a_session(&server, "S-05", "practice").await;
+    let silent = server.prepare("S-05", "practice").await;
     assert!(!headers("surgeon", "/surgeon").await.0, "a session without voice");
     let abort = json!({"session": silent, "action": "abort", "reason": "enough"});
-    post(&server, "operator", "/api/operator/actions", &abort).await;
+    server.post("/api/operator/actions", abort).await;
 
-    let session = a_session(&server, "S-06", "spoken").await;
+    let session = server.prepare("S-06", "spoken").await;
     let (microphone, policy) = headers("surgeon", "/surgeon").await;
     assert!(microphone && !policy.contains("media-src"), "{policy}");
     assert!(!headers("operator", "/operator").await.0);

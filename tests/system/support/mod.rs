@@ -9,6 +9,7 @@ pub mod fake_camera;
 #[allow(dead_code, reason = "the trial's tests use more of it")]
 mod fixture;
 mod in_process;
+mod requests;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr};
@@ -24,6 +25,7 @@ use tempfile::TempDir;
 use tokio::runtime::Builder;
 
 use self::in_process::{InProcess, on_a_thread};
+pub use self::requests::database;
 use crate::browser::screenshots::are_wanted as screenshots_are_wanted;
 
 /// A running server; ends when dropped, if it is a process by a kill.
@@ -252,6 +254,13 @@ pub fn refusal(mut command: Command) -> (Option<i32>, String) {
     let mut said = String::new();
     process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     (process.wait().unwrap().code(), said)
+}
+
+/// Runs `parfocal` with `arguments` and `path`. Returns whether it succeeded, and its output.
+pub fn parfocal(arguments: &[&str], path: &Path) -> (bool, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).arg(path).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.success(), String::from_utf8(said).unwrap())
 }
 
 /// A cheap cost of passphrases' hashes, because most tests sign in to test something else. A hash says what it cost, so
