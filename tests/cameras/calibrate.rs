@@ -2,23 +2,8 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn parfocal(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
-}
-
-fn done(arguments: &[&str]) -> String {
-    let output = parfocal(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn refused(arguments: &[&str]) -> String {
-    let output = parfocal(arguments);
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
-    String::from_utf8(output.stderr).unwrap()
-}
+use super::program::{done, refused};
 
 fn capture<'a>(which: &'a str, camera: &'a str, out: &'a Path) -> [&'a str; 8] {
     ["calibrate", which, "--camera", camera, "--frames", "4", "--out", out.to_str().unwrap()]

@@ -1,6 +1,8 @@
 //! Cameras from outside: what the simulated ones show, what they claim to know, and how they report bad sources.
 
 mod calibrate;
+#[path = "../shared/program.rs"]
+mod program;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

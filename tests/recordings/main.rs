@@ -2,6 +2,8 @@
 //! own libraries.
 
 mod damage;
+#[path = "../shared/program.rs"]
+mod program;
 mod spectrum;
 mod step;
 mod view;
@@ -9,7 +11,7 @@ mod view;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,40 +24,10 @@ use parfocal_recording::{CALIBRATION, CapturedFrame, FORMAT, Header, PatchRow, R
 use serde_json::Value;
 use tempfile::TempDir;
 
+use self::program::{command, complaint, done, parfocal, said, text};
+
 /// Width and height of the recordings that tests make up.
 const SIZE: (usize, usize) = (64, 32);
-
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    command.args(arguments).stdin(Stdio::null());
-    command
-}
-
-fn parfocal(arguments: &[&str]) -> Output {
-    command(arguments).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-/// What a command that succeeds prints.
-fn done(arguments: &[&str]) -> String {
-    let output = parfocal(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    said(&output)
-}
-
-/// The one sentence that a failing command ends with.
-fn complaint(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(1), "{}{}", said(output), String::from_utf8_lossy(&output.stderr));
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    error.lines().find(|line| line.starts_with("parfocal: ")).unwrap_or_else(|| panic!("{error}")).to_owned()
-}
 
 fn info(recording: &Path) -> Value {
     serde_json::from_str(&done(&["recording", "info", text(recording), "--json"])).unwrap()

@@ -5,6 +5,8 @@ mod bench;
 mod evaluation;
 mod from_stack;
 mod import;
+#[path = "../shared/program.rs"]
+mod program;
 mod raw;
 mod tiff;
 
@@ -26,26 +28,7 @@ use parfocal_learning::scans::recorded::{HASTE, Kept, RecordedScan};
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    command.args(arguments).stdin(Stdio::null());
-    command
-}
-
-fn parfocal(arguments: &[&str]) -> Output {
-    command(arguments).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-/// The one sentence with which a failing command ends.
-fn complaint(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(1), "{}{}", said(output), String::from_utf8_lossy(&output.stderr));
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    error.lines().find(|line| line.starts_with("parfocal: ")).unwrap_or_else(|| panic!("{error}")).to_owned()
-}
+use self::program::{command, complaint, parfocal, said, text};
 
 /// What a command that succeeds tells on standard error.
 fn notes(output: &Output) -> String {
@@ -89,10 +72,6 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
     files.sort();
     files
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 #[test]

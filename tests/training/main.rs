@@ -2,12 +2,14 @@
 //! same figures.
 
 mod bench;
+#[path = "../shared/program.rs"]
+mod program;
 
 use std::cell::Cell;
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use parfocal_autofocus::Registry;
@@ -24,6 +26,8 @@ use parfocal_learning::training::run::checkpoint::Checkpoint;
 use parfocal_learning::training::run::resume::ResumeRequest;
 use parfocal_learning::training::run::{Run, Sources};
 use rustix::process::Signal;
+
+use self::program::{command, parfocal};
 
 /// The recipe that ships as `policy`, made small, with `updates` updates.
 fn small(policy: &str, updates: u64) -> Recipe {
@@ -151,10 +155,6 @@ fn training_resumed_is_training_never_stopped() {
     });
 }
 
-fn parfocal(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
-}
-
 /// A picture of noise, `side` pixels wide and high.
 fn picture(folder: &Path, name: &str, side: u32) -> PathBuf {
     let path = folder.join(name);
@@ -260,9 +260,8 @@ fn a_signal_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_p
     let out = out.to_str().unwrap();
 
     let start = |arguments: &[&str]| {
-        let command = ["train", "mgm-learned", "--out", out];
-        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-        process.args(command).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        let mut process = command(&["train", "mgm-learned", "--out", out]);
+        process.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     };
 
     let send = |signal, process: &std::process::Child| {
@@ -307,8 +306,8 @@ fn a_training_outlives_its_log() {
     std::fs::write(&config, toml::to_string(&recipe).unwrap()).unwrap();
 
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    process.args(["train", "mgm-learned", "--config"]).arg(&config).arg("--out").arg(&out);
+    let mut process = command(&["train", "mgm-learned", "--config"]);
+    process.arg(&config).arg("--out").arg(&out);
 
     let output = process.stderr(full).output().unwrap();
     assert!(output.status.success(), "{:?}", output.status);
@@ -319,9 +318,8 @@ fn a_training_outlives_its_log() {
 fn footage_is_read_as_what_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let evaluate = |name: &str| {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-        process.current_dir(folder.path()).args(["evaluate", "--policies", "fixed", "--count", "1", "--footage", name]);
-        process.output().unwrap()
+        let mut process = command(&["evaluate", "--policies", "fixed", "--count", "1", "--footage", name]);
+        process.current_dir(folder.path()).output().unwrap()
     };
 
     let whole = std::fs::read(picture(folder.path(), "cut.jpg", 200)).unwrap();

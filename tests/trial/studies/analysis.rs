@@ -11,6 +11,7 @@ use parfocal_trial::remark::CommentContent;
 use parfocal_trial::voice::{Ending, NewPiece};
 use serde_json::{Value, json};
 
+use super::program::{command, done, refused, text};
 use super::*;
 use crate::exports::rows;
 
@@ -151,29 +152,6 @@ impl Site {
         to_the_end(&self.trial).await;
         self.trial.store.close().await;
     }
-}
-
-/// Runs `parfocal`, and returns whether it succeeded and what it printed.
-fn parfocal(arguments: &[&str]) -> (bool, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap();
-    let printed = if output.status.success() { output.stdout } else { output.stderr };
-    (output.status.success(), String::from_utf8(printed).unwrap())
-}
-
-fn done(arguments: &[&str]) -> String {
-    let (succeeded, printed) = parfocal(arguments);
-    assert!(succeeded, "{printed}");
-    printed
-}
-
-fn refused(arguments: &[&str]) -> String {
-    let (succeeded, printed) = parfocal(arguments);
-    assert!(!succeeded, "{printed}");
-    printed
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 fn exported(data: &Path, out: &Path) {
@@ -403,9 +381,8 @@ async fn a_package_that_is_changed_blinded_or_none_is_not_analysed() {
     exported(&data, &package);
     // A name that is both a package here and a study of the database is refused.
     let analyse = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-        command.args(["study", "analyse"]).args(arguments).current_dir(folder.path());
-        let output = command.output().unwrap();
+        let mut command = command(&["study", "analyse"]);
+        let output = command.args(arguments).current_dir(folder.path()).output().unwrap();
         (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
     let (succeeded, said) = analyse(&[STUDY]);

@@ -3,6 +3,7 @@
 use parfocal_trial::study::definition::{Definition, Site};
 use sha2::{Digest, Sha256};
 
+use super::program::done;
 use super::{PROTOCOL, STUDY, a_trial, definition, detail, plan, protocol};
 
 /// The error from reading the definition with `from` replaced by `to`; empty if there is none.
@@ -44,12 +45,7 @@ async fn a_file_from_windows_keeps_its_bytes_and_has_the_same_hash_everywhere() 
     a_trial(&elsewhere).await.store.close().await;
     let file = elsewhere.join("study.toml");
     std::fs::write(&file, &text).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_parfocal"));
-        let output = command.args(arguments).arg("--data-dir").arg(&elsewhere).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    };
+    let run = |arguments: &[&str]| done(&[arguments, &["--data-dir", elsewhere.to_str().unwrap()]].concat());
     let protocols = folder.path().to_str().unwrap();
     let signed = ["--by", "Dr Lead", "--reason", "ethics approved it", "--protocols", protocols];
     run(&[&["study", "new", file.to_str().unwrap()][..], &signed].concat());

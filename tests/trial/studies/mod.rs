@@ -8,6 +8,8 @@ mod definition;
 mod evidence;
 mod package;
 mod places;
+#[path = "../../shared/program.rs"]
+mod program;
 
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use parfocal_results::package::{self, PackageSource, Sessions, exports_of};
 use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports};
@@ -10,6 +10,7 @@ use parfocal_trial::erasure::{Erasable, NewErasure};
 use parfocal_trial::remark::NewComment;
 use serde_json::Value;
 
+use super::program::{command, done, parfocal, refused, text};
 use super::*;
 use crate::exports::{json, rows};
 
@@ -22,26 +23,6 @@ fn long_text() -> String {
 /// lines.
 fn said() -> [String; 3] {
     ["=1+1 looks sharp".to_owned(), long_text(), "first line\nsecond, with \"quotes\"".to_owned()]
-}
-
-fn parfocal(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
-}
-
-fn done(arguments: &[&str]) -> String {
-    let output = parfocal(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn refused(arguments: &[&str]) -> String {
-    let output = parfocal(arguments);
-    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
-    String::from_utf8(output.stderr).unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 /// Makes a data folder with the study at its end. Its sessions ran at these `sites`. The server's random source begins
@@ -476,8 +457,7 @@ fn a_file_that_is_no_package_is_named_with_what_to_give_instead() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("joined.zip"), b"PK\x03\x04").unwrap();
     let refused = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
-        let output = command.args(arguments).current_dir(folder.path()).output().unwrap();
+        let output = command(arguments).current_dir(folder.path()).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         String::from_utf8(output.stderr).unwrap()
     };
