@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
+use tokio::task::JoinHandle;
 
 use crate::support::{Server, client, parfocal};
 
@@ -48,6 +49,7 @@ async fn after_a_kill_in_mid_writing_the_chain_is_whole_and_each_acknowledged_co
             .collect();
 
         while acknowledged.load(Ordering::Relaxed) < 20 {
+            assert!(!talkers.iter().any(JoinHandle::is_finished), "a comment was refused while the server ran");
             tokio::task::yield_now().await;
         }
         assert!(!server.end(Signal::KILL));

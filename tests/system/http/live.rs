@@ -403,6 +403,9 @@ async fn a_tablet_that_goes_silent_is_told_to_the_operator_and_pauses_the_papers
     server.post("/api/surgeon/actions", tap).await;
     surgeon.watch(20).await;
 
+    // The page from before has not been read meanwhile. After ten seconds, which 20 frames take on a busy machine, the
+    // server lets such a page go.
+    let mut operator = Page::open(&server, "operator").await;
     drop(surgeon);
     operator.until(|told| told["tablet"]["presence"] == "silent" && told["tablet"]["away_seconds"].is_u64()).await;
     // The session may have followed before the sign was sent, so the server is asked, at each status.
