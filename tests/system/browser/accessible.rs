@@ -129,7 +129,7 @@ async fn elements_that_nobody_can_use_are_found() {
     let driver = Driver::start();
     let server = theatre::server();
     let page = driver.browser().await;
-    page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    page.open(&server.link("surgeon")).await;
     page.sees("#panel", "No trial is under way").await;
     assert_eq!((violations(&page).await, small(&page).await), (vec![], vec![]));
 

@@ -11,7 +11,7 @@ use crate::support::parfocal;
 /// The researcher reads the session and unblinds it. Returns its id.
 pub async fn researcher(theatre: &Theatre) -> String {
     let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.sees("tbody", "completed").await;
     shoot(page, "researcher-1-sessions").await;
 

@@ -136,7 +136,7 @@ impl Day {
 
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
-        operator.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+        operator.open(&server.link("operator")).await;
         let theatre = Theatre { server, proxy, surgeon, operator };
         let mut day = Self {
             theatre,

@@ -21,7 +21,7 @@ async fn the_operator_reads_whether_everything_is_ready() {
     shoot(&operator, "operator-12-checks-open").await;
 
     let tablet = driver.browser().await;
-    tablet.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    tablet.open(&server.link("surgeon")).await;
     until("the tablet is ready", || async {
         operator.try_click("#check-again").await;
         operator.text("#checks-well").await.contains("The surgeon's page is open in Chrome on Linux")

@@ -150,7 +150,7 @@ async fn emergency_unblinding(theatre: &Theatre) -> String {
     surgeon.sees("#change-title", "Setting 2 of 2").await;
     let before = surgeon.everything().await;
 
-    let researcher = theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")));
+    let researcher = theatre.server.link("researcher");
     let operator = page.new_tab(&researcher).await;
     page.click("td a.button").await;
 

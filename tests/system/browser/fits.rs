@@ -26,7 +26,7 @@ async fn the_box_is_wide_enough_to_write_in_and_a_pause_brings_the_slider_under_
     let (slider, picture) = (operator.area("#focal-power").await, operator.area("#view").await);
     assert!(slider.top >= picture.bottom() && slider.bottom() <= 900.0, "{slider:?} under {picture:?}");
 
-    operator.open(&server.url(&format!("/enter?key={}", server.key("researcher")))).await;
+    operator.open(&server.link("researcher")).await;
     resize(operator, 390, 844).await;
     operator.sees("tbody", "S-31").await;
     let beyond = operator.run("return document.documentElement.scrollWidth - innerWidth", &[]).await;

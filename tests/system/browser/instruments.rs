@@ -140,7 +140,7 @@ async fn closing(theatre: &Theatre) {
 /// The researcher changes the records, in the operator's browser.
 async fn researcher(theatre: &Theatre) {
     let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.click("td a.button").await;
     page.sees(".answers", "Raw TLX 35.8").await;
     page.sees(".closing", "Weighted SURG-TLX 33.3").await;

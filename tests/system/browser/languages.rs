@@ -141,7 +141,7 @@ async fn a_trial(spoken: &Spoken, large: bool) {
     let driver = Driver::start();
     let mut theatre = Theatre::open(&driver).await;
     if large {
-        let link = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
+        let link = theatre.server.link("surgeon");
         theatre.surgeon = driver.browser_with_large_text().await;
         theatre.surgeon.open(&link).await;
     }

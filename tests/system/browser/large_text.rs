@@ -22,12 +22,10 @@ pub(super) async fn look(browser: &Browser, name: &str) {
 async fn text_of_twice_the_size_leaves_every_page_usable() {
     let driver = Driver::start();
     let mut theatre = Theatre::open(&driver).await;
-    let link = |role| theatre.server.url(&format!("/enter?key={}", theatre.server.key(role)));
-    let (surgeons, operators) = (link("surgeon"), link("operator"));
     theatre.surgeon = driver.browser_with_large_text().await;
-    theatre.surgeon.open(&surgeons).await;
+    theatre.surgeon.open(&theatre.server.link("surgeon")).await;
     theatre.operator = driver.browser_with_large_text().await;
-    theatre.operator.open(&operators).await;
+    theatre.operator.open(&theatre.server.link("operator")).await;
     let surgeon = &theatre.surgeon;
     assert_eq!(surgeon.style("html", "font-size").await, "32px");
 

@@ -18,7 +18,7 @@ async fn what_was_half_written_when_the_link_ended_is_sent_and_nothing_stays_out
     take_session_link(&mut server).await;
 
     let tablet = Driver::start().browser().await;
-    tablet.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    tablet.open(&server.link("surgeon")).await;
     act(&server, "operator", json!({"session": session, "action": "start"})).await;
     tablet.sees("#change-title", "Setting 1 of 2").await;
     until("the notice to take the tap", || async {

@@ -39,7 +39,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     let driver = Driver::start();
     let server = theatre::server();
     let page = driver.browser().await;
-    page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    page.open(&server.link("surgeon")).await;
 
     // An answer is changed while its first value is on its way to a server whose disk is full.
     let script = r#"
@@ -169,7 +169,7 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
     let driver = Driver::start();
     let server = theatre::server();
     let page = driver.browser().await;
-    page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    page.open(&server.link("surgeon")).await;
     let waits = async |script: &str| run(&page, &format!("{WAIT} {script}")).await;
 
     let forward = "return wait(await heldBack(() => (Date.now = () => clock() + 600000)), 0)";

@@ -81,7 +81,7 @@ fn recorded_seconds(said: &str) -> f64 {
 
 async fn open_session(theatre: &Theatre) {
     let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.click("td a.button").await;
     page.sees("#comment-list", "It wanders").await;
 }

@@ -101,7 +101,7 @@ async fn kinds(server: &Server) -> Vec<String> {
 
 async fn surgeon(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
-    browser.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    browser.open(&server.link("surgeon")).await;
     is_live(&browser).await;
     browser
 }
@@ -242,7 +242,7 @@ async fn the_papers_trial_has_neither_button_and_a_tap_changes_nothing() {
 async fn with_text_of_twice_the_size_the_buttons_stay_in_reach() {
     let driver = Driver::start();
     let mut theatre = Theatre::open(&driver).await;
-    let link = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
+    let link = theatre.server.link("surgeon");
     theatre.surgeon = driver.browser_with_large_text().await;
     theatre.surgeon.open(&link).await;
     theatre.begin("P-03", "pointing").await;

@@ -155,7 +155,7 @@ async fn recorded(theatre: &Theatre) {
     theatre.operator.sees("#recording-notice", "frames are saved in").await;
 
     let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.click("td a.button").await;
     page.sees("#comment-list", "Sharp there").await;
     unblind(page).await;
@@ -452,7 +452,7 @@ async fn with_a_white_reference_and_text_of_twice_the_size_reflectance_can_be_re
 
     let driver = Driver::start();
     let page = driver.browser_with_large_text().await;
-    page.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+    page.open(&server.link("operator")).await;
     page.click("#point-spectrum").await;
     for (index, place) in PLACES.into_iter().take(2).enumerate() {
         point(&page, "#view", place, true).await;

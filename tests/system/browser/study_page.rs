@@ -14,7 +14,7 @@ use crate::support::{PASSPHRASE, Server};
 
 async fn researcher(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
-    browser.open(&server.url(&format!("/enter?key={}", server.key("researcher")))).await;
+    browser.open(&server.link("researcher")).await;
     browser
 }
 

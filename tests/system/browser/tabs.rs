@@ -52,7 +52,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     let other = driver.browser().await;
-    other.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")))).await;
+    other.open(&theatre.server.link("surgeon")).await;
     theatre.begin("S-14", "short").await;
     theatre.tap_notice(1).await;
     theatre.finish().await;
@@ -81,7 +81,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
         AND e.kind = 'aborted' AND d.monotonic_ns > e.monotonic_ns";
     theatre.keeps(empty, &["2"]).await;
     let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.click("td a.button").await;
     page.sees("#aside-list", "3 (another device gave a different answer later; 5 counts)").await;
     page.sees("table.answers", "5").await;

@@ -38,7 +38,7 @@ pub fn seeing_server() -> Server {
 /// A browser on the operator's page of `server`.
 pub async fn operator(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
-    browser.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+    browser.open(&server.link("operator")).await;
     browser
 }
 
@@ -113,8 +113,9 @@ impl Theatre {
     async fn before(driver: &Driver, server: Server, arguments: &[String]) -> Self {
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser_with(arguments), driver.browser());
-        surgeon.open(&format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"))).await;
-        operator.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+        let surgeons = format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"));
+        let operators = server.link("operator");
+        tokio::join!(surgeon.open(&surgeons), operator.open(&operators));
         Self { server, proxy, surgeon, operator }
     }
 

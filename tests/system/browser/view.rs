@@ -20,7 +20,7 @@ const UPRIGHT: (u32, u32) = (820, 1180);
 /// A surgeon's page with a picture on it.
 async fn surgeon(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
-    browser.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    browser.open(&server.link("surgeon")).await;
     is_live(&browser).await;
     is_fitted(&browser).await;
     browser

@@ -117,7 +117,7 @@ async fn open_session(theatre: &Theatre) -> String {
     page.click_labelled("#session-actions", "Abort").await;
     theatre.give_reason("enough").await;
     page.sees("#phase", "Aborted").await;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.open(&theatre.server.link("researcher")).await;
     page.click("td a.button").await;
     page.sees("#comment-list", "Voice comment").await;
     page.attribute("#session", "data-session").await.unwrap()

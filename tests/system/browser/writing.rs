@@ -24,7 +24,7 @@ impl Theatre {
     /// Answers the questions after a setting on another device.
     async fn answer_elsewhere(&self, driver: &Driver) {
         let other = driver.browser().await;
-        other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
+        other.open(&self.server.link("surgeon")).await;
         other.tap_in_panel("input[name=sharpness][value='3']").await;
         other.sees("[data-question=sharpness] > .state", "Saved").await;
         other.tap_in_panel(".questions .done button").await;

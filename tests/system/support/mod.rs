@@ -173,6 +173,11 @@ impl Server {
         format!("{scheme}://{}{path}", self.address)
     }
 
+    /// The link of `role`.
+    pub fn link(&self, role: &str) -> String {
+        self.url(&format!("/enter?key={}", self.key(role)))
+    }
+
     /// A GET without any credential.
     pub fn get(&self, path: &str) -> RequestBuilder {
         client().get(self.url(path))

@@ -43,7 +43,7 @@ async fn a_device_that_does_not_trust_the_server_gets_the_steps_and_one_that_doe
     assert_eq!(trusting.complaints().await, Vec::<String>::new());
 
     // The link leads to the encrypted pages, with the operator's cookie.
-    trusting.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+    trusting.open(&server.link("operator")).await;
     trusting.sees("#trust-link", &format!("http://{}/trust", server.address)).await;
     trusting.sees("#fingerprint", ":").await;
     shoot(&trusting, "operator-encrypted").await;
@@ -59,7 +59,7 @@ async fn the_live_view_runs_encrypted() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--tls", "--camera", BRAIN]);
     let driver = Driver::start();
     let tablet = driver.browser_with(&[trusting(&server).await]).await;
-    tablet.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    tablet.open(&server.link("surgeon")).await;
     crate::browser::wait::until("a picture", || async { tablet.brightness().await > 20.0 }).await;
     assert_eq!(tablet.complaints().await, Vec::<String>::new());
 }
