@@ -5,14 +5,15 @@
 mod clip;
 mod coverage;
 mod defocus;
+mod files;
 mod pnm;
 mod reel;
 mod video;
 mod wide;
 
 pub use coverage::{CutOff, cut_off};
+pub use files::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
 pub use pnm::next_pnm;
-pub use reel::{is_picture, is_raw, picture_head, pictures_in, read_picture, tell_unread};
 pub use video::{FootageError, SQUARE_PIXELS, Video, ffmpeg};
 pub use wide::{WideSamples, sample_bits};
 

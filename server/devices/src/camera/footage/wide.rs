@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::reel::picture_head;
+use super::files::picture_head;
 use super::video::FootageError;
 use parfocal_base::notices::tell;
 use parfocal_imaging::{DecodeError, PictureFile};
