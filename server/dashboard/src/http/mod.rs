@@ -35,6 +35,7 @@ mod recording;
 mod records;
 mod researcher;
 pub mod roles;
+mod routes;
 pub mod security;
 mod sign_in;
 mod spectra;
@@ -69,7 +70,6 @@ use tower_http::timeout::TimeoutLayer;
 use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
-use utoipa_axum::routes;
 
 use error::Error;
 use transport::Transport;
@@ -84,8 +84,8 @@ const TIMEOUT: Duration = Duration::from_secs(20);
 pub fn router(app: AppState) -> Router {
     let document = openapi::Finished::default();
     let (router, api) = OpenApiRouter::with_openapi(openapi::Document::openapi())
-        .merge(unencrypted_routes())
-        .merge(routes())
+        .merge(routes::unencrypted())
+        .merge(routes::others())
         .split_for_parts();
 
     match openapi::document(api) {
@@ -105,92 +105,6 @@ pub fn router(app: AppState) -> Router {
         .layer(Extension(document));
 
     router.fallback(|| async { StatusCode::NOT_FOUND }).layer(layers).with_state(app)
-}
-
-/// The routes that an encrypted server also has on unencrypted connections. They need no key.
-fn unencrypted_routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(trust::page))
-        .routes(routes!(trust::certificate))
-        .routes(routes!(trust::profile))
-        .routes(routes!(trust::check))
-        .routes(routes!(assets::asset))
-}
-
-/// All other routes.
-fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(roles::enter))
-        .routes(routes!(roles::start))
-        .routes(routes!(sign_in::page))
-        .routes(routes!(sign_in::sign_in))
-        .routes(routes!(sign_in::sign_out))
-        .routes(routes!(accounts::people_page))
-        .routes(routes!(accounts::list, accounts::make))
-        .routes(routes!(accounts::change))
-        .routes(routes!(surgeon::page))
-        .routes(routes!(surgeon::session))
-        .routes(routes!(surgeon::act))
-        .routes(routes!(surgeon::patch))
-        .routes(routes!(surgeon::comment))
-        .routes(routes!(surgeon::answer))
-        .routes(routes!(surgeon::holding))
-        .routes(routes!(tablet_trial::tablet_page))
-        .routes(routes!(tablet_trial::tried))
-        .routes(routes!(offline::worker))
-        .routes(routes!(voice::keep_piece))
-        .routes(routes!(voice::recording))
-        .routes(routes!(operator::page))
-        .routes(routes!(operator::link))
-        .routes(routes!(operator::choices))
-        .routes(routes!(operator::focus))
-        .routes(routes!(operator::patch))
-        .routes(routes!(operator::add_participant))
-        .routes(routes!(operator::session))
-        .routes(routes!(operator::create))
-        .routes(routes!(operator::consent))
-        .routes(routes!(operator::act))
-        .routes(routes!(operator::dismiss))
-        .routes(routes!(camera::offer))
-        .routes(routes!(camera::change))
-        .routes(routes!(checks::checks))
-        .routes(routes!(recording::status))
-        .routes(routes!(recording::order))
-        .routes(routes!(spectra::spectra))
-        .routes(routes!(researcher::list_page))
-        .routes(routes!(researcher::session_page))
-        .routes(routes!(researcher::list))
-        .routes(routes!(researcher::session))
-        .routes(routes!(researcher::course))
-        .routes(routes!(researcher::timeline))
-        .routes(routes!(researcher::chain_head))
-        .routes(routes!(researcher::unblind))
-        .routes(routes!(playback::recordings))
-        .routes(routes!(playback::frame))
-        .routes(routes!(playback::spectrum))
-        .routes(routes!(records::correct))
-        .routes(routes!(records::erase))
-        .routes(routes!(records::erase_all))
-        .routes(routes!(records::withdraw))
-        .routes(routes!(studies::studies_page))
-        .routes(routes!(studies::study_page))
-        .routes(routes!(studies::list_studies, studies::plan_study))
-        .routes(routes!(studies::study))
-        .routes(routes!(studies::change_study))
-        .routes(routes!(analysis::analysis_page))
-        .routes(routes!(analysis::analysis))
-        .routes(routes!(analysis::analysis_zip))
-        .routes(routes!(export::zip))
-        .routes(routes!(export::dictionary))
-        .routes(routes!(study_export::study_export, study_export::start_study_export))
-        .routes(routes!(study_export::study_export_zip))
-        .routes(routes!(backup::backup_state, backup::start_backup))
-        .routes(routes!(backup::backup_file))
-        .routes(routes!(live::live))
-        .routes(routes!(mjpeg::mjpeg))
-        .routes(routes!(health::healthz))
-        .routes(routes!(metrics::metrics))
-        .routes(routes!(openapi::openapi))
 }
 
 /// Logs only the path of a request: the query may contain a key.

@@ -12,11 +12,11 @@ use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::error::{self, Error};
-use super::{AppState, security, unencrypted_routes};
+use super::{AppState, routes, security};
 
 /// The routes for unencrypted connections. None of them reads a body or waits for anything.
 pub(super) fn router(app: AppState) -> Router {
-    let (router, _) = unencrypted_routes().split_for_parts();
+    let (router, _) = routes::unencrypted().split_for_parts();
 
     let layers = ServiceBuilder::new()
         .layer(middleware::from_fn(security::headers))

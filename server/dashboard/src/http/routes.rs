@@ -1,0 +1,96 @@
+//! All routes, and which of them an encrypted server also has on unencrypted connections.
+
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::{
+    AppState, accounts, analysis, assets, backup, camera, checks, export, health, live, metrics, mjpeg, offline,
+    openapi, operator, playback, recording, records, researcher, roles, sign_in, spectra, studies, study_export,
+    surgeon, tablet_trial, trust, voice,
+};
+
+/// The routes that an encrypted server also has on unencrypted connections. They need no key.
+pub(super) fn unencrypted() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(trust::page))
+        .routes(routes!(trust::certificate))
+        .routes(routes!(trust::profile))
+        .routes(routes!(trust::check))
+        .routes(routes!(assets::asset))
+}
+
+/// All other routes.
+pub(super) fn others() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(roles::enter))
+        .routes(routes!(roles::start))
+        .routes(routes!(sign_in::page))
+        .routes(routes!(sign_in::sign_in))
+        .routes(routes!(sign_in::sign_out))
+        .routes(routes!(accounts::people_page))
+        .routes(routes!(accounts::list, accounts::make))
+        .routes(routes!(accounts::change))
+        .routes(routes!(surgeon::page))
+        .routes(routes!(surgeon::session))
+        .routes(routes!(surgeon::act))
+        .routes(routes!(surgeon::patch))
+        .routes(routes!(surgeon::comment))
+        .routes(routes!(surgeon::answer))
+        .routes(routes!(surgeon::holding))
+        .routes(routes!(tablet_trial::tablet_page))
+        .routes(routes!(tablet_trial::tried))
+        .routes(routes!(offline::worker))
+        .routes(routes!(voice::keep_piece))
+        .routes(routes!(voice::recording))
+        .routes(routes!(operator::page))
+        .routes(routes!(operator::link))
+        .routes(routes!(operator::choices))
+        .routes(routes!(operator::focus))
+        .routes(routes!(operator::patch))
+        .routes(routes!(operator::add_participant))
+        .routes(routes!(operator::session))
+        .routes(routes!(operator::create))
+        .routes(routes!(operator::consent))
+        .routes(routes!(operator::act))
+        .routes(routes!(operator::dismiss))
+        .routes(routes!(camera::offer))
+        .routes(routes!(camera::change))
+        .routes(routes!(checks::checks))
+        .routes(routes!(recording::status))
+        .routes(routes!(recording::order))
+        .routes(routes!(spectra::spectra))
+        .routes(routes!(researcher::list_page))
+        .routes(routes!(researcher::session_page))
+        .routes(routes!(researcher::list))
+        .routes(routes!(researcher::session))
+        .routes(routes!(researcher::course))
+        .routes(routes!(researcher::timeline))
+        .routes(routes!(researcher::chain_head))
+        .routes(routes!(researcher::unblind))
+        .routes(routes!(playback::recordings))
+        .routes(routes!(playback::frame))
+        .routes(routes!(playback::spectrum))
+        .routes(routes!(records::correct))
+        .routes(routes!(records::erase))
+        .routes(routes!(records::erase_all))
+        .routes(routes!(records::withdraw))
+        .routes(routes!(studies::studies_page))
+        .routes(routes!(studies::study_page))
+        .routes(routes!(studies::list_studies, studies::plan_study))
+        .routes(routes!(studies::study))
+        .routes(routes!(studies::change_study))
+        .routes(routes!(analysis::analysis_page))
+        .routes(routes!(analysis::analysis))
+        .routes(routes!(analysis::analysis_zip))
+        .routes(routes!(export::zip))
+        .routes(routes!(export::dictionary))
+        .routes(routes!(study_export::study_export, study_export::start_study_export))
+        .routes(routes!(study_export::study_export_zip))
+        .routes(routes!(backup::backup_state, backup::start_backup))
+        .routes(routes!(backup::backup_file))
+        .routes(routes!(live::live))
+        .routes(routes!(mjpeg::mjpeg))
+        .routes(routes!(health::healthz))
+        .routes(routes!(metrics::metrics))
+        .routes(routes!(openapi::openapi))
+}
