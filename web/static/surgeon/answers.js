@@ -31,7 +31,7 @@ export function slotOf({ session, segment }, question) {
 
 /**
  * Sends text answers that were left half-written, in any tab, if their questions are no longer on screen. They are sent
- * as they are.
+ * as they are. A ranking that was not confirmed is no answer, so it is only removed from this device.
  *
  * @param {import("./outbox.js").Outbox} outbox
  * @param {import("./drafts.js").Drafts} drafts
@@ -42,12 +42,13 @@ export function sendLeftAnswers(outbox, drafts, state) {
     state?.phase === "questions" || state?.phase === "closing" ? slotOf(placeOf(state), "") : null;
 
   for (const left of drafts.of("answer.")) {
-    const { rest: slot, value: text } = left;
-    if (typeof text !== "string" || (onScreen !== null && slot.startsWith(onScreen))) continue;
+    const { rest: slot, value } = left;
+    if (onScreen && slot.startsWith(onScreen)) continue;
 
     const [session, segment, ...question] = slot.split("/");
     const about = { session, segment: segment === "closing" ? null : segment, question: question.join("/") };
-    if (text.trim()) outbox.add(PATH, { ...about, value: text.trim() }, slot, left);
+    const text = typeof value === "string" && value.trim();
+    if (text) outbox.add(PATH, { ...about, value: text }, slot, left);
     drafts.forget(left);
   }
 }
