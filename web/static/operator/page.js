@@ -223,7 +223,7 @@ followOverlayBoxes((name, on) => {
   if (name === "traces" || name === "belief") traces.show(name, on);
   else viewer.overlay(name, on);
   if (name === "depths") {
-    viewer.live.wantDepths(on);
+    viewer.live.tell({ type: "depths", wanted: on });
     offerDepths();
   }
 });

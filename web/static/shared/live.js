@@ -27,6 +27,8 @@ const LINK_OVER = 4403;
 /** Delay before the picture's size on the screen is sent to the server. During a pinch the size keeps changing. */
 const SCREEN_MS = 150;
 
+/** @typedef {{ type: string, [what: string]: unknown }} Message a message to the server */
+
 /**
  * A page's callbacks. `frame` must draw its picture before it returns.
  *
@@ -48,8 +50,8 @@ export class Live {
   #reconnection = new Reconnection();
   /** Screen pixels that the picture covers from left to right. @type {number | null} */
   #screen = null;
-  /** Whether depth maps are to come with the pictures. */
-  #wantsDepths = false;
+  /** The last message of each type about this page, which each new connection gets. @type {Map<string, Message>} */
+  #told = new Map();
   /** Whether the page's link is no longer valid. */
   #over = false;
   /** Whether a timer runs that will send `#screen` to the server. */
@@ -60,6 +62,7 @@ export class Live {
   /** @param {"surgeon" | "operator" | "researcher"} role */
   constructor(role) {
     this.#role = role;
+    this.#tellVisibility();
     document.addEventListener("visibilitychange", () => this.#tellVisibility());
 
     // When the network or a page from the browser's cache comes back, there is no need to wait for the next attempt.
@@ -89,18 +92,18 @@ export class Live {
     this.#screenWaits = true;
     setTimeout(() => {
       this.#screenWaits = false;
-      this.#sendScreen();
+      this.tell({ type: "screen", width: this.#screen });
     }, SCREEN_MS);
   }
 
   /**
-   * Asks for depth maps with the pictures, or for none any more. Not for a surgeon's page.
+   * Tells the server something about this page, now and on each new connection.
    *
-   * @param {boolean} wanted
+   * @param {Message} message
    */
-  wantDepths(wanted) {
-    this.#wantsDepths = wanted;
-    this.#sendDepths();
+  tell(message) {
+    this.#told.set(message.type, message);
+    send(this.#socket, message);
   }
 
   #isSilent() {
@@ -135,9 +138,7 @@ export class Live {
     const opened = () => {
       if (socket !== this.#socket) return;
       this.#reconnection.opened();
-      this.#tellVisibility();
-      this.#sendScreen();
-      if (this.#wantsDepths) this.#sendDepths();
+      for (const message of this.#told.values()) send(socket, message);
       this.#tellConnection(true);
     };
     const take = (/** @type {any} */ data, /** @type {number} */ at) => {
@@ -198,15 +199,7 @@ export class Live {
   }
 
   #tellVisibility() {
-    if (this.#socket) send(this.#socket, { type: "visible", visible: !document.hidden });
-  }
-
-  #sendScreen() {
-    if (this.#socket && this.#screen !== null) send(this.#socket, { type: "screen", width: this.#screen });
-  }
-
-  #sendDepths() {
-    if (this.#socket) send(this.#socket, { type: "depths", wanted: this.#wantsDepths });
+    this.tell({ type: "visible", visible: !document.hidden });
   }
 
   /** @param {boolean} open */
@@ -221,11 +214,11 @@ function isAlive(socket) {
 }
 
 /**
- * @param {WebSocket} socket
- * @param {unknown} message
+ * @param {WebSocket | null} socket
+ * @param {Message} message
  */
 function send(socket, message) {
-  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 }
 
 /**
