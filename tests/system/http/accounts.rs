@@ -42,7 +42,8 @@ async fn a_person_who_signs_in_has_the_pages_of_the_role_until_the_sign_in_ends(
 
     let response = sign_in(&server, "operator", PASSPHRASE).await;
     let header = response.headers()[SET_COOKIE].to_str().unwrap().to_owned();
-    assert!(header.contains("HttpOnly") && header.contains("SameSite=Strict") && header.contains("Max-Age=43200"));
+    // The cookie outlives the sign-in, which ends after twelve hours.
+    assert!(header.contains("HttpOnly") && header.contains("SameSite=Strict") && header.contains("Max-Age=2592000"));
     let cookie = header.split(';').next().unwrap().to_owned();
     let said: Value = response.json().await.unwrap();
     assert_eq!(
@@ -61,6 +62,13 @@ async fn a_person_who_signs_in_has_the_pages_of_the_role_until_the_sign_in_ends(
     let out = client().post(server.url("/api/sign-out")).header(COOKIE, &cookie).send().await.unwrap();
     assert_eq!(out.status(), StatusCode::NO_CONTENT);
     assert_eq!(status(&server, "/operator", &cookie).await, 403);
+
+    // The browser's other pages are asked to sign in again. They hold the cookie that the sign-out has left.
+    let left = out.headers()[SET_COOKIE].to_str().unwrap().split(';').next().unwrap();
+    assert_eq!(left, "parfocal-account=");
+    let refused = server.get("/api/operator/session").header(COOKIE, left).send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::FORBIDDEN);
+    assert_eq!(refused.json::<Value>().await.unwrap()["sign_in"], true);
 
     // A command ends a browser's sign-in at once.
     let token = server.sign_in("operator").await;

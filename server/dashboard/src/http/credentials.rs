@@ -11,8 +11,12 @@ use super::keys::Keys;
 use parfocal_base::ids::SessionId;
 use parfocal_trial::role::Role;
 
-/// The cookie of a browser that is signed in under a personal account.
+/// The cookie of a browser that is signed in under a personal account. It outlives the sign-in, so that its pages are
+/// asked to sign in again.
 pub(super) const ACCOUNT_COOKIE: &str = "parfocal-account";
+
+/// Lifetime of each cookie: it outlives a study day, but not a study.
+const COOKIE_LIFETIME: Duration = Duration::days(30);
 
 /// Whether a request with these headers holds `role`, by its cookie or its bearer token.
 pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
@@ -65,14 +69,11 @@ pub(super) const fn cookie_name(role: Role) -> &'static str {
     }
 }
 
-/// The header that sets cookie `name` for `seconds`. Browsers send it only with this site's own requests, and if the
-/// server is `encrypted` only over TLS.
-pub(super) fn set_cookie(name: &str, value: &str, seconds: u64, encrypted: bool) -> String {
-    let cookie = Cookie::build((name, value))
-        .path("/")
-        .max_age(Duration::seconds(seconds.cast_signed()))
-        .http_only(true)
-        .same_site(SameSite::Strict);
+/// The header that sets cookie `name`. Browsers send it only with this site's own requests, and if the server is
+/// `encrypted` only over TLS.
+pub(super) fn set_cookie(name: &str, value: &str, encrypted: bool) -> String {
+    let cookie =
+        Cookie::build((name, value)).path("/").max_age(COOKIE_LIFETIME).http_only(true).same_site(SameSite::Strict);
     let cookie = if encrypted { cookie.secure(true) } else { cookie };
     cookie.to_string()
 }

@@ -21,9 +21,6 @@ use parfocal_records::store::Access;
 use parfocal_trial::account::Account;
 use parfocal_trial::role::Role;
 
-/// Lifetime of a role's cookie: it outlives a study day, but not a study.
-const COOKIE_SECONDS: u64 = 30 * 24 * 3600;
-
 /// Proof that the request comes from the surgeon of the session on the screens.
 #[derive(Debug, Clone, Copy)]
 pub struct Surgeon;
@@ -196,7 +193,7 @@ pub(super) async fn enter(
         (None, Some(_)) => return Err(Error::SessionOver),
         (None, None) => return Err(Error::WrongKey),
     };
-    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.address.encrypted());
+    let cookie = set_cookie(cookie_name(role), &token, app.address.encrypted());
 
     // A browser is let in even if the disk is full. Then only the log records it.
     match app.access_log(role).record(&Access::Entered).await {

@@ -17,7 +17,7 @@ use super::people::{PeerAddress, SignedIn};
 use super::roles::home;
 use super::security::Nonce;
 use parfocal_records::accounts::Passphrase;
-use parfocal_trial::account::{Account, AccountRole, SIGN_IN_LIMIT};
+use parfocal_trial::account::{Account, AccountRole};
 use parfocal_trial::role::Role;
 
 #[derive(Deserialize, IntoParams)]
@@ -107,7 +107,7 @@ pub(super) async fn sign_in(
         let token = Some(token.as_str().to_owned());
         return Ok(Json(SignedInAs { account, home, token }).into_response());
     }
-    let cookie = set_cookie(ACCOUNT_COOKIE, token.as_str(), SIGN_IN_LIMIT.as_secs(), app.address.encrypted());
+    let cookie = set_cookie(ACCOUNT_COOKIE, token.as_str(), app.address.encrypted());
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Json(SignedInAs { account, home, token: None })).into_response())
 }
 
@@ -122,7 +122,8 @@ pub(super) async fn sign_out(
     if let Some(person) = person {
         app.accounts.sign_out(&person.token).await?;
     }
-    let cookie = set_cookie(ACCOUNT_COOKIE, "", 0, app.address.encrypted());
+    // Without a token, but not removed: the browser's other pages are asked to sign in again.
+    let cookie = set_cookie(ACCOUNT_COOKIE, "", app.address.encrypted());
     Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie)])))
 }
 
