@@ -260,6 +260,16 @@ async fn what_is_said_while_the_server_is_dead_is_kept_here_and_lands_once() {
     theatre.sees_saved(1).await;
     let kept = recorded(&theatre).await;
     assert!(kept[0].1 >= 4, "{kept:?}");
+
+    // The end of a session takes the microphone away. The next participant reads nothing of it.
+    hold(&theatre.surgeon).await;
+    theatre.surgeon.sees("#talk-label", "Recording 0:01").await;
+    theatre.abort("an emergency").await;
+    theatre.surgeon.sees("#voice-trouble", "The microphone was taken away").await;
+    let_go(&theatre.surgeon).await;
+    theatre.operator.click_labelled("#session-actions", "Close and prepare").await;
+    theatre.surgeon.sees_panel("No trial").await;
+    assert_eq!(theatre.surgeon.text("#voice-trouble").await, "");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -186,6 +186,11 @@ function followLastView() {
 /** @param {View | null} next */
 function follow(next) {
   known = true;
+  if (next?.session !== state?.session) {
+    // What went wrong in one session is not for the next participant to read.
+    tell(byId("trouble"), "");
+    talk.trouble = "";
+  }
   state = next;
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
