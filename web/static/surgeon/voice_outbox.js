@@ -140,8 +140,7 @@ export class VoiceOutbox {
 
   /** How many recordings are not saved yet, without those that the server refused. */
   get waiting() {
-    const comments = this.#queue().map(({ comment }) => comment);
-    return new Set(comments).size;
+    return recordings(this.#queue());
   }
 
   /** The sessions that recordings on this page belong to. @returns {Set<string>} */
@@ -155,8 +154,7 @@ export class VoiceOutbox {
    * @param {string} session
    */
   held(session) {
-    const ofSession = [...this.#steps.values()].filter((step) => step.session === session);
-    return new Set(ofSession.map(({ comment }) => comment)).size;
+    return recordings([...this.#steps.values()].filter((step) => step.session === session));
   }
 
   /**
@@ -165,11 +163,8 @@ export class VoiceOutbox {
    * @param {string} [session] only those of this session
    */
   refused(session) {
-    const steps = [...this.#steps.values()].filter(
-      (step) => session === undefined || step.session === session,
-    );
-    const refused = steps.filter(({ comment }) => this.#refused.has(comment));
-    return new Set(refused.map(({ comment }) => comment)).size;
+    const refused = [...this.#steps.values()].filter(({ comment }) => this.#refused.has(comment));
+    return recordings(refused.filter((step) => session === undefined || step.session === session));
   }
 
   /**
@@ -308,4 +303,13 @@ export class VoiceOutbox {
   #tell() {
     for (const listener of [...this.#listeners]) listener();
   }
+}
+
+/**
+ * The number of recordings that `steps` belong to.
+ *
+ * @param {Step[]} steps
+ */
+function recordings(steps) {
+  return new Set(steps.map(({ comment }) => comment)).size;
 }
