@@ -95,12 +95,26 @@ async fn beside_another_operator(theatre: &Theatre) {
     operator.click("#session-actions button:first-child").await;
     operator.sees("#session-badges", "Paused").await;
     operator.type_into("#pause-reason", "Half a reason").await;
+
+    // The other gives the reason first. What this one was writing is not taken for the reason of the next pause.
+    let server = &theatre.server;
+    let shown = server.read("/api/operator/session").await;
+    let session = shown["session"].clone();
+    let event = &shown["reason_wanted"]["event"];
+    let reason = json!({ "session": session, "action": "give-reason", "event": event, "reason": "The phone" });
+    server.post("/api/operator/actions", reason).await;
+    operator.sees_no("#reason-wanted").await;
+    assert_eq!(operator.value("#pause-reason").await, "");
+
+    for pressed in ["Resume", "Pause"] {
+        operator.sees("#session-actions", pressed).await;
+        operator.click_labelled("#session-actions", pressed).await;
+    }
+    operator.type_into("#pause-reason", "Half a reason").await;
     operator.click_labelled("#session-actions", "Abort").await;
     operator.sees("#reason-heading", "Abort the session").await;
 
-    let server = &theatre.server;
     server.post("/api/operator/participants", json!({ "code": "S-08" })).await;
-    let session = server.read("/api/operator/session").await["session"].clone();
     let abort = json!({ "session": session, "action": "abort", "reason": "By the other" });
     server.post("/api/operator/actions", abort).await;
     server.post("/api/operator/dismissals", json!({ "session": session })).await;

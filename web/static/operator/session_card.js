@@ -110,13 +110,16 @@ export class SessionCard {
   }
 
   /**
-   * A reason that is being written stays in the box, and with its pause, while the session moves on.
+   * A reason that is being written stays in the box, and with its pause, while the session moves on. It goes once the
+   * pause has a reason, perhaps from another operator: the server asks for the latest pause that has none.
    *
    * @param {View} session
    */
   #drawReasonWanted({ reason_wanted: wanted }) {
-    const isWriting = byId("pause-reason", HTMLInputElement).value !== "";
-    if (!isWriting || this.#reasonFor === null) this.#reasonFor = wanted;
+    const box = byId("pause-reason", HTMLInputElement);
+    const lacksReason = wanted && this.#reasonFor && wanted.event >= this.#reasonFor.event;
+    if (!lacksReason) box.value = "";
+    if (box.value === "") this.#reasonFor = wanted;
     const about = this.#reasonFor;
     byId("reason-wanted").hidden = !wanted;
     if (about) setText(byId("pause-reason-label"), reasonWords(secondText(about.at), about));
@@ -134,8 +137,7 @@ export class SessionCard {
     save.disabled = false;
     if (!given) return;
 
-    if (box.value.trim() === reason) box.value = "";
-    // An earlier pause may still lack its reason, and is asked for next.
+    // Another pause may still lack its reason, and is asked for next.
     this.#reasonFor = null;
     if (this.#session) this.#drawReasonWanted(this.#session);
   }
