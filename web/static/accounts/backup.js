@@ -1,14 +1,11 @@
-// The backup of the database: started here, made by the server, and downloaded here. The page asks whether it is ready,
-// and may be closed meanwhile.
+// The backup of the database: started here, made by the server, and downloaded here.
 
-import { get, post, Refused } from "../shared/api.js";
+import { get, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
+import { followUntilMade } from "../shared/until_made.js";
 
 const PATH = "/api/researcher/backup";
-
-/** Time between two questions whether the backup is ready. */
-const ASK_AGAIN_MS = 1000;
 
 /**
  * A size for people.
@@ -30,24 +27,13 @@ export function offerBackup() {
     event.preventDefault();
     go.disabled = true;
     try {
-      show(await post(PATH, { passphrase: passphrase.value }));
+      follow(await post(PATH, { passphrase: passphrase.value }));
       passphrase.value = "";
     } catch (error) {
       go.disabled = false;
       tellTrouble(trouble, error);
     }
   });
-
-  /** Asks until the backup is made. If the server does not answer, it is asked again. */
-  async function ask() {
-    try {
-      show(await get(PATH));
-    } catch (error) {
-      tellTrouble(trouble, error);
-      // Asked again at once, the server would ask to sign in every second.
-      if (!(error instanceof Refused)) setTimeout(ask, ASK_AGAIN_MS);
-    }
-  }
 
   /** @param {Api.BackupState} now */
   function show(now) {
@@ -56,11 +42,9 @@ export function offerBackup() {
     byId("backup-download").hidden = now.state !== "ready";
     tell(trouble, now.state === "failed" ? `No backup was made: ${now.reason}.` : "");
     setText(byId("backup-state"), words(now));
-    if (isRunning) setTimeout(ask, ASK_AGAIN_MS);
   }
 
-  document.addEventListener("signed-in", ask);
-  ask();
+  const follow = followUntilMade(() => get(PATH), show, trouble);
 }
 
 /** @param {Api.BackupState} now */

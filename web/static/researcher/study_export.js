@@ -1,15 +1,12 @@
-// The study's export. It is started here, made by the server, and downloaded here. The page asks for its progress, and
-// may be closed meanwhile.
+// The study's export. It is started here, made by the server, and downloaded here.
 
-import { get, post, Refused } from "../shared/api.js";
+import { get, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
+import { followUntilMade } from "../shared/until_made.js";
 import { failedWords, progressShare, progressWords, readyWords } from "./study_export_words.js";
 
 const PATH = "/api/researcher/studies/{study}/export";
-
-/** Time between two requests for the progress. */
-const ASK_AGAIN_MS = 1000;
 
 /**
  * Shows the state of the export of `study`, and starts an export when a button is pressed.
@@ -26,23 +23,12 @@ export function showExport(study) {
     button.addEventListener("click", async () => {
       for (const each of buttons) each.disabled = true;
       try {
-        show(await post(PATH, { unblinded: button === unblinded }, { study }));
+        follow(await post(PATH, { unblinded: button === unblinded }, { study }));
       } catch (error) {
         for (const each of buttons) each.disabled = false;
         tellTrouble(trouble, error);
       }
     });
-  }
-
-  /** Asks for the state until the export is finished. If the server does not answer, it is asked again. */
-  async function ask() {
-    try {
-      show(await get(PATH, { study }));
-    } catch (error) {
-      tellTrouble(trouble, error);
-      // Asked again at once, the server would ask to sign in every second.
-      if (!(error instanceof Refused)) setTimeout(ask, ASK_AGAIN_MS);
-    }
   }
 
   /** @param {Api.StudyExportState} now */
@@ -57,10 +43,8 @@ export function showExport(study) {
     if (now.state === "running") {
       setText(byId("export-words"), progressWords(now));
       byId("export-bar", HTMLProgressElement).value = progressShare(now.progress);
-      setTimeout(ask, ASK_AGAIN_MS);
     }
   }
 
-  document.addEventListener("signed-in", ask);
-  ask();
+  const follow = followUntilMade(() => get(PATH, { study }), show, trouble);
 }
