@@ -284,7 +284,7 @@ async fn a_surgeons_link_is_for_one_session_and_ends_with_it() {
     // After the operator has closed the session, the tablet has no access, but the server accepts what it still holds.
     server.post("/api/operator/dismissals", json!({"session": session})).await;
     assert_eq!(closed(&mut page).await, CloseCode::from(4403));
-    for path in ["/api/surgeon/session", "/stream.mjpeg", "/api/openapi.json"] {
+    for path in ["/api/surgeon/session", "/tablet", "/stream.mjpeg", "/api/openapi.json"] {
         assert_eq!(self::status(&server, path, &cookie).await, 403, "{path}");
     }
     let refused = connect_async(upgrade(&server, "/live?role=surgeon", "surgeon")).await.unwrap_err();

@@ -1,4 +1,5 @@
 //! The page that a tablet opens once, and that tries what a trial needs of it. The operator's page tells the result.
+//! It is open to tablets that are let in: on others the live connection fails, whatever the network does.
 
 use askama::Template;
 use axum::Json;
@@ -11,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::error::Error;
 use super::json::JsonBody;
-use super::roles::SurgeonsTablet;
+use super::roles::Surgeon;
 use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
 use super::{AppState, tongue};
 use crate::doctor::{TabletPart, TriedTablet};
@@ -29,7 +30,7 @@ struct Page {
 #[utoipa::path(get, path = "/tablet", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
 pub(super) async fn tablet_page(
-    _: SurgeonsTablet,
+    _: Surgeon,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
     headers: HeaderMap,
@@ -64,7 +65,7 @@ struct TriedPart {
     (status = 200, description = "Noted", body = bool),
     (status = 422, description = "The body is malformed")))]
 pub(super) async fn tried(
-    _: SurgeonsTablet,
+    _: Surgeon,
     State(app): State<AppState>,
     headers: HeaderMap,
     JsonBody(trial): JsonBody<TabletTrial>,
