@@ -23,10 +23,6 @@ export class Places {
     return this.#all;
   }
 
-  get isFull() {
-    return this.#all.length === LOOKS.length;
-  }
-
   /**
    * Adds a place, which gets the first look that is free. Null if there is none.
    *
