@@ -3,6 +3,8 @@
 use std::net::{IpAddr, UdpSocket};
 use std::path::Path;
 
+use if_addrs::Interface;
+
 use super::finding::Finding;
 
 /// Folder in which Linux lists the network interfaces.
@@ -17,26 +19,49 @@ const ETHERNET: u32 = 1;
 const NETWORK: &str = "network";
 const CAMERA: &str = "camera's network";
 
-/// The address at which other devices can reach this machine.
+/// The addresses at which other devices can reach this machine.
 pub fn addresses() -> Finding {
-    match outward() {
-        Some(address) => Finding::well(NETWORK, format!("A tablet can reach this machine at {address}.")),
-        None => Finding::advice(
+    let found: Vec<String> = reachable_at().iter().map(ToString::to_string).collect();
+    if found.is_empty() {
+        return Finding::advice(
             NETWORK,
             "This machine is not connected to a network.",
             "Connect it to the tablet's network, unless all pages are opened on this machine.",
-        ),
+        );
+    }
+    Finding::well(NETWORK, format!("A tablet can reach this machine at {}.", found.join(" or at ")))
+}
+
+/// The address for links to this machine; `None` if it is not in a network.
+pub fn outward() -> Option<IpAddr> {
+    reachable_at().first().copied()
+}
+
+/// The address from which this machine would reach the world. In networks that lead no further, such as a cable to a
+/// tablet or an access point without the internet, its address in each of them.
+fn reachable_at() -> Vec<IpAddr> {
+    match towards_the_world() {
+        Some(address) => vec![address],
+        None => in_networks(if_addrs::get_if_addrs().unwrap_or_default()),
     }
 }
 
-/// The address from which this machine would reach the world; `None` if it is not in a network.
+/// The address on the way to the world; `None` if there is no such way.
 ///
 /// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The
 /// destination is an address reserved for documentation (RFC 5737).
-pub fn outward() -> Option<IpAddr> {
+fn towards_the_world() -> Option<IpAddr> {
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
     socket.connect("192.0.2.1:9").ok()?;
     socket.local_addr().ok().map(|address| address.ip())
+}
+
+/// The IPv4 addresses of those `interfaces` that are up. Addresses that the machine gave itself (RFC 3927) come last: it
+/// has them where nobody assigns any, as on a cable to a camera.
+fn in_networks(mut interfaces: Vec<Interface>) -> Vec<IpAddr> {
+    interfaces.retain(|interface| interface.is_oper_up() && !interface.is_loopback());
+    interfaces.sort_by_key(Interface::is_link_local);
+    interfaces.iter().map(Interface::ip).filter(IpAddr::is_ipv4).collect()
 }
 
 /// Whether each wired network that is up could carry a GigE camera's pictures. Empty if there is no such network.
@@ -96,6 +121,10 @@ impl Link {
 
 #[cfg(test)]
 mod tests {
+    use std::net::Ipv4Addr;
+
+    use if_addrs::{IfAddr, IfOperStatus, Ifv4Addr};
+
     use super::*;
     use crate::doctor::finding::Verdict;
 
@@ -107,6 +136,24 @@ mod tests {
             std::fs::write(folder.path().join(name), value).unwrap();
         }
         folder
+    }
+
+    #[test]
+    fn a_machine_in_a_network_of_its_own_is_reached_at_its_address_there() {
+        let interface = |ip: &str, oper_status| {
+            let Ok(IpAddr::V4(ip)) = ip.parse() else { panic!("{ip}") };
+            let netmask = Ipv4Addr::new(255, 255, 255, 0);
+            let addr = IfAddr::V4(Ifv4Addr { ip, netmask, prefixlen: 24, broadcast: None });
+            Interface { name: String::new(), addr, index: None, oper_status, is_p2p: false }
+        };
+        let found = in_networks(vec![
+            interface("127.0.0.1", IfOperStatus::Up),
+            interface("172.17.0.1", IfOperStatus::Down),
+            interface("169.254.7.9", IfOperStatus::Up),
+            interface("10.42.0.1", IfOperStatus::Up),
+        ]);
+        let found: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert_eq!(found, ["10.42.0.1", "169.254.7.9"]);
     }
 
     #[test]

@@ -30,7 +30,7 @@ impl ServerAddress {
         self.host_from(outward)
     }
 
-    /// The same, for a machine that reaches the world from the address `outward`.
+    /// The same, for a machine that others reach at the address `outward`.
     fn host_from(&self, outward: Option<IpAddr>) -> String {
         let ip = match outward {
             Some(address) => address,
