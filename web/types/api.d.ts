@@ -1460,7 +1460,7 @@ export interface components {
         Agreement: {
             /**
              * Format: double
-             * @description Upper end of its 95 % interval; none if repeats agree exactly.
+             * @description Upper end of its 95 % interval; none if it cannot be computed.
              */
             high?: number | null;
             /**
@@ -1470,7 +1470,7 @@ export interface components {
             icc: number;
             /**
              * Format: double
-             * @description Lower end of its 95 % interval; none if repeats agree exactly.
+             * @description Lower end of its 95 % interval; none if it cannot be computed.
              */
             low?: number | null;
         };

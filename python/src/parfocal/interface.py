@@ -90,13 +90,13 @@ class Agreement(TypedDict):
     """Agreement of repeats."""
 
     high: NotRequired[float | None]
-    """Upper end of its 95 % interval; none if repeats agree exactly."""
+    """Upper end of its 95 % interval; none if it cannot be computed."""
 
     icc: float
     """ICC(A,1), at most 1; negative if repeats differ more than subjects."""
 
     low: NotRequired[float | None]
-    """Lower end of its 95 % interval; none if repeats agree exactly."""
+    """Lower end of its 95 % interval; none if it cannot be computed."""
 
 class AnalysedSession(TypedDict):
     """A session of the study, and whether it counts."""

@@ -327,7 +327,13 @@ fn repeats(policies: &[String], sessions: &[Vec<&Value>]) -> Repeats {
         return unknown("There are fewer than two pairs of repeats: nothing to compare.");
     }
     let Some(found) = agreement(&subjects) else {
-        return unknown("All values are the same: their agreement has no measure.");
+        let mut values = subjects.iter().flatten();
+        let first = values.next();
+        return unknown(if values.all(|value| Some(value) == first) {
+            "All values are the same: their agreement has no measure."
+        } else {
+            "Each policy in a session and each repeat has the same mean: their agreement has no measure."
+        });
     };
 
     let ends = found.low.zip(found.high).map(|(low, high)| Interval { low, high });

@@ -93,7 +93,7 @@ fn session(number: usize) -> SessionId {
     SessionId(Uuid::from_u128(number as u128))
 }
 
-fn observations(study: &Study) -> Vec<Value> {
+fn observations(sessions: &[Session]) -> Vec<Value> {
     let of_session = |(number, own): (usize, &Session)| {
         let observation = |(place, setting): (usize, &Setting)| Value {
             session: session(number),
@@ -106,7 +106,7 @@ fn observations(study: &Study) -> Vec<Value> {
         };
         own.settings.iter().enumerate().map(observation).collect::<Vec<_>>()
     };
-    study.sessions.iter().enumerate().flat_map(of_session).collect()
+    sessions.iter().enumerate().flat_map(of_session).collect()
 }
 
 fn rating() -> Outcome {
@@ -124,7 +124,7 @@ fn assert_near(found: f64, expected: f64, what: &str) {
 fn simulated_studies_have_the_figures_that_scipy_has() {
     for study in studies() {
         let name = study.name.as_str();
-        let found = compare(rating(), &study.policies, &observations(&study), 7);
+        let found = compare(rating(), &study.policies, &observations(&study.sessions), 7);
         let expected = &study.expected;
         assert_eq!((found.complete, found.left_out), (expected.complete, 1), "{name}");
 
@@ -170,12 +170,12 @@ fn simulated_studies_have_the_figures_that_scipy_has() {
 #[test]
 fn an_effect_is_found_if_there_is_one_and_not_otherwise() {
     let [none, large] = studies().try_into().ok().unwrap();
-    let found = compare(rating(), &none.policies, &observations(&none), 7);
+    let found = compare(rating(), &none.policies, &observations(&none.sessions), 7);
     assert!(found.difference.said.starts_with("No difference between the policies was shown"), "{found:?}");
     assert!(found.pairs.iter().all(|pair| pair.said.starts_with("No difference")), "{found:?}");
     assert!(found.position.said.starts_with("No trend"), "{found:?}");
 
-    let found = compare(rating(), &large.policies, &observations(&large), 7);
+    let found = compare(rating(), &large.policies, &observations(&large.sessions), 7);
     assert!(found.difference.said.starts_with("The policies differ: Friedman χ²(2) = 15.85"), "{found:?}");
     let said: Vec<&str> = found.pairs.iter().map(|pair| pair.said.split(':').next().unwrap()).collect();
     assert_eq!(
@@ -241,6 +241,20 @@ fn where_there_is_nothing_to_compute_a_sentence_says_so_and_json_has_no_odd_numb
         assert!(json["position"]["means"].as_array().unwrap().iter().all(serde_json::Value::is_number), "{name}");
     }
     assert!(compare_simple(&[&[Some(1.0)]]).pairs.is_empty());
+}
+
+#[test]
+fn repeats_without_a_measure_of_agreement_are_described_as_they_are() {
+    let said_of = |values: [f64; 4]| {
+        let setting = |(policy, value): (&str, f64)| Setting { policy: policy.to_owned(), value: Some(value) };
+        let settings = ["a", "a", "b", "b"].into_iter().zip(values).map(setting).collect();
+        let sessions = vec![Session { surgeon: "S-1".to_owned(), settings }];
+        let values = observations(&sessions);
+        compare(rating(), &["a".to_owned(), "b".to_owned()], &values, 1).repeats.said
+    };
+    assert!(said_of([3.0; 4]).starts_with("All values are the same"));
+    let opposed = said_of([3.0, 4.0, 4.0, 3.0]);
+    assert!(opposed.starts_with("Each policy in a session and each repeat has the same mean"), "{opposed}");
 }
 
 #[test]

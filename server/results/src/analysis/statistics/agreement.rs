@@ -12,14 +12,14 @@ use utoipa::ToSchema;
 pub struct Agreement {
     /// ICC(A,1), at most 1; negative if repeats differ more than subjects.
     pub icc: f64,
-    /// Lower end of its 95 % interval; none if repeats agree exactly.
+    /// Lower end of its 95 % interval; none if it cannot be computed.
     pub low: Option<f64>,
-    /// Upper end of its 95 % interval; none if repeats agree exactly.
+    /// Upper end of its 95 % interval; none if it cannot be computed.
     pub high: Option<f64>,
 }
 
 /// The agreement within `subjects`, each with the same two or more repeats. `None` for fewer than two subjects or
-/// repeats, and if all values are equal.
+/// repeats, if all values are equal, and if all subjects and all repeats have the same mean.
 pub fn agreement(subjects: &[Vec<f64>]) -> Option<Agreement> {
     let repeats = subjects.first()?.len();
     if subjects.len() < 2 || repeats < 2 {
@@ -49,18 +49,18 @@ pub fn agreement(subjects: &[Vec<f64>]) -> Option<Agreement> {
     let error_square = if rest <= all * 1e-14 { 0.0 } else { rest / ((n - 1.0) * (k - 1.0)) };
 
     let divisor = subjects_square + (k - 1.0) * error_square + k * (repeats_square - error_square) / n;
-    let icc = (subjects_square - error_square) / divisor;
-    if !icc.is_finite() {
+    // Two subjects of two repeats that differ the other way round, such as 3, 4 and 4, 3.
+    if divisor <= error_square * 1e-12 {
         return None;
     }
+    let icc = (subjects_square - error_square) / divisor;
     if icc >= 1.0 - 1e-12 {
         return Some(Agreement { icc: 1.0, low: None, high: None });
     }
 
     let squares = MeanSquares { subjects: subjects_square, repeats: repeats_square, error: error_square };
-    let (low, high) = squares.interval(icc, n, k);
-    let known = |end: f64| end.is_finite().then_some(end);
-    Some(Agreement { icc, low: known(low), high: known(high) })
+    let (low, high) = squares.interval(icc, n, k).unzip();
+    Some(Agreement { icc, low, high })
 }
 
 /// Mean squares of a two-way analysis of variance.
@@ -72,8 +72,8 @@ struct MeanSquares {
 
 impl MeanSquares {
     /// The 95 % interval of `icc`, of `n` subjects with `k` repeats each: McGraw & Wong 1996, table 7, case 2A, with
-    /// degrees of freedom by Satterthwaite.
-    fn interval(&self, icc: f64, n: f64, k: f64) -> (f64, f64) {
+    /// degrees of freedom by Satterthwaite. `None` if these come to nothing: below 0 their parts can cancel out.
+    fn interval(&self, icc: f64, n: f64, k: f64) -> Option<(f64, f64)> {
         let repeats = k * icc / (n * (1.0 - icc)) * self.repeats;
         let error = (1.0 + k * icc * (n - 1.0) / (n * (1.0 - icc))) * self.error;
         let spread = repeats.powi(2) / (k - 1.0) + error.powi(2) / ((n - 1.0) * (k - 1.0));
@@ -84,7 +84,7 @@ impl MeanSquares {
         let rest = k * self.repeats + (k * n - k - n) * self.error;
         let low = n * (self.subjects - f_low * self.error) / (f_low * rest + n * self.subjects);
         let high = n * (f_high * self.subjects - self.error) / (rest + n * f_high * self.subjects);
-        (low, high)
+        (low.is_finite() && high.is_finite()).then_some((low, high))
     }
 }
 

@@ -138,6 +138,11 @@ fn what_has_no_answer_has_none() {
     assert_eq!((friedman(&two_treatments, 1), trend(&two_treatments)), (None, None));
     assert_eq!((friedman(&[], 1), trend(&[]), agreement(&[])), (None, None, None));
 
+    let opposed = [3.0, 4.0].map(|first| vec![0.1 * first, 0.7 - 0.1 * first]);
+    assert_eq!(agreement(&opposed), None, "nothing but rounding in its divisor");
+    let cancelling = agreement(&[vec![1.0, 3.0, 1.0], vec![3.0, 0.0, 1.0]]).unwrap();
+    assert_eq!((cancelling.low, cancelling.high), (None, None), "no half of an interval");
+
     let perfect = vec![vec![1.0, 1.0], vec![2.0, 2.0], vec![5.0, 5.0]];
     assert_eq!(agreement(&perfect), Some(Agreement { icc: 1.0, low: None, high: None }));
 }
