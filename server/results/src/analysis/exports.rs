@@ -152,12 +152,13 @@ pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
         unblinded = unblinded.max(session.unblinded(folder)?);
     }
     let sites = sites(&sessions)?;
-    let databases = Databases::of(&sessions, &definition);
+    let left_out = left_out(folder)?;
+    let gone = withdrawn_sessions(&sessions, &left_out);
+    let databases = Databases::of(&sessions, &gone, &definition);
     databases.put_in_order(&mut sessions);
     let definition_sha256 = sessions.first().map(|session| session.study().definition_sha256.clone());
 
     let mut notes: Vec<String> = databases.note().into_iter().collect();
-    let left_out = left_out(folder)?;
     let named = definition.protocols.iter().map(|one| one.name.as_str());
     let without = named.filter(|name| !protocols.contains_key(*name));
     let (withdrawn, none): (Vec<&str>, Vec<&str>) =
@@ -170,7 +171,6 @@ pub fn read(folder: &Path) -> Result<StudyRecords, AnalysisError> {
         notes.push(format!("Every session of these protocols was withdrawn: {}.", withdrawn.join(", ")));
     }
 
-    let gone = withdrawn_sessions(&sessions, &left_out);
     let mut by_protocol = Vec::new();
     for name in definition.protocols.iter().map(|one| &one.name) {
         let Some(protocol) = protocols.remove(name) else { continue };
@@ -356,7 +356,8 @@ struct Databases {
 }
 
 impl Databases {
-    fn of(sessions: &[ExportedSession], definition: &Outline) -> Self {
+    /// The databases of `sessions`. The codes of sessions that are `gone` are told nowhere.
+    fn of(sessions: &[ExportedSession], gone: &BTreeSet<String>, definition: &Outline) -> Self {
         let mut sites: Vec<(String, Vec<String>)> = Vec::new();
         for site in definition.sites.iter().map(|site| &site.name) {
             for session in sessions.iter().filter(|session| session.place().site == *site) {
@@ -369,7 +370,7 @@ impl Databases {
         }
 
         let mut databases: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for session in sessions {
+        for session in sessions.iter().filter(|session| !gone.contains(&session.session().session.to_string())) {
             databases.entry(session.code()).or_default().insert(&session.database);
         }
         let several = databases.into_iter().filter(|(_, databases)| databases.len() > 1);
