@@ -206,6 +206,7 @@ fn a_camera_that_fails_is_reported_and_comes_back() {
         let status = stage.status_until(|status| status.held == Some(Hold::CameraFailed));
         assert!(!status.camera.working && status.lens.working);
         assert!(status.message.as_ref().unwrap().contains("no frame"), "{:?}", status.message);
+        assert!(status.camera.message.contains("no frame"), "{}", status.camera.message);
         assert_eq!(stage.lens.position(), power(0.6));
         let again = stage.status_until(|_| true);
         assert_eq!(again.policy, status.policy, "the policy stays in charge");

@@ -270,7 +270,11 @@ impl Worker {
         let reason = self.hold_reason();
         let held = reason.map(|reason| reason.hold);
         let mut camera = self.source.health();
-        camera.working &= held != Some(Hold::CameraFailed);
+        // The driver may think that all is well. If it knows more, its own words stay.
+        if let Some(fault) = self.camera_fault.as_ref().filter(|_| camera.working) {
+            camera.working = false;
+            camera.message = Arc::clone(&fault.message);
+        }
 
         ControlStatus {
             at: now,
