@@ -85,5 +85,25 @@ pub(super) fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> 
 }
 
 pub(super) fn bearer(headers: &HeaderMap) -> Option<&str> {
-    headers.get(AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
+    // Programs may write the scheme in any case (RFC 9110, 11.1).
+    let (scheme, token) = headers.get(AUTHORIZATION)?.to_str().ok()?.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then_some(token)
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::http::HeaderValue;
+
+    use super::*;
+
+    #[test]
+    fn a_key_is_read_whatever_the_case_of_its_scheme() {
+        let key_in = |value: &'static str| {
+            let headers = HeaderMap::from_iter([(AUTHORIZATION, HeaderValue::from_static(value))]);
+            bearer(&headers).map(str::to_owned)
+        };
+        assert_eq!(key_in("Bearer 0f"), Some("0f".to_owned()));
+        assert_eq!(key_in("bearer 0f"), Some("0f".to_owned()));
+        assert_eq!((key_in("Basic 0f"), key_in("Bearer")), (None, None));
+    }
 }
