@@ -78,6 +78,9 @@ impl Keys {
                 keys.write(&path).map_err(io)?;
                 Ok(keys)
             }
+            Err(error) if error.kind() == std::io::ErrorKind::InvalidData => {
+                Err(KeyError::Damaged { path, reason: "it is not UTF-8".to_owned() })
+            }
             Err(error) => Err(io(error)),
         }
     }
@@ -240,7 +243,8 @@ mod tests {
     #[test]
     fn a_damaged_file_is_reported_as_damaged() {
         let dir = tempfile::tempdir().unwrap();
-        for text in ["", "surgeon = 3", "surgeon = \"\"\noperator = \"\"\nresearcher = \"\"\n"] {
+        let empty_keys = b"surgeon = \"\"\noperator = \"\"\nresearcher = \"\"\n";
+        for text in [b"".as_slice(), b"surgeon = 3", empty_keys, b"\xff\xfes\0u\0"] {
             fs::write(dir.path().join(FILE), text).unwrap();
             let error = Keys::load_or_create(dir.path()).err().expect("damaged").to_string();
             assert!(error.contains("keys.toml") && error.contains("delete it"), "{error}");
