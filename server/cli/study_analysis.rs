@@ -11,7 +11,7 @@ use parfocal_base::notices;
 use parfocal_records::store::Reader;
 use parfocal_records::store::export::verify::Verdict;
 use parfocal_results::analysis::{
-    Analysis, Comparison, ProtocolAnalysis, SiteAnalysis, analyse, analyse_package, decimals,
+    Analysis, Comparison, ProtocolAnalysis, SiteAnalysis, analyse, analyse_package, counted, decimals,
 };
 use parfocal_results::package;
 
@@ -139,6 +139,11 @@ fn write_protocol(text: &mut String, protocol: &ProtocolAnalysis) {
     for note in &protocol.notes {
         let _ = writeln!(text, "{note}");
     }
+    for session in &protocol.sessions {
+        let Some(remark) = &session.remark else { continue };
+        let of = session.surgeon.as_ref().map_or_else(String::new, |surgeon| format!("of {surgeon} "));
+        let _ = writeln!(text, "Session {of}at {} ({}): {remark}.", session.site, session.session);
+    }
     for (place, compared) in protocol.outcomes.iter().enumerate() {
         write_outcome(text, compared);
         for site in &protocol.by_site {
@@ -149,9 +154,9 @@ fn write_protocol(text: &mut String, protocol: &ProtocolAnalysis) {
 
 /// The figures of one site, below those of all.
 fn write_site(text: &mut String, site: &SiteAnalysis, compared: &Comparison) {
-    let surgeons = if site.surgeons == 1 { "surgeon" } else { "surgeons" };
-    let sessions = if site.sessions == 1 { "session" } else { "sessions" };
-    let _ = writeln!(text, "  at {}: {} {surgeons}, {} {sessions}", site.site, site.surgeons, site.sessions);
+    let surgeons = counted(site.surgeons, "surgeon");
+    let sessions = counted(site.sessions, "session");
+    let _ = writeln!(text, "  at {}: {surgeons}, {sessions}", site.site);
     write_policies(text, "    ", compared);
     for sentence in sentences(compared) {
         let _ = writeln!(text, "    {sentence}");

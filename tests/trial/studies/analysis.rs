@@ -279,7 +279,12 @@ async fn the_report_and_the_folder_of_a_package_have_each_site_and_need_no_datab
 
     let out = folder.path().join("analysis");
     let printed = done(&["study", "analyse", text(&joined), "--out", text(&out)]);
-    for said in ["sites: leeds, london", "  at leeds: 4 surgeons, 4 sessions", "  at london: 2 surgeons, 2 sessions"] {
+    for said in [
+        "sites: leeds, london",
+        "  at leeds: 4 surgeons, 4 sessions",
+        "  at london: 2 surgeons, 2 sessions",
+        "): aborted.\nSession at leeds (",
+    ] {
         assert!(printed.contains(said), "{said} is not in {printed}");
     }
 

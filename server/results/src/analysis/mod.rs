@@ -29,4 +29,4 @@ pub use report::{
 };
 pub use study::{analyse, analyse_package};
 pub use tables::TABLES;
-pub use words::{decimals, p_words};
+pub use words::{counted, decimals, p_words};
