@@ -49,8 +49,8 @@ study <- list()
 "#;
 
 /// Columns with few distinct texts, which become factors.
-const FACTORS: [&str; 11] =
-    ["site", "participant", "protocol", "policy", "kind", "status", "question", "measure", "by", "role", "stage"];
+const FACTORS: [&str; 10] =
+    ["site", "participant", "protocol", "policy", "kind", "status", "question", "measure", "role", "stage"];
 
 /// The script for `tables`, each a CSV file beside it.
 pub fn script(tables: &[JoinedTable]) -> String {
