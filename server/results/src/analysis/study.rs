@@ -186,7 +186,8 @@ fn notes() -> Vec<String> {
         "Only sessions that were completed and not withdrawn count. Of several answers to a question, the one given \
          last counts, with its correction, unless it arrived too late.",
         "A surgeon is one unit of every test: the mean over all settings of a policy. A surgeon with a missing value \
-         is left out of the tests of that outcome; the number of such surgeons is given.",
+         is left out of that outcome's tests between policies; the number of such surgeons is given. Repeats and \
+         positions are compared over all sessions without a missing value.",
         "p values are two-sided. Holm's correction covers the pairs of one outcome. Nothing is corrected for the \
          number of outcomes: choose the main one before there are data.",
         "Intervals cover 95 %. Those of differences and effect sizes are percentile bootstrap intervals over \
