@@ -6,7 +6,7 @@ use std::path::Path;
 use super::comparison::{Comparison, compare};
 use super::error::AnalysisError;
 use super::gathering::{GatheredSession, GatheredSetting, gather};
-use super::outcomes::{FOCAL_ERROR, IN_FOCUS, Outcome, Value, asked, asked_of_session, driven};
+use super::outcomes::{FOCAL_ERROR, Outcome, Value, asked, asked_of_session, driven};
 use super::records::{ProtocolRecords, StudyRecords};
 use super::report::{
     AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SiteAnalysis, SurgeonWords, WholeSessions,
@@ -207,10 +207,9 @@ fn protocol_notes(sessions: &[AnalysedSession], gathered: &[GatheredSession], me
         notes.push("A surgeon with several sessions counts once, by the mean over all of them.".to_owned());
     }
 
-    let known = |name: &str| measured.iter().any(|outcome| outcome.outcome == name);
     if measured.is_empty() {
         notes.push("There is no telemetry: turns, travel and focal error are not known.".to_owned());
-    } else if !known(FOCAL_ERROR) || !known(IN_FOCUS) {
+    } else if !measured.iter().any(|outcome| outcome.outcome == FOCAL_ERROR) {
         notes.push(
             "The focal error is not known: only a simulated camera knows the optimum, and it is not estimated here."
                 .to_owned(),
