@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -82,6 +83,32 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
         assert wrong in run.stderr
         assert said in run.stderr
         assert "Traceback" not in run.stderr
+
+
+def test_a_film_that_does_not_fit_onto_the_disk_is_named_and_not_left(tmp_path: Path) -> None:
+    """A part of a film would be taken for one."""
+    write(tmp_path / "surface.png", np.random.default_rng(2).integers(0, 256, (200, 300)))
+    command = [sys.executable, "-s", str(TOOL), "--out", str(tmp_path / "films"), "--each", "1"]
+    run = subprocess.run(
+        [*command, str(tmp_path / "surface.png")],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),
+    )
+    assert run.returncode == 1
+    assert f"ffmpeg could not write {tmp_path / 'films/surface-0.mp4'}" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert list((tmp_path / "films").iterdir()) == []
+
+
+def test_files_of_an_operating_system_are_no_planes(tmp_path: Path) -> None:
+    """Such as those that macOS puts beside pictures."""
+    stack = tmp_path / "scene"
+    stack.mkdir()
+    write(stack / "00.png", np.random.default_rng(2).integers(0, 256, (200, 300)))
+    (stack / "._00.png").write_text("no picture")
+    make(tmp_path / "films", "--each", "1", str(stack))
+    assert (tmp_path / "films/scene-0.mp4").is_file()
 
 
 def test_two_surfaces_of_one_name_are_refused(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import struct
 import subprocess
 import sys
@@ -83,3 +84,19 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     done = run(tmp_path / "missing/out", f"{one}=1")
     assert done.returncode == 1
     assert done.stderr == f"cannot write {tmp_path / 'missing/out'}: No such file or directory\n"
+
+
+def test_weights_that_are_there_stay_if_the_new_ones_do_not_fit_onto_the_disk(tmp_path: Path) -> None:
+    """They may be those that are averaged."""
+    one = write(tmp_path / "one", bias=[1.0] * 4096)
+    before = Path(one).read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-s", str(TOOL), "--out", one, f"{one}=1"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),
+    )
+    assert done.returncode == 1
+    assert done.stderr == f"cannot write {one}: File too large\n"
+    assert Path(one).read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["one"]

@@ -9,6 +9,7 @@ of one network, in float32. Needs numpy.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 from pathlib import Path
@@ -67,9 +68,14 @@ def write(file: Path, weights: Weights, made: str) -> None:
         data += raw
     head = json.dumps(entries).encode()
     head += b" " * (-len(head) % 8)
+    # Weights that are there stay until the new ones are whole.
+    unfinished = file.with_name(f".{file.name}.partial")
     try:
-        file.write_bytes(len(head).to_bytes(8, "little") + head + data)
+        unfinished.write_bytes(len(head).to_bytes(8, "little") + head + data)
+        unfinished.replace(file)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
         raise SystemExit(f"cannot write {file}: {error.strerror}") from error
 
 

@@ -11,8 +11,10 @@ Every core makes films of another surface. Needs ffmpeg and numpy.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import shutil
 import subprocess
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -31,7 +33,7 @@ SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 def read(file: Path) -> Picture:
     """Return a picture as gray levels, at most WIDEST pixels wide."""
     scale = f"scale='min({WIDEST},iw)':-2:flags=area,format=gray"
-    command = ["ffmpeg", "-v", "error", "-i", str(file), "-frames:v", "1", "-vf", scale]
+    command = ["ffmpeg", "-v", "error", "-i", f"file:{file}", "-frames:v", "1", "-vf", scale]
     command += ["-f", "image2pipe", "-c:v", "pgm", "-"]
     run = subprocess.run(command, capture_output=True)
     pgm = run.stdout
@@ -54,7 +56,9 @@ def blurred(picture: Picture, sigma: float) -> Picture:
 
 def all_in_focus(folder: Path) -> Picture:
     """Return one picture of a focal stack: each place from the plane where it is sharpest."""
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
+    # Hidden files are an operating system's, such as `._picture.jpg`.
+    named = (file for file in folder.iterdir() if not file.name.startswith("."))
+    files = sorted(file for file in named if file.suffix.lower() in SUFFIXES)
     if not files:
         raise SystemExit(f"{folder} holds no pictures")
     best = np.zeros(0, np.float32)
@@ -123,7 +127,8 @@ def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
     # One thread, so that the same seed gives the same film on every machine.
     video = ["-c:v", "libx264", "-preset", "veryfast", "-threads", "1"]
     video += ["-crf", str(quality), "-pix_fmt", "yuv420p"]
-    command = ["ffmpeg", "-y", "-v", "error", *raw, *video, str(file)]
+    unfinished = file.with_name(f".{file.name}.partial")
+    command = ["ffmpeg", "-y", "-v", "error", *raw, *video, "-f", "mp4", f"file:{unfinished}"]
     encoder = subprocess.Popen(command, stdin=subprocess.PIPE)
     assert encoder.stdin is not None
     for frame in range(frames):
@@ -154,10 +159,18 @@ def film(surface: Picture, file: Path, frames: int, seed: int) -> None:
         picture[is_glint] = 255
         if noise:
             picture += np.float32(noise) * random.standard_normal(picture.shape, np.float32)
-        encoder.stdin.write(np.clip(np.rint(picture), 0, 255).astype(np.uint8).tobytes())
-    encoder.stdin.close()
+        try:
+            encoder.stdin.write(np.clip(np.rint(picture), 0, 255).astype(np.uint8).tobytes())
+        except BrokenPipeError:
+            # ffmpeg has ended early, and has said why.
+            break
+
+    with contextlib.suppress(BrokenPipeError):
+        encoder.stdin.close()
     if encoder.wait() != 0:
+        unfinished.unlink(missing_ok=True)
         raise SystemExit(f"ffmpeg could not write {file}")
+    unfinished.replace(file)
 
 
 def films(path: Path, first_seed: int, given: argparse.Namespace) -> None:
@@ -167,13 +180,24 @@ def films(path: Path, first_seed: int, given: argparse.Namespace) -> None:
         film(surface, given.out / f"{path.stem}-{number}.mp4", given.frames, first_seed + number)
 
 
+def whole(least: int) -> Callable[[str], int]:
+    """Read a whole number of at least so much."""
+
+    def read_number(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of {least} or more")
+        return int(text)
+
+    return read_number
+
+
 def main() -> None:
     """Make the films that the command line names."""
     parser = argparse.ArgumentParser(description="Make films of still surfaces, to train on.")
     parser.add_argument("--out", type=Path, required=True, help="folder of the films")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the first film; the others follow")
-    parser.add_argument("--frames", type=int, default=160, help="frames of each film")
-    parser.add_argument("--each", type=int, default=2, help="films of each surface")
+    parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first film; the others follow")
+    parser.add_argument("--frames", type=whole(1), default=160, help="frames of each film")
+    parser.add_argument("--each", type=whole(1), default=2, help="films of each surface")
     parser.add_argument("surface", type=Path, nargs="+", help="photograph, or folder of a focal stack")
     given = parser.parse_args()
     if not shutil.which("ffmpeg"):
@@ -184,7 +208,10 @@ def main() -> None:
         if stems.count(stem) > 1:
             raise SystemExit(f"two surfaces are named {stem}, and so would be their films: rename one")
 
-    given.out.mkdir(parents=True, exist_ok=True)
+    try:
+        given.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SystemExit(f"cannot make the folder {given.out}: {error.strerror}") from error
     first_seeds = [given.seed + given.each * index for index in range(len(given.surface))]
     with ProcessPoolExecutor() as cores:
         # The list waits for the films, and raises what went wrong with one.
