@@ -169,8 +169,12 @@ def test_a_program_that_ends_is_told_with_a_sentence(env: FocusEnv) -> None:
 def test_what_the_program_refuses_is_its_own_sentence(tmp_path: Path) -> None:
     with pytest.raises(parfocal.NoProgram, match=r"did not start: .*there is no folder"):
         FocusEnv(tmp_path / "nowhere")
-    with pytest.raises(parfocal.NoProgram, match=r"did not start: .*Mono9"):
+    with pytest.raises(ValueError, match=r"^invalid value 'Mono9' for '--raw <FORMAT>': .*choose from"):
         FocusEnv(raw="Mono9")
+    with pytest.raises(ValueError, match=r"'--frames <N>'"):
+        FocusEnv(frames=0)
+    with pytest.raises(ValueError, match=r"'patches' for '--observation .*\[possible values: patch, view\]"):
+        FocusEnv(observation="patches")
     with pytest.raises(parfocal.NoProgram, match=r"did not start: .*nothing.mp4"):
         FocusEnv(footage=tmp_path / "nothing.mp4")
     stranger = tmp_path / "parfocal"

@@ -86,6 +86,10 @@ class _Simulation:
         except (ValueError, KeyError, TypeError):
             said = self._said()
             self.close()
+            if said.startswith("error: invalid value"):
+                # It names the option, which is called as the argument is.
+                sentence = said.split("\n\n")[0].removeprefix("error: ")
+                raise ValueError(" ".join(sentence.split())) from None
             raise NoProgram(f"The simulation did not start: {last_words(said)}") from None
         if not known:
             self.close()
