@@ -57,6 +57,8 @@ def test_requests_answer_with_what_the_interface_promises(server: Server) -> Non
     with server.client("operator") as client:
         health = client.service.healthz()
         assert health["version"] == interface.VERSION == parfocal.__version__
+        # The wheel is named by it.
+        assert f'\nversion = "{health["version"]}"\n' in (ROOT / "python" / "pyproject.toml").read_text()
         assert health["simulated"]
         assert "practice" in [protocol["name"] for protocol in client.operator.choices()["protocols"]]
         assert client.operator.session() is None
