@@ -7,6 +7,8 @@ fn bench(folder: &TempDir) -> (String, Emulator) {
     let still = folder.path().join("still.png");
     let noise = |x: u32, y: u32| u8::try_from((x * 7919 + y * 104_729 + x * y * 31) % 200).unwrap();
     image::GrayImage::from_fn(160, 120, |x, y| image::Luma([noise(x, y)])).save(&still).unwrap();
+    let larger = folder.path().join("larger.png");
+    image::GrayImage::from_fn(320, 240, |x, y| image::Luma([noise(x, y)])).save(&larger).unwrap();
     let model = Model { latency: Duration::ZERO, ..Model::default() };
     (format!("footage:{}", still.display()), Emulator::start(model, Arc::new(SystemClock)).unwrap())
 }
@@ -46,9 +48,18 @@ fn a_bench_is_recorded_by_a_stepper_whose_failure_loses_nothing() {
     let told = complaint(&record());
     assert!(told.contains("failed at pose 3 (exit status: 5)") && told.contains("2 of 4 poses are saved"), "{told}");
     fs::remove_file(&broken).unwrap();
+
+    // A camera that was set to another size in between does not spoil the poses before.
+    let [still, larger, aside] = ["still.png", "larger.png", "aside.png"].map(|name| folder.path().join(name));
+    fs::rename(&still, &aside).unwrap();
+    fs::rename(&larger, &still).unwrap();
+    let told = complaint(&record());
+    assert!(told.contains("holds another scan (with pictures of 120x90 pixels, not 240x180)"), "{told}");
+    fs::rename(&aside, &still).unwrap();
+
     let output = record();
     assert!(output.status.success(), "{}", complaint(&output));
-    assert_eq!(fs::read_to_string(&log).unwrap().split_whitespace().collect::<String>(), "12334");
+    assert_eq!(fs::read_to_string(&log).unwrap().split_whitespace().collect::<String>(), "123334");
     let scan = ScanFolder::open(&out).unwrap().whole().unwrap();
     assert!(scan.header().lens.as_ref().unwrap().contains("Optotune") && scan.header().simulated);
     // 5 to 10 dpt in the units of firmware A: (dpt + 5) * 200; each pose sends the lens to all three, in its own order.

@@ -62,17 +62,17 @@ impl<'a> Options<'a> {
         unit: &str,
     ) -> Result<Option<T>, BadOptions>
     where
-        T: FromStr<Err: Display> + PartialOrd + Display,
+        T: FromStr + PartialOrd + Display,
     {
-        match self.take(name)? {
-            Some(value) if !range.contains(&value) => Err(BadOptions(format!(
-                "in '{}': {name}={value}: must be from {} to {}{unit}",
-                self.spec,
-                range.start(),
-                range.end()
-            ))),
-            value => Ok(value),
-        }
+        self.known.push(name);
+        let Some(text) = self.values.remove(name) else { return Ok(None) };
+
+        let value = text.parse().ok().filter(|value| range.contains(value));
+        let outside = || {
+            let (least, most) = (range.start(), range.end());
+            BadOptions(format!("in '{}': {name}={text}: must be from {least} to {most}{unit}", self.spec))
+        };
+        value.map(Some).ok_or_else(outside)
     }
 
     /// Rejects unknown options.
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_number_outside_its_range_is_refused_by_name() {
-        for value in ["nan", "NaN", "inf", "-inf", "infinity", "200.5", "-0.5", "1e999"] {
+        for value in ["five", "", "nan", "NaN", "inf", "-inf", "infinity", "200.5", "-0.5", "1e999"] {
             let spec = format!("x?low={value}");
             let (_, mut options) = Options::split(&spec).unwrap();
             let said = options.take_within("low", 0.0..=200.0, " °C").unwrap_err().to_string();

@@ -81,7 +81,7 @@ impl ScanFolder {
             return Err(format!("pose {number} is listed twice"));
         }
 
-        if let Some(first) = self.poses.values().next().filter(|first| (first.width, first.height) != (width, height)) {
+        if let Some(first) = self.of_another_size(width, height) {
             return Err(format!(
                 "pose {number} is {width}x{height} pixels, but pose {} is {}x{}",
                 first.pose, first.width, first.height
@@ -107,6 +107,11 @@ impl ScanFolder {
             Some(image) => Err(format!("{:?} is not a file in the scan's folder", image.file)),
             None => Ok(()),
         }
+    }
+
+    /// A stored pose whose pictures do not have this size.
+    pub(super) fn of_another_size(&self, width: usize, height: usize) -> Option<&Pose> {
+        self.poses.values().next().filter(|first| (first.width, first.height) != (width, height))
     }
 
     /// The scan's folder.

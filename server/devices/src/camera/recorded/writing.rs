@@ -39,6 +39,13 @@ pub struct TakenPose {
     pub truth: Option<FocalPower>,
 }
 
+impl TakenPose {
+    /// Width and height of its pictures.
+    fn size(&self) -> (usize, usize) {
+        self.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height))
+    }
+}
+
 impl ScanRecording {
     /// Begins a scan in `path`, a new or empty folder, or continues the scan there if it was begun with
     /// the same `header` (apart from the software's version).
@@ -79,8 +86,15 @@ impl ScanRecording {
     /// Stores a pose.
     ///
     /// # Errors
-    /// If it cannot be written. Then no part of it is left.
+    /// If its pictures have another size than those of the poses before, or it cannot be written. Then no part of it is
+    /// left.
     pub fn store(&mut self, shot: &TakenPose) -> Result<(), ScanError> {
+        let (width, height) = shot.size();
+        if let Some(first) = self.folder.of_another_size(width, height) {
+            let had = format!("with pictures of {}x{} pixels, not {width}x{height}", first.width, first.height);
+            return Err(ScanError::other(self.folder.path(), &had));
+        }
+
         let name = format!("pose{:04}", shot.pose);
         let partial = self.folder.path().join(format!(".{name}.partial"));
         let stored = self.write(shot, &name, &partial);
@@ -116,7 +130,7 @@ impl ScanRecording {
         let _ = fs::remove_dir_all(&whole);
         fs::rename(partial, &whole)?;
 
-        let (width, height) = shot.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height));
+        let (width, height) = shot.size();
         let TakenPose { pose, patch, optimum, truth, .. } = *shot;
         let pose = Pose { pose, width, height, patch: (patch.x, patch.y), optimum, truth, images };
 
