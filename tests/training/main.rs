@@ -6,7 +6,9 @@ mod bench;
 mod program;
 
 use std::cell::Cell;
+use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -197,6 +199,14 @@ fn trainings_are_compared_by_what_their_folders_hold() {
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 3);
     assert!(String::from_utf8_lossy(&output.stderr).contains("begun is left out: it has saved nothing yet"));
 
+    // A training that still draws its pictures, or was stopped there, has a lock alone in its folder.
+    let drawing = folder.path().join("drawing");
+    let drawing = drawing.to_str().unwrap();
+    assert!(!parfocal(&["train", "mgm-learned", "--out", drawing, "--footage", "/no/such.mp4"]).status.success());
+    let output = parfocal(&["train", "--compare", first, drawing]);
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("drawing is left out: it has saved nothing yet"));
+
     let nothing = parfocal(&["train", "--compare", folder.path().to_str().unwrap()]);
     assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no saved training"));
     for wrong in [["train", "parfocal"].as_slice(), &["train"], &["train", "parfocal", "--compare", first]] {
@@ -230,7 +240,8 @@ fn a_training_continues_on_the_footage_that_it_was_begun_with() {
     assert!(again(&[], Some(8)).unwrap_err().contains("begun with seed 7, not 8"));
     assert!(again(&[&other], None).unwrap_err().contains("begun on other footage: "));
 
-    let moved = folder.path().join("moved.png");
+    // The name of a file need not be text.
+    let moved = folder.path().join(OsStr::from_bytes(b"moved \xff.png"));
     std::fs::rename(&first, &moved).unwrap();
     assert!(again(&[], None).unwrap_err().contains("is gone: cannot read"));
     assert_eq!(again(&[&moved], None), Ok(LEG));

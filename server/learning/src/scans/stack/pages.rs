@@ -36,7 +36,9 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
         None => depth(&file.description().unwrap_or_default(), file.pages())
             .map_err(|reason| LearningError::of(path, reason))?,
     };
-    tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
+    if file.pages() > 1 {
+        tell(format_args!("note: {} has {} pages: {}", path.display(), file.pages(), depth.source));
+    }
 
     let mut wide = WideSamples::default();
     depth.pages.iter().try_for_each(|&page| wide.see(path, &file, page)).map_err(unusable)?;
@@ -107,7 +109,7 @@ fn of_image_j(description: &str, count: usize) -> Result<Depth, String> {
     let channels = number("channels").unwrap_or(1);
     let times = number("frames").unwrap_or(1);
     let images = number("images").unwrap_or(1);
-    let depths = number("slices").unwrap_or(if channels * times > 1 { 1 } else { images });
+    let depths = number("slices").unwrap_or(if channels.max(times) > 1 { 1 } else { images });
     only_focus(depths, channels, times, count)?;
 
     let pages = (0..count).collect();

@@ -77,9 +77,9 @@ impl StackSource {
     /// The error that it has fewer planes than a range of `planes` needs, or its pictures are too small.
     pub(crate) fn too_small(&self, planes: usize) -> LearningError {
         LearningError::new(format!(
-            "{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
-             pixels",
-            self.folder.display()
+            "{folder} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least \
+             128x128 pixels; {folder}:K makes K planes the range",
+            folder = self.folder.display()
         ))
     }
 

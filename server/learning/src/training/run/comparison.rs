@@ -9,11 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::checkpoint::{CHECKPOINT, Checkpoint};
 use super::curves;
+use super::folder::LOCK;
 use crate::LearningError;
 use crate::evaluation::Row;
 use crate::training::recipe::Recipe;
 
-/// File in a run folder with its recipe, which is there before anything is trained.
+/// File in a run folder with its recipe, which is there before anything is trained, once all pictures are drawn.
 pub const RECIPE: &str = "recipe.toml";
 /// File in a run folder with the figures of its weights on the reference benchmark.
 pub const BENCHMARK: &str = "benchmark.json";
@@ -72,7 +73,7 @@ impl TrainedRun {
     pub fn read(folder: &Path) -> Result<Option<Self>, LearningError> {
         let file = folder.join(CHECKPOINT);
         if !file.is_file() {
-            if folder.join(RECIPE).is_file() {
+            if [LOCK, RECIPE].iter().any(|name| folder.join(name).is_file()) {
                 return Ok(None);
             }
             bail!("{} holds no saved training; give run folders of `parfocal train`", folder.display());

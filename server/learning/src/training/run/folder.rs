@@ -9,7 +9,8 @@ use super::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::LearningError;
 use parfocal_base::files::{self, LockedFile};
 
-const LOCK: &str = ".lock";
+/// File in a run folder from the moment a training begins there, before its pictures are drawn.
+pub(super) const LOCK: &str = ".lock";
 
 /// A training's folder.
 #[derive(Debug)]

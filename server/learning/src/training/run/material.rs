@@ -84,7 +84,11 @@ impl Material {
         let known = KnownSources::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
         let scans = KnownSources::of(checkpoint, SCANS, asked.scans.clone())?;
 
-        let from = known.paths().iter().map(PathBuf::from).collect::<Vec<_>>();
+        // A path that is given need not be text, as a note is.
+        let from = match &asked.footage[..] {
+            [] => known.paths().iter().map(PathBuf::from).collect(),
+            given => given.to_vec(),
+        };
         let footage = footage(&from).map_err(|error| known.unusable(error))?;
         known.check(footage.as_ref().map(|(_, origin)| origin))?;
 
