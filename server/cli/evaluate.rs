@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::input::without_systems_own;
 use super::library;
-use super::output::{Failure, bar, bar_of_poses, print, print_result};
+use super::output::{Failure, bar, bar_of_poses, print, print_result, word};
 use super::policy_process;
 use parfocal_autofocus::{FieldOfView, Registry, exec, scripted};
 use parfocal_base::files::replace;
@@ -226,7 +226,7 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
     if let Some(folder) = &arguments.out {
         let file = folder.join(shard.part.file_name());
         replace(&file, text.as_bytes()).map_err(|error| unwritable(folder, &error))?;
-        let folder = folder.display();
+        let folder = word(folder);
         message = format!(
             "shard {} is in {}; when all shards are there: \
              parfocal evaluate --merge {folder}/shard-*.json --out {folder}\n",

@@ -2,8 +2,8 @@
 //! second ends the process at once. Every lens is released before the process ends.
 
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use tokio::signal::unix::{SignalKind, signal};
@@ -44,30 +44,40 @@ pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
 }
 
 fn listen(ending: &[i32], undo: impl Fn() + Clone + Send + 'static) -> io::Result<()> {
+    on_a_thread("signals", || {
+        for &ending in ending {
+            let mut heard = signal(SignalKind::from_raw(ending))?;
+            let undo = undo.clone();
+            tokio::spawn(async move {
+                heard.recv().await;
+                undo();
+                end_by(ending);
+            });
+        }
+        Ok(std::future::pending())
+    })
+}
+
+/// Runs what `listen` returns on a thread of its own, which ends with the process.
+fn on_a_thread<W>(name: &str, listen: impl FnOnce() -> io::Result<W>) -> io::Result<()>
+where
+    W: Future<Output = ()> + Send + 'static,
+{
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let within = runtime.enter();
-
-    for &ending in ending {
-        let mut heard = signal(SignalKind::from_raw(ending))?;
-        let undo = undo.clone();
-        runtime.spawn(async move {
-            heard.recv().await;
-            undo();
-            end_by(ending);
-        });
-    }
+    let waiting = listen()?;
     drop(within);
 
-    let thread = std::thread::Builder::new().name("signals".to_owned());
-    thread.spawn(move || runtime.block_on(std::future::pending::<()>()))?;
+    let thread = std::thread::Builder::new().name(name.to_owned());
+    thread.spawn(move || runtime.block_on(waiting))?;
     Ok(())
 }
 
-/// Whether Ctrl-C was pressed or SIGTERM came, and whether everything is saved.
+/// Whether Ctrl-C was pressed or SIGTERM came, and what to say then once everything is saved.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
-    saved: Arc<AtomicBool>,
+    saved: Arc<OnceLock<String>>,
 }
 
 impl Interrupt {
@@ -78,25 +88,26 @@ impl Interrupt {
     pub fn listen(notice: String) -> io::Result<Self> {
         let interrupt = Self::default();
         let heard = interrupt.clone();
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        let within = runtime.enter();
-        let mut interrupted = signal(SignalKind::interrupt())?;
-        let mut terminated = signal(SignalKind::terminate())?;
-        drop(within);
-
-        std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
-            runtime.block_on(async {
+        on_a_thread("interrupt", move || {
+            let mut interrupted = signal(SignalKind::interrupt())?;
+            let mut terminated = signal(SignalKind::terminate())?;
+            Ok(async move {
                 loop {
                     let ending = tokio::select! {
                         _ = interrupted.recv() => SIGINT,
                         _ = terminated.recv() => SIGTERM,
                     };
-                    if heard.asked.swap(true, Ordering::Relaxed) || heard.saved.load(Ordering::Relaxed) {
+                    let is_asked_again = heard.asked.swap(true, Ordering::Relaxed);
+                    let saved = heard.saved.get();
+                    if let Some(notice) = saved {
+                        tell(format_args!("{notice}"));
+                    }
+                    if is_asked_again || saved.is_some() {
                         end_by(ending);
                     }
                     tell(format_args!("{notice}; Ctrl-C again to stop at once"));
                 }
-            });
+            })
         })?;
 
         Ok(interrupt)
@@ -107,8 +118,8 @@ impl Interrupt {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// From now on either ends the process at once, because everything is saved.
-    pub fn all_is_saved(&self) {
-        self.saved.store(true, Ordering::Relaxed);
+    /// From now on either prints `notice` and ends the process at once, because everything is saved.
+    pub fn all_is_saved(&self, notice: String) {
+        let _ = self.saved.set(notice);
     }
 }

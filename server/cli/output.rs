@@ -50,6 +50,16 @@ pub fn save_plot(path: &Path, svg: &str) -> Result<(), Failure> {
     replace(path, svg.as_bytes()).map_err(|error| format!("cannot save the plot to {}: {error}", path.display()).into())
 }
 
+/// `path` as one word of a command that somebody may copy into a shell.
+pub fn word(path: &Path) -> String {
+    let path = path.display().to_string();
+    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:=@%".contains(letter);
+    if !path.is_empty() && path.chars().all(is_plain) {
+        return path;
+    }
+    format!("'{}'", path.replace('\'', r"'\''"))
+}
+
 /// A table of `rows` as CSV.
 pub fn csv<R: Serialize>(rows: impl IntoIterator<Item = Result<R, Failure>>) -> Result<Vec<u8>, Failure> {
     let mut table = csv::Writer::from_writer(Vec::new());
@@ -118,4 +128,24 @@ impl Steps {
 /// `count` poses in words.
 pub fn poses(count: usize) -> String {
     format!("{count} {}", if count == 1 { "pose" } else { "poses" })
+}
+
+/// Says that the scan in `out` holds what it was made for: `poses`, such as "6 poses".
+pub fn stored(poses: &str, out: &Path) -> String {
+    format!("{poses} in {}; check them with `parfocal scan info {}`\n", out.display(), word(out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_in_a_command_is_one_word_of_it() {
+        assert_eq!(word(Path::new("runs/first-try_2.0")), "runs/first-try_2.0");
+        for path in ["runs/first try", "it's", "a;b $HOME *", "", "naïve \"x\""] {
+            let command = format!("printf '%s|' {}", word(Path::new(path)));
+            let run = std::process::Command::new("sh").args(["-c", &command]).output().unwrap();
+            assert_eq!(String::from_utf8_lossy(&run.stdout), format!("{path}|"));
+        }
+    }
 }

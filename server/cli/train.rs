@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use super::input::without_systems_own;
 use super::interrupt::Interrupt;
-use super::output::{Failure, bar, print, print_result};
+use super::output::{Failure, bar, print, print_result, word};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
@@ -141,24 +141,30 @@ fn train(arguments: &Training) -> Result<(), Failure> {
 
     if !whole {
         bar.finish_and_clear();
+        let device = if arguments.device == Compute::Cuda { " --device cuda" } else { "" };
         return print(&format!(
-            "stopped after {} of {total} updates; continue with: parfocal train {} --out {} --resume\n",
+            "stopped after {} of {total} updates; continue with: parfocal train {} --out {} --resume{device}\n",
             run.updates(),
             arguments.policy,
-            arguments.out.display()
+            word(&arguments.out)
         ));
     }
 
-    interrupt.all_is_saved();
+    let saved = format!(
+        "trained and saved in {}; --resume adds the benchmark's figures to the model card",
+        arguments.out.display()
+    );
+    interrupt.all_is_saved(saved.clone());
     if interrupt.asked() {
         bar.finish_and_clear();
-        return print(&format!(
-            "trained and saved in {}; --resume adds the benchmark's figures to the model card\n",
-            arguments.out.display()
-        ));
+        return print(&(saved + "\n"));
     }
 
-    bar.set_message("running the best weights on the reference benchmark; Ctrl-C skips it");
+    let next = "running the best weights on the reference benchmark; Ctrl-C skips it";
+    if bar.is_hidden() && run.recipe().benchmark > 0 {
+        tell(format_args!("{next}"));
+    }
+    bar.set_message(next);
     run.report()?;
     bar.finish_and_clear();
     print(&format!("best validation MAE {:.4}; weights and model card in {}\n", run.best(), arguments.out.display()))

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::{Failure, print_result, wait_for};
+use super::output::{Failure, print_result, wait_for, word};
 use parfocal_records::store::export::verify::{Check, Verdict, is_export, verify};
 use parfocal_records::store::{Head, StoreError, verify_database};
 use parfocal_results::package::{check, is_package};
@@ -36,10 +36,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         bail!("{} does not exist; give an export, a data folder or a database", path.display());
     }
 
-    if is_zip(path) {
+    if begins_with(path, b"PK\x03\x04") {
         bail!(
-            "{0} is a ZIP file: unpack it, for example with `unzip {0}`, and verify the folder that was in it",
-            path.display()
+            "{} is a ZIP file: unpack it, for example with `unzip {}`, and verify the folder that was in it",
+            path.display(),
+            word(path)
         );
     }
 
@@ -68,15 +69,20 @@ fn unopened(path: &Path, error: StoreError) -> Failure {
             let path = path.display();
             format!("{path} is neither an export nor a data folder; if it was one, copy it again, whole").into()
         }
+        StoreError::Damaged(_) if path.is_file() && !begins_with(path, b"SQLite format 3\0") => {
+            let path = path.display();
+            format!("{path} is not a database; name an export's folder, or copy the database again, if it was one")
+                .into()
+        }
         error => error.into(),
     }
 }
 
-/// Whether `path` is a ZIP file, by its first bytes.
-fn is_zip(path: &Path) -> bool {
-    let mut start = [0; 4];
+/// Whether `path` is a file that begins with `bytes`, as files of a kind do.
+fn begins_with<const N: usize>(path: &Path, bytes: &[u8; N]) -> bool {
+    let mut start = [0; N];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    read.is_ok() && start == *b"PK\x03\x04"
+    read.is_ok() && start == *bytes
 }
 
 fn line(check: &Check) -> String {

@@ -97,6 +97,12 @@ async fn what_is_no_whole_database_is_named_and_not_taken_for_the_data_folders()
     assert_eq!(output.status.code(), Some(1));
     assert!(told(&output).contains("export.zip is a ZIP file: unpack it"), "{}", told(&output));
 
+    let table = folder.path().join("comments.csv");
+    std::fs::write(&table, "session,comment\n".repeat(1000)).unwrap();
+    let output = parfocal(&["verify", table.to_str().unwrap()], None);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains("comments.csv is not a database; name an export's folder"), "{}", told(&output));
+
     let nothing = folder.path().join("nothing");
     std::fs::create_dir(&nothing).unwrap();
     let output = parfocal(&["verify", nothing.to_str().unwrap()], None);

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use crate::cli::input::{frame_rate, frame_rate_help};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
-use crate::cli::output::{Failure, print};
+use crate::cli::output::{Failure, print, word};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::{PolicyName, SOFTWARE};
@@ -197,7 +197,10 @@ fn tell(arguments: &Arguments, progress: &RecordingProgress) -> Result<(), Failu
             Err(format!("stopped, because the disk of {out} is nearly full; free some space: {done}").into())
         }
         Some(Ended::Failed(problem)) => Err(format!("{problem}: {done}").into()),
-        Some(Ended::Stopped) | None => print(&format!("{done}; check them with `parfocal recording info {out}`\n")),
+        Some(Ended::Stopped) | None => {
+            let named = word(&arguments.out);
+            print(&format!("{done}; check them with `parfocal recording info {named}`\n"))
+        }
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     };
     save(out, &table)?;
-    print(&format!("{} in {}\n", summary(&spectrum), out.display()))
+    print(&format!("{}: {}\n", out.display(), summary(&spectrum)))
 }
 
 fn summary(spectrum: &Spectrum) -> String {

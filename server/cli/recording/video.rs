@@ -1,7 +1,7 @@
 //! `parfocal recording video`: a recording as a video for people, or its frames as pictures.
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -101,9 +101,13 @@ fn format(out: &Path) -> Result<Option<&'static str>, Failure> {
         );
     };
     if fs::symlink_metadata(out).is_ok() {
-        bail!("{} exists already; give a name that is not taken", out.display());
+        return Err(taken(out).into());
     }
     Ok(Some(*format))
+}
+
+fn taken(out: &Path) -> String {
+    format!("{} exists already; give a name that is not taken", out.display())
 }
 
 /// Numbers of the frames within the requested span.
@@ -228,7 +232,10 @@ fn save_pictures(
     develop: &mut impl FnMut(&MosaicFrame, &mut RgbImage),
 ) -> Result<(), Failure> {
     let out = &arguments.out;
-    fs::create_dir(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
+    fs::create_dir(out).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => taken(out),
+        _ => format!("cannot make the folder {}: {error}", out.display()),
+    })?;
 
     let mut picture = RgbImage::default();
     for &frame in frames {

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::info;
 use crate::cli::input::whole_number;
-use crate::cli::output::{Failure, bar_of_poses, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print, stored};
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{LEAST_SIDE, MOST_POSES};
 use parfocal_imaging::PixelFormat;
@@ -86,13 +86,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     progress.finish_and_clear();
 
     let (width, height) = stack.size();
-    let out = arguments.out.display();
     print(&format!(
-        "{taken} pictures of {width}x{height} pixels\n\
-         {}{} of {} planes in {out}; check them with `parfocal scan info {out}`\n",
+        "{taken} pictures of {width}x{height} pixels\n{}{}",
         info::optics(&StackOptics::of(&stack), "position"),
-        poses(cut.poses),
-        cut.planes,
+        stored(&format!("{} of {} planes", poses(cut.poses), cut.planes), &arguments.out)
     ))
 }
 

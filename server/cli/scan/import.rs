@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::cli::output::{Failure, bar_of_poses, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print, stored};
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::scans::recording::{Imported, import};
 
@@ -39,6 +39,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let camera = arguments.camera.clone().unwrap_or(folder);
     import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();
-    let out = arguments.out.display();
-    print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(imported.count())))
+    print(&stored(&poses(imported.count()), &arguments.out))
 }

@@ -93,7 +93,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     if let Some(damage) = damages.first() {
         let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
-        bail!("{} is damaged: {}{more}", damage.file, damage.reason);
+        bail!(
+            "{} is damaged: {}{more}; restore it from a copy, or record the scan again",
+            scan.path().join(&damage.file).display(),
+            damage.reason
+        );
     }
 
     scan.whole()?;
@@ -217,7 +221,12 @@ pub(super) fn optics(optics: &StackOptics, unit: &str) -> String {
     let mut text = table(&rows);
     for place in &optics.places {
         let name = format!("{},{}", place.x, place.y);
-        let _ = writeln!(text, "{name:<14}{} sharpest at {unit} {:.3}", bars(&place.sharpness), place.best);
+        let sees = if place.sharpness.iter().any(|value| *value > 0.0) {
+            format!("sharpest at {unit} {:.3}", place.best)
+        } else {
+            "nothing to focus on".to_owned()
+        };
+        let _ = writeln!(text, "{name:<14}{} {sees}", bars(&place.sharpness));
     }
     text
 }

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 
 use crate::cli::input::{hear_lines, whole_number};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
-use crate::cli::output::{Failure, bar_of_poses, poses, print};
+use crate::cli::output::{Failure, bar_of_poses, poses, print, stored};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::recorded::{Header, MOST_POSES, PictureOrder, ScanRecording};
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.display();
 
     match outcome {
-        Ok(()) => print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(done))),
+        Ok(()) => print(&stored(&poses(done), &arguments.out)),
         // Ctrl-C also interrupts the stepper's command.
         Err(RecordError::Stopped | RecordError::Stepper(_)) if interrupt.asked() => print(&format!(
             "stopped: {done} of {} poses are saved in {out}; run the same command again to continue\n",
