@@ -166,6 +166,32 @@ async fn a_note_that_was_changed_is_erased_in_all_its_versions() {
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
 }
 
+/// A tablet sends what was typed each time that the surgeon leaves the field.
+#[tokio::test]
+async fn an_answer_in_words_is_erased_in_all_its_versions() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, _) = session(&mut trial).await;
+    let first = trial.store.reader().answers(session).await.unwrap().pop().unwrap().1;
+    let note = FieldChange::Note { record: first.key, old: String::new(), new: words("note on") };
+    let note = NewCorrection { change: note, reason: "on second thoughts".to_owned() };
+    trial.conductor.correct(Role::Researcher, session, note).await.unwrap();
+    trial.answer("ready", AnswerValue::Text("ask again".to_owned())).await.unwrap();
+
+    let shown = trial.reports.session_detail(session).await.unwrap().answers;
+    let counts = shown.iter().find(|answer| answer.question == "ready").unwrap();
+    assert_eq!(counts.words, "ask again", "the page has the latest version alone");
+    trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Answer, counts.key)).await.unwrap();
+    for gone in ["ask again about Frau", "note on Frau"] {
+        assert_eq!(holding(folder.path(), gone), NOWHERE, "{gone}");
+    }
+    let texts = trial.store.reader().answers(session).await.unwrap();
+    let texts = texts.iter().filter(|(_, answer)| answer.question == "ready").map(|(_, answer)| &answer.value);
+    assert!(texts.eq(&[AnswerValue::Text(String::new()), AnswerValue::Text(String::new())]));
+    let checks = verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+}
+
 #[tokio::test]
 async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
     let folder = tempfile::tempdir().unwrap();

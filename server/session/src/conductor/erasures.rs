@@ -4,7 +4,7 @@ use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Pen, Shared};
 use parfocal_base::boxed;
 use parfocal_base::ids::SessionId;
-use parfocal_records::store::{Correction, Erased, Erasure, Reader, StoreError};
+use parfocal_records::store::{Answer, Correction, Erased, Erasure, Reader, StoreError};
 use parfocal_trial::account::Actor;
 use parfocal_trial::correction::Field;
 use parfocal_trial::erasure::{self, Erasable, NewErasure};
@@ -128,8 +128,9 @@ impl Shared {
         Ok(erased?)
     }
 
-    /// The record itself and the notes on it, because a note may repeat the words. A note is erased in all its
-    /// versions, because a correction also has what stood there before it.
+    /// The record itself and the notes on it, because a note may repeat the words. An answer and a note are erased in
+    /// all their versions: a surgeon who goes on writing gives another answer to the same question, and a correction
+    /// also has what stood there before it.
     async fn with_its_notes(
         &self,
         session: SessionId,
@@ -138,38 +139,40 @@ impl Shared {
     ) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let corrections = reader.corrections(session).await?;
-        let mut about = record.clone();
-        let (has_words, refusal) = match subject {
+        let (about, refusal) = match subject {
             Erasable::Comment => {
                 let comments = reader.comments(session).await?;
                 let comment = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
-                let has_words = comment.map(|(_, comment)| can_be_erased(&comment.said));
-                (has_words, "only words can be erased; this comment has none")
+                let (_, comment) = comment.ok_or_else(no_such_record)?;
+                let about = if can_be_erased(&comment.said) { vec![record] } else { Vec::new() };
+                (about, "only words can be erased; this comment has none")
             }
             Erasable::Answer => {
                 let answers = reader.answers(session).await?;
                 let answer = answers.iter().find(|(_, answer)| answer.key.to_string() == record);
-                let has_words = answer.map(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
-                (has_words, "only words can be erased; this answer is a number")
+                let (_, answer) = answer.ok_or_else(no_such_record)?;
+                (versions_in_words(answer, &answers), "only words can be erased; this answer is a number")
             }
             _ => {
                 let stored = corrections.iter().find(|stored| stored.number.to_string() == record);
                 let correction = stored.map(|stored| &stored.correction).ok_or_else(no_such_record)?;
-                about.clone_from(&correction.record);
-                (Some(correction.field == Field::Note), "only a note can be erased; this correction is a value")
+                let about = if correction.field == Field::Note { vec![correction.record.clone()] } else { Vec::new() };
+                (about, "only a note can be erased; this correction is a value")
             }
         };
-        if !has_words.ok_or_else(no_such_record)? {
+        if about.is_empty() {
             return Err(Refusal::conflict(refusal).into());
         }
 
+        let is_note = |correction: &Correction| correction.field == Field::Note && about.contains(&correction.record);
+        let notes = corrections.iter().filter(|stored| is_note(&stored.correction));
+        let notes: Vec<_> = notes.map(|stored| (Erasable::Correction, stored.number.to_string())).collect();
+
         let mut records = Vec::new();
         if subject != Erasable::Correction {
-            records.push((subject, record));
+            records.extend(about.into_iter().map(|record| (subject, record)));
         }
-        let is_note = |correction: &Correction| correction.field == Field::Note && correction.record == about;
-        let notes = corrections.iter().filter(|stored| is_note(&stored.correction));
-        records.extend(notes.map(|stored| (Erasable::Correction, stored.number.to_string())));
+        records.extend(notes);
         Ok(records)
     }
 
@@ -204,6 +207,14 @@ fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind
         }
         _ => false,
     }
+}
+
+/// The keys of all answers in words to the question that `answer`, one of `answers`, answers.
+fn versions_in_words(answer: &Answer, answers: &[(i64, Answer)]) -> Vec<String> {
+    let same = |other: &&Answer| other.segment == answer.segment && other.question == answer.question;
+    let in_words = |other: &&Answer| matches!(other.value, AnswerValue::Text(_));
+    let versions = answers.iter().map(|(_, other)| other).filter(same).filter(in_words);
+    versions.map(|version| version.key.to_string()).collect()
 }
 
 /// Whether a comment's words, written or spoken, can be erased.
