@@ -15,6 +15,7 @@ use parfocal_trial::question::AnswerValue;
 use parfocal_trial::remark::NewComment;
 use parfocal_trial::role::Role;
 use parfocal_trial::study::signature::Signature;
+use parfocal_trial::study::state::Change;
 
 use crate::exports::{failed, rows};
 use crate::fixture::{PARTICIPANT, Trial};
@@ -297,6 +298,29 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
         assert!(refused.to_string().contains("append-only"), "{sql}: {refused}");
     }
     pool.close().await;
+}
+
+/// All sessions of the study have that reason, and so does the study.
+#[tokio::test]
+async fn the_reason_for_unblinding_a_whole_study_is_not_erased_in_one_of_its_sessions() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = studies::opened(folder.path()).await;
+    let session = studies::prepare(&trial, PARTICIPANT, "leeds").await.unwrap();
+    let abort = Action::Abort { reason: "smoke".to_owned() };
+    trial.conductor.act(Role::Operator, session, abort).await.unwrap();
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    studies::change(&trial, Change::Close).await.unwrap();
+    studies::change(&trial, Change::Lock { despite_outstanding: true }).await.unwrap();
+    let signature = Signature::new(studies::STATISTICIAN, "the last surgeon was there").unwrap();
+    let study = studies::STUDY.to_owned();
+    trial.conductor.change_study(Role::Researcher, study, Change::Unblind, signature).await.unwrap();
+
+    let log = trial.reports.session_detail(session).await.unwrap().log;
+    let erasable: Vec<u32> = log.iter().filter_map(|line| line.erasable_event).collect();
+    assert_eq!(erasable, [2], "that of the abort: {log:?}");
+    let erasure = NewErasure { subject: Erasable::Event, record: "3".to_owned(), reason: "names a patient".to_owned() };
+    let refused = trial.conductor.erase(Role::Researcher, session, erasure).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the whole study")), "{refused}");
 }
 
 async fn count(data: &Path, sql: &'static str) -> i64 {

@@ -226,6 +226,13 @@ impl EventKind {
         }
     }
 
+    /// Whether the reason was given for the whole study of the session, which is `in_study` or not. All sessions of the
+    /// study have it then.
+    pub const fn has_reason_of_study(&self, in_study: bool) -> bool {
+        // Unblinding one session of a study is always an emergency.
+        in_study && matches!(self, Self::Unblinded { emergency: false, .. })
+    }
+
     /// Number of the event that this one is about, if any.
     pub const fn about(&self) -> Option<u32> {
         match self {

@@ -186,8 +186,15 @@ impl Shared {
             return Err(Refusal::conflict("only a reason can be erased; this event has none").into());
         }
 
+        let enrolment = reader.enrolment(session).await?;
+        if event.kind.has_reason_of_study(enrolment.is_some()) {
+            let refusal = "this is the reason for unblinding the whole study; all its sessions tell it, and it cannot \
+                           be erased";
+            return Err(Refusal::conflict(refusal).into());
+        }
+
         let mut records = vec![(Erasable::Event, format!("{session}/{}", event.number))];
-        if let Some(enrolment) = reader.enrolment(session).await? {
+        if let Some(enrolment) = enrolment {
             let of_study = reader.study_events(&enrolment.study).await?;
             let copies = of_study.iter().filter(|copy| repeats(&copy.kind, session, &event.kind));
             records.extend(copies.map(|copy| (Erasable::StudyEvent, format!("{}/{}", enrolment.study, copy.number))));

@@ -174,7 +174,8 @@ impl Reports {
             let text = event.kind.in_words(|segment| course.setting(segment));
             let account = event.account.as_ref().map(ToString::to_string);
             let has_reason = event.kind.reason().is_some_and(|reason| !reason.is_empty());
-            let erasable_event = has_reason.then_some(event.number);
+            let is_its_own = !event.kind.has_reason_of_study(course.study.is_some());
+            let erasable_event = (has_reason && is_its_own).then_some(event.number);
             let line = LogLine { at: event.wall, by: event.by, account, text, erasable_event };
             lines.push((at, line));
         }
