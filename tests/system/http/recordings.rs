@@ -118,6 +118,22 @@ async fn a_protocol_records_mosaics_from_a_sessions_start_to_its_end() {
     assert!(recording.rows().iter().all(|row| (0.0..=1.0).contains(&row.measured)));
 }
 
+/// Somebody who may play the session's recording must not see a later session in it, whose policies are still secret.
+#[tokio::test]
+async fn what_the_operator_records_during_a_session_ends_with_it() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "practice").await;
+    assert_eq!(order(&server, true).await.0, StatusCode::OK);
+    let running = until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
+    assert_eq!(running["by_protocol"], false);
+
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+    let recording = Recording::open(&recordings(&server).join(running["folder"].as_str().unwrap())).unwrap();
+    assert_eq!(recording.header().session.as_deref(), Some(session.as_str()));
+    assert_eq!(recording.header().ended, Some(Ended::Stopped));
+}
+
 #[tokio::test]
 async fn a_recording_that_is_ending_as_the_server_ends_is_stored_to_its_end() {
     let mut server = start(Arc::new(tempfile::tempdir().unwrap()));

@@ -1,5 +1,6 @@
 //! Recordings made while the server runs: mosaics when the operator asks for them, and what a protocol asks for, from a
-//! session's start to its end. A trial never waits for a recording, and continues without one.
+//! session's start to its end. What was begun during a session ends with it. A trial never waits for a recording, and
+//! continues without one.
 
 mod parts;
 mod running;
@@ -67,6 +68,8 @@ struct Notice {
 /// A recording under way.
 struct Active {
     what: Running,
+    /// The session that was under way when it began, whose name it has; `None` outside sessions.
+    session: Option<SessionId>,
     /// Whether a protocol asked for it.
     by_protocol: bool,
     began: Moment,
@@ -188,7 +191,7 @@ impl Recordings {
         report
     }
 
-    /// Starts the recording that the session under way asks for, and ends it with the session.
+    /// Starts the recording that the session under way asks for.
     async fn follow(&self) {
         let wanted = self.0.parts.conductor.to_record();
         let followed = self.0.state().followed;
@@ -206,22 +209,20 @@ impl Recordings {
                 });
                 begun.await;
             }
-            None if followed.is_some() => {
-                let ended = self.to_the_end(|this| async move {
-                    this.0.state().followed = None;
-                    if this.0.state().active.as_ref().is_some_and(|active| active.by_protocol) {
-                        this.end().await;
-                    }
-                });
-                ended.await;
-            }
-            _ => {}
+            Some(_) => {}
+            None => self.0.state().followed = None,
         }
     }
 
+    /// Ends the recording under way if it has ended by itself, or if its session is over: who may see that session must
+    /// not see the next one, too.
     async fn notice_the_end(&self) {
         let noticed = self.to_the_end(|this| async move {
-            let ended = this.0.state().active.as_ref().is_some_and(|active| active.what.progress().ended.is_some());
+            let under_way = this.0.parts.conductor.session_under_way();
+            let is_over = |active: &Active| {
+                active.what.progress().ended.is_some() || active.session.is_some_and(|own| under_way != Some(own))
+            };
+            let ended = this.0.state().active.as_ref().is_some_and(is_over);
             if ended {
                 this.end().await;
             }
@@ -302,10 +303,12 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins to record. `session` is the session whose protocol asked for it, if one did.
-    fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
+    /// Begins to record. `asked_by` is the session whose protocol asked for it, if one did.
+    fn begin(&self, what: Record, asked_by: Option<SessionId>) -> Result<(), StartError> {
+        let session = asked_by.or_else(|| self.parts.conductor.session_under_way());
         let began = self.parts.clock.now();
-        let Some(running) = starting::start(&self.parts, what, session, began)? else { return Ok(()) };
+        let folder = starting::new_folder(&self.parts, asked_by);
+        let Some(running) = starting::start(&self.parts, what, &folder, session, began)? else { return Ok(()) };
 
         tracing::info!(folder = %running.folder().display(), "a recording began");
         let mut state = self.state();
@@ -314,7 +317,7 @@ impl Shared {
             // Connect while the state is locked, so that a measurement does not disconnect the tap.
             self.parts.tap.connect(recorder.intake());
         }
-        state.active = Some(Active { what: running, by_protocol: session.is_some(), began });
+        state.active = Some(Active { what: running, session, by_protocol: asked_by.is_some(), began });
         Ok(())
     }
 }

@@ -42,13 +42,14 @@ impl From<RecordingError> for StartError {
     }
 }
 
-/// Begins to record; `None` if `what` is [`Record::None`].
+/// Begins to record into `folder`; `None` if `what` is [`Record::None`]. `session` is the session under way.
 ///
 /// # Errors
 /// If the camera has no mosaics, the disk has no room, or the recording cannot be written.
 pub fn start(
     parts: &RecorderParts,
     what: Record,
+    folder: &Path,
     session: Option<SessionId>,
     began: Moment,
 ) -> Result<Option<Running>, StartError> {
@@ -57,17 +58,16 @@ pub fn start(
         return Err(StartError::NoRoom(room));
     }
 
-    let folder = new_folder(parts, session);
-    let name = session.or(parts.conductor.session_under_way()).map(|session| session.to_string());
+    let session = session.map(|session| session.to_string());
     match what {
         Record::None => Ok(None),
-        Record::Mosaic => record_mosaics(parts, &folder, name, began).map(Running::Mosaic).map(Some),
-        Record::View => record_view(parts, &folder, name, began).map(Running::View).map(Some),
+        Record::Mosaic => record_mosaics(parts, folder, session, began).map(Running::Mosaic).map(Some),
+        Record::View => record_view(parts, folder, session, began).map(Running::View).map(Some),
     }
 }
 
 /// A folder that no recording has yet, named after the session or, without one, after the time.
-fn new_folder(parts: &RecorderParts, session: Option<SessionId>) -> PathBuf {
+pub fn new_folder(parts: &RecorderParts, session: Option<SessionId>) -> PathBuf {
     let name = session
         .map_or_else(|| parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(), |session| session.to_string());
     let numbered = |number: u32| if number == 1 { name.clone() } else { format!("{name}-{number}") };
