@@ -7,7 +7,7 @@ use parfocal_session::conductor::ConductError;
 use parfocal_trial::action::{Action, Focus};
 use parfocal_trial::role::Role;
 
-use crate::fixture::Trial;
+use crate::fixture::{PARTICIPANT, Trial};
 
 #[tokio::test]
 async fn the_operator_moves_the_lens_before_a_session_is_made_and_after_it_is_closed() {
@@ -57,4 +57,29 @@ async fn nobody_but_the_operator_moves_the_lens_and_only_to_where_it_can_go() {
         assert!(matches!(invalid, Err(ConductError::Invalid(_))), "{value}");
     }
     assert_eq!(trial.commanded(), []);
+}
+
+/// Two operators: one still moves the lens after an abort, and the other prepares the next session.
+#[tokio::test]
+async fn a_movement_by_hand_while_the_next_session_is_made_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let aborted = trial.begin("practice").await;
+    trial.conductor.act(Role::Operator, aborted, Action::Abort { reason: "smoke".to_owned() }).await.unwrap();
+
+    // Another program locks the database, so that the next session takes a while to reach the disk.
+    let database = crate::storage::raw(folder.path()).await;
+    let other_program = database.begin_with("BEGIN IMMEDIATE").await.unwrap();
+    let conductor = trial.conductor.clone();
+    let making = tokio::spawn(async move { conductor.create(Role::Operator, PARTICIPANT, "practice", None).await });
+    while trial.store.writes().under_way_for().is_none() {
+        tokio::task::yield_now().await;
+    }
+    trial.conductor.focus(Role::Operator, &Focus::FocalPower(0.3)).await.unwrap();
+    other_program.rollback().await.unwrap();
+    let next = making.await.unwrap().unwrap();
+
+    assert_eq!(trial.view().session, next);
+    let events = trial.store.reader().events(aborted).await.unwrap();
+    assert_eq!(events.last().unwrap().1.kind.focal_power(), Some(FocalPower::new(0.3).unwrap()));
 }

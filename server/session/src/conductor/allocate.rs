@@ -65,11 +65,30 @@ impl Shared {
 
         let session = made.session;
         let study = enrolment.map(|enrolment| enrolment.study);
-        let mut live = self.live();
-        live.course = Some(Course::new(made, protocol, created, study, self.run_clock.clone()));
-        self.publish(&live);
+        let before = {
+            let mut live = self.live();
+            let before = live.course.replace(Course::new(made, protocol, created, study, self.run_clock.clone()));
+            self.publish(&live);
+            before
+        };
         self.wake();
+        if let Some(before) = before {
+            self.record_last_of(before).await;
+        }
         Ok(session)
+    }
+
+    /// Records what was not on disk yet of `course` when another session took its place: somebody may have moved the
+    /// lens by hand meanwhile.
+    async fn record_last_of(&self, mut course: Course) {
+        course.record_movement();
+        let (events, _) = course.unrecorded();
+        if events.is_empty() {
+            return;
+        }
+        if let Err(error) = self.store.append_events(course.session(), events).await {
+            tracing::error!("how the lens was moved by hand after session {} is lost: {error}", course.session());
+        }
     }
 
     /// An order for a session outside any study, by the installed protocol.
