@@ -249,6 +249,19 @@ async fn a_study_whose_words_are_all_in_is_locked_without_more_ado() {
 }
 
 #[tokio::test]
+async fn a_withdrawn_session_keeps_no_study_from_being_locked() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
+    change(&trial, Change::Close).await.unwrap();
+    assert!(refusal(change(&trial, LOCK).await).contains("for 1 of its sessions"));
+
+    change(&trial, Change::Withdraw { session }).await.unwrap();
+    assert_eq!(detail(&trial).await.outstanding, 0);
+    change(&trial, LOCK).await.unwrap();
+}
+
+#[tokio::test]
 async fn a_session_of_a_study_takes_words_after_its_end_like_any_other() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = opened(folder.path()).await;

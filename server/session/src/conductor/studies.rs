@@ -262,8 +262,8 @@ pub(crate) async fn plan_concerns(reader: &Reader, study: &StoredStudy) -> Resul
     Ok(concerns(&study.definition, &enabled, &study.sites))
 }
 
-/// Number of sessions of `study` for which a surgeon's device may still hold something that counts. `now` tells the
-/// present time by the clocks of the server's runs.
+/// Number of sessions of `study` for which a surgeon's device may still hold something that counts. Nothing of a
+/// withdrawn session does. `now` tells the present time by the clocks of the server's runs.
 pub(crate) async fn outstanding_sessions(
     reader: &Reader,
     study: &StoredStudy,
@@ -272,7 +272,7 @@ pub(crate) async fn outstanding_sessions(
     let clocks = reader.run_clocks().await?;
     let now = now(&clocks);
     let mut outstanding = 0;
-    for enrolled in &study.sessions {
+    for enrolled in study.sessions.iter().filter(|enrolled| !enrolled.withdrawn) {
         let Some(stored) = reader.session(enrolled.session).await? else { continue };
         let left = super::outstanding(reader, &clocks, enrolled.session, stored.grace(&clocks), now).await?;
         outstanding += usize::from(left.is_some());
