@@ -50,6 +50,35 @@ async fn one_session_is_unblinded_only_in_an_emergency_that_somebody_signs() {
     assert!(matches!(event.kind, EventKind::Unblinded { emergency: true, .. }), "{event:?}");
 }
 
+/// An aborted session and the one that took its place have the same order, drawn from the same seed.
+#[tokio::test]
+async fn the_export_of_a_session_in_the_place_of_an_aborted_one_tells_the_seed_of_a_shuffled_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = PROTOCOL.replace("\"balanced\"", "\"shuffled\"");
+    std::fs::write(folder.path().join("pair.toml"), &protocol).unwrap();
+    let trial = Trial::start_with(folder.path(), Some(folder.path()), 5).await;
+    trial.conductor.add_participant(Role::Operator, "S-02").await.unwrap();
+    trial.account("lead", AccountRole::Lead, "Dr Lead").await;
+
+    let sha256 = |protocol: &Protocol| hex::encode(protocol.sha256());
+    let shuffled = Protocol::parse(&protocol, "pair.toml", &crate::fixture::known()).unwrap();
+    let definition = definition().replace("\"balanced\"", "\"shuffled\"");
+    let definition = definition.replace("aborted = \"next-spare\"", "aborted = \"same-place\"");
+    let definition = definition.replace(&sha256(&super::protocol()), &sha256(&shuffled));
+    plan(&trial, definition).await.unwrap();
+    change(&trial, Change::Open { despite_concerns: true }).await.unwrap();
+
+    aborted(&trial, PARTICIPANT, "leeds").await;
+    let session = aborted(&trial, "S-02", "leeds").await;
+    assert_eq!(detail(&trial).await.study_sessions[1].place, 1);
+    emergency(&trial, session, "an adverse event").await.unwrap();
+
+    let out = folder.path().join("export");
+    export(&trial.access_log(), session, &out, true).await.unwrap();
+    assert!(json(&out, "allocation.json")["seed"].is_string());
+    assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
+}
+
 #[tokio::test]
 async fn nobody_who_knows_a_policy_names_it_where_every_export_shows_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -66,9 +66,15 @@ impl Unblinded {
 
         let Some(reason) = reason else { return Ok(None) };
         let study = StudyOrders::of(reader, stored.made.session).await?;
-        // In a study, the seed of a balanced set also reveals the orders of places that nobody has taken yet.
-        let tells_others = stored.made.algorithm.order() == Order::Balanced && matches!(study, StudyOrders::Withheld);
-        let seed_told = !tells_others && reader.balanced_set(stored.made.seed).await?.may_tell_seed();
+        let seed_told = match stored.made.algorithm.order() {
+            // It tells nothing beyond this order, which an aborted session and the one in its place have in common.
+            Order::Shuffled => true,
+            // In a study, the seed of a balanced set also reveals the orders of places that nobody has taken yet.
+            Order::Balanced => {
+                let study_is_blinded = matches!(study, StudyOrders::Withheld);
+                !study_is_blinded && reader.balanced_set(stored.made.seed).await?.may_tell_seed()
+            }
+        };
         Ok(Some(Self { made: stored.made.clone(), reason, seed_told, study }))
     }
 
