@@ -43,7 +43,7 @@ const ONCE: &str = "sessions";
 const INSTRUMENTS: [&str; 7] = [ONCE, "segments", "comments", "answers", "scores", "corrections", "allocation"];
 
 /// Columns whose texts can be long.
-const NOTES: [&str; 6] = ["text", "value", "given_value", "question_text", "reason", "new_value"];
+const NOTES: [&str; 7] = ["text", "value", "given_value", "question_text", "reason", "old_value", "new_value"];
 
 /// The members of `tables` that become instruments, the table of sessions first.
 pub fn instruments(tables: &[JoinedTable]) -> Vec<&JoinedTable> {
