@@ -103,7 +103,8 @@ table! {
         ),
         counts_until: Option<Timestamp> = means(
             "Time until which arriving comments and answers count: the session's end plus the protocol's \
-             grace_minutes, or the unblinding if that came first; empty while the session is under way",
+             grace_minutes, or the unblinding or the study's locking if that came first; empty while the session is \
+             under way",
         ).in_unit("UTC"),
     }
 }
@@ -351,7 +352,9 @@ table! {
              study-event, else the key",
         ).open(),
         reason: String = means("Reason, in the researcher's words").sealed(),
-        role: Role = means("Role that made the record: researcher").open(),
+        role: Role = means(
+            "Role that made the record: researcher, or system once the time is over for which the protocol keeps voice",
+        ).open(),
         wall: Timestamp = WALL.open(),
         run: i64 = RUN.open(),
         monotonic_ns: i64 = MONOTONIC.open(),
