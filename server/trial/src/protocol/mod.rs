@@ -144,14 +144,15 @@ impl Protocol {
     }
 }
 
-/// The first of `policies` that `text` names. A name without a dash ("fixed") is also an ordinary word, which texts may
-/// use.
+/// The first of `policies` that `text` names, in upper or lower case. A name of letters alone ("fixed") is also an
+/// ordinary word, which texts may use.
 pub(crate) fn named_policy<'a>(
     text: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
 ) -> Option<&'a PolicyName> {
     let text = text.to_lowercase();
-    policies.into_iter().find(|policy| policy.as_str().contains('-') && text.contains(policy.as_str()))
+    let is_word = |policy: &PolicyName| policy.as_str().chars().all(char::is_alphabetic);
+    policies.into_iter().find(|policy| !is_word(policy) && text.contains(&policy.as_str().to_lowercase()))
 }
 
 #[cfg(test)]
@@ -354,6 +355,15 @@ mod tests {
         let said =
             error(&PAPER.replace("text = \"How does the focus feel now?\"", "text = \"Is MGM-hill-climber good?\""));
         assert!(said.contains("mgm-hill-climber") && said.contains("must not know"), "{said}");
+    }
+
+    #[test]
+    fn a_policy_of_a_file_or_of_another_process_is_named_too() {
+        let policies = ["parfocal", "file:Nets/Sharp.pt", "exec:./Search-Fast"].map(PolicyName::new);
+        let named = |text: &str| named_policy(text, &policies).map(PolicyName::as_str);
+        assert_eq!(named("Was it FILE:nets/sharp.pt?"), Some("file:Nets/Sharp.pt"));
+        assert_eq!(named("it was exec:./Search-Fast"), Some("exec:./Search-Fast"));
+        assert_eq!(named("made with parfocal"), None, "an ordinary word");
     }
 
     #[test]
