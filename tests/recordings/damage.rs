@@ -78,6 +78,34 @@ fn a_cut_or_missing_file_names_its_frames() {
 }
 
 #[test]
+fn a_calibration_that_does_not_fit_the_recording_is_refused_by_all_that_use_it() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 2);
+    let out = |name: &str| text(&folder.path().join(name)).to_owned();
+    let (cube, video, table) = (out("cube.hdr"), out("pictures"), out("steps.csv"));
+    let uses: [&[&str]; 4] = [
+        &["cube", "--frame", "1", "--out", &cube],
+        &["spectrum", "--at", "30,20"],
+        &["video", "--out", &video],
+        &["step", "--policy", "fixed", "--out", &table],
+    ];
+
+    let dark = Reference::PerPixel(MosaicFrame::new(8, 4, vec![1; 32]).unwrap());
+    let small = Calibration { dark, ..Calibration::default() };
+    let white = Reference::PerBand([4095.0; BANDS]);
+    let deep = Calibration { bit_depth: 12, white, ..Calibration::default() };
+    for (other, why) in [(small, "was taken at 8x4, but the recording is 64x32"), (deep, "for samples of 12 bit")] {
+        camera::calibration::save(&recording.join(CALIBRATION), &other, &["dark"]).unwrap();
+        for arguments in uses {
+            let told =
+                complaint(&parfocal(&[&["recording", arguments[0], text(&recording)], &arguments[1..]].concat()));
+            assert!(told.contains(why) && told.contains("put the recording's own back into"), "{told}");
+        }
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was written");
+}
+
+#[test]
 fn a_folder_that_is_not_a_recording_of_this_version_is_named_as_such() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 2);

@@ -19,7 +19,7 @@ use parfocal_base::FocalPower;
 use parfocal_base::clock::{Clock, ManualClock, Moment, SystemClock};
 use parfocal_devices::camera::{self, Camera, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
-use parfocal_imaging::{Calibration, MosaicFrame};
+use parfocal_imaging::{BANDS, Calibration, MosaicFrame, Reference};
 use parfocal_recording::{CALIBRATION, CapturedFrame, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, Writer};
 use serde_json::Value;
 use tempfile::TempDir;

@@ -27,7 +27,7 @@ pub struct Arguments {
 /// If the frame cannot be read, or the files cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
-    let calibration = calibration::read(&recording.calibration())?;
+    let calibration = calibration::of_recording(&recording)?;
     let mosaic = recording.frame(arguments.frame)?;
 
     let order = by_wavelength(&calibration);

@@ -34,7 +34,7 @@ pub struct Arguments {
 /// If the place or a frame is not in the recording, a frame is damaged, or the table cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
-    let calibration = calibration::read(&recording.calibration())?;
+    let calibration = calibration::of_recording(&recording)?;
 
     let (x, y) = arguments.at;
     let circle = Circle { x, y, radius: arguments.radius };

@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         bail!("{} holds no frame to step a policy over", arguments.folder.display());
     }
 
-    let calibration = calibration::read(&recording.calibration())?;
+    let calibration = calibration::of_recording(&recording)?;
     let name = PolicyName::new(&arguments.policy);
     // It must outlive the policy: a policy in another process ends with it.
     let registry = registry(arguments, &name, recording.rate())?;

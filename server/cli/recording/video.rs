@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     let recording = Recording::open(&arguments.folder)?;
-    let calibration = calibration::read(&recording.calibration())?;
+    let calibration = calibration::of_recording(&recording)?;
     let frames = chosen(arguments, &recording)?;
     let mut developer = Developer::new(&calibration);
     let size = arguments.size.unwrap_or(Size::Cell);

@@ -141,7 +141,7 @@ struct MosaicDeveloper {
 
 impl MosaicDeveloper {
     fn new(recording: &Recording) -> Result<Self, ConductError> {
-        let calibration = calibration::read(&recording.calibration())
+        let calibration = calibration::of_recording(recording)
             .map_err(|error| ConductError::Damaged(format!("the recording's calibration: {error}")))?;
         let encoder =
             JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY).map_err(|error| ConductError::Damaged(error.to_string()))?;

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use parfocal_base::files::replace;
 use parfocal_imaging::{Calibration, MosaicFrame, Picture, Reference, decode, encode_tiff};
+use parfocal_recording::Recording;
 
 /// Why a calibration, or a maker's table, cannot be used or saved. The message names the file, and says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +50,21 @@ pub fn read_into(calibration: Calibration, path: &Path) -> Result<Calibration, C
     Ok(changed.map_err(|error| format!("calibration {}, {error}", path.display()))?)
 }
 
+/// The calibration that is kept in `recording`.
+///
+/// # Errors
+/// As [`read`], and if it does not fit the recording's mosaics, because another one was put there.
+pub fn of_recording(recording: &Recording) -> Result<Calibration, CalibrationFault> {
+    let calibration = read(&recording.calibration())?;
+
+    let misfit = misfit(&calibration, "the recording", Some(recording.size()));
+    if let Some(misfit) = misfit.or_else(|| other_scale(&calibration)) {
+        let folder = recording.calibration();
+        return Err(format!("{misfit}: put the recording's own back into {}", folder.display()).into());
+    }
+    Ok(calibration)
+}
+
 /// The calibration of `path` if one is given, else that of a typical unit.
 ///
 /// # Errors
@@ -62,19 +78,24 @@ pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, CalibrationFa
 /// # Errors
 /// If they do not fit.
 pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
-    match (calibration.size(), size) {
-        (Some(taken), Some(size)) if taken != size => Err(format!(
-            "the calibration {} was taken at {}x{}, but {of} is {}x{}: take new references with \
-             `parfocal calibrate`, or set the camera to the size of the references",
-            calibration.title(),
-            taken.0,
-            taken.1,
-            size.0,
-            size.1
-        )
-        .into()),
-        _ => Ok(()),
-    }
+    let Some(misfit) = misfit(calibration, of, size) else { return Ok(()) };
+    Err(format!(
+        "{misfit}: take new references with `parfocal calibrate`, or set the camera to the size of the references"
+    )
+    .into())
+}
+
+/// How the references per pixel of `calibration` differ from frames of `size`; `None` if they fit.
+fn misfit(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Option<String> {
+    let (taken, size) = calibration.size().zip(size).filter(|(taken, size)| taken != size)?;
+    Some(format!(
+        "the calibration {} was taken at {}x{}, but {of} is {}x{}",
+        calibration.title(),
+        taken.0,
+        taken.1,
+        size.0,
+        size.1
+    ))
 }
 
 /// Refuses a calibration that does not fit, in size or in scale, a camera with mosaics of `size` (`None` if it delivers
@@ -92,17 +113,19 @@ pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> 
 /// # Errors
 /// If it does not fit.
 pub fn check_scale(calibration: &Calibration) -> Result<(), CalibrationFault> {
-    if calibration.bit_depth != CAMERA_BITS {
-        return Err(format!(
-            "the calibration {} is for samples of {} bit, but parfocal converts every camera to {CAMERA_BITS} bit: \
-             give dark and white on that scale, and `bit_depth = {CAMERA_BITS}`",
+    let Some(other) = other_scale(calibration) else { return Ok(()) };
+    Err(format!("{other}: give dark and white on that scale, and `bit_depth = {CAMERA_BITS}`").into())
+}
+
+/// How the scale of `calibration` differs from that of the cameras' samples; `None` if it does not.
+fn other_scale(calibration: &Calibration) -> Option<String> {
+    (calibration.bit_depth != CAMERA_BITS).then(|| {
+        format!(
+            "the calibration {} is for samples of {} bit, but parfocal converts every camera to {CAMERA_BITS} bit",
             calibration.title(),
             calibration.bit_depth
         )
-        .into());
-    }
-
-    Ok(())
+    })
 }
 
 fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
