@@ -182,7 +182,7 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
         if let Reference::PerPixel(frame) = reference
             && (changed.contains(&key) || name.is_empty())
         {
-            *name = format!("{key}-{}.tiff", calibration.version);
+            *name = format!("{}.tiff", of_version(key, &calibration.version));
             new.push((folder.join(name.as_str()), frame));
         }
     }
@@ -197,12 +197,17 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
 
     // The earlier calibration is kept under its version before the new one takes its place.
     if !before.is_empty() {
-        let version = named(&before, "version");
-        replace(&folder.join(format!("calibration-{version}.toml")), before.as_bytes()).map_err(failed)?;
+        let kept = format!("{}.toml", of_version("calibration", &named(&before, "version")));
+        replace(&folder.join(kept), before.as_bytes()).map_err(failed)?;
     }
 
     replace(&current, text.as_bytes()).map_err(failed)?;
     Ok(current)
+}
+
+/// The name of what belongs to `version`, without its ending. People write versions as they like, such as 3/2026.
+fn of_version(what: &str, version: &str) -> String {
+    format!("{what}-{}", version.replace('/', "-"))
 }
 
 /// Refuses a calibration that could not be read again from `text`, in which `dark` is the dark reference's picture.
@@ -231,4 +236,23 @@ fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), CalibrationFaul
     let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
     let bytes = encode_tiff(frame).map_err(|error| failed(&error))?;
     Ok(replace(path, &bytes).map_err(|error| failed(&error))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_may_be_any_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let dark = Reference::PerPixel(MosaicFrame::new(8, 4, vec![7; 32]).unwrap());
+        let first = Calibration { version: "../3/2026".to_owned(), dark, ..Calibration::default() };
+        save(folder.path(), &first, &["dark"]).unwrap();
+        assert_eq!(read(folder.path()).unwrap(), first);
+
+        let second = Calibration { version: "4".to_owned(), ..first.clone() };
+        save(folder.path(), &second, &[]).unwrap();
+        assert_eq!(read(folder.path()).unwrap(), second);
+        assert_eq!(read(&folder.path().join("calibration-..-3-2026.toml")).unwrap(), first);
+    }
 }
