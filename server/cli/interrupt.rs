@@ -43,6 +43,14 @@ pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
     listen(&[SIGHUP, SIGQUIT], || {})
 }
 
+/// The same for the signals that an [`Interrupt`] does not handle that [asks at a hangup](Interrupt::ask_at_hangup).
+///
+/// # Errors
+/// If the system cannot provide a thread or a signal handler.
+pub fn let_lenses_go_first_at_sigquit() -> io::Result<()> {
+    listen(&[SIGQUIT], || {})
+}
+
 fn listen(ending: &[i32], undo: impl Fn() + Clone + Send + 'static) -> io::Result<()> {
     on_a_thread("signals", || {
         for &ending in ending {
@@ -111,6 +119,15 @@ impl Interrupt {
         })?;
 
         Ok(interrupt)
+    }
+
+    /// Makes SIGHUP (the terminal closes) ask as well. However often it comes, it never ends the process at once: a shell
+    /// and the system may both send it.
+    ///
+    /// # Errors
+    /// If the system cannot provide a signal handler.
+    pub fn ask_at_hangup(&self) -> io::Result<()> {
+        signal_hook::flag::register(SIGHUP, Arc::clone(&self.asked)).map(drop)
     }
 
     /// Whether Ctrl-C was pressed or SIGTERM came, so that the command should stop.

@@ -46,6 +46,21 @@ fn what_a_killed_recording_had_stored_opens() {
 }
 
 #[test]
+fn a_recording_whose_terminal_closes_keeps_its_last_frames() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("recording");
+    let mut recording = command(&["recording", "record", "--out", text(&out)]).stderr(Stdio::null()).spawn().unwrap();
+    wait_for(|| Recording::open(&out).is_ok_and(|there| !there.rows().is_empty()));
+    let process = rustix::process::Pid::from_child(&recording);
+    for _ in 0..2 {
+        rustix::process::kill_process(process, rustix::process::Signal::HUP).unwrap();
+    }
+
+    assert!(recording.wait().unwrap().success());
+    assert_eq!(info(&out)["ended"]["why"], "stopped");
+}
+
+#[test]
 fn a_damaged_frame_is_named_and_the_others_are_read() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 30);

@@ -7,7 +7,7 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 
 use crate::cli::input::{frame_rate, frame_rate_help};
-use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
+use crate::cli::interrupt::{Interrupt, let_lenses_go_first_at_sigquit};
 use crate::cli::output::{Failure, print, word};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, SystemClock};
@@ -63,7 +63,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     let interrupt = Interrupt::listen("storing the last frames".to_owned())?;
-    let_lenses_go_first_beside_an_interrupt()?;
+    interrupt.ask_at_hangup()?;
+    let_lenses_go_first_at_sigquit()?;
     control::keep_policies_quiet();
 
     let (control_loop, control, recorder) = start(arguments)?;
@@ -71,8 +72,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = watch(arguments, &interrupt, &control, &recorder);
 
     control.tap.disconnect();
-    let progress = recorder.stop();
+    // First, because a disk that hangs must not keep the lens under current.
     control_loop.stop();
+    let progress = recorder.stop();
     outcome?;
     tell(arguments, &progress)
 }
