@@ -22,6 +22,7 @@ use tokio::time::{Instant, interval, timeout};
 use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
 use parfocal_recording::{Ended, Intake, Room, compressed_size, room};
+use parfocal_records::store::Stamp;
 use parfocal_trial::protocol::Record;
 use running::Running;
 
@@ -306,7 +307,8 @@ impl Shared {
     /// Begins to record. `asked_by` is the session whose protocol asked for it, if one did.
     fn begin(&self, what: Record, asked_by: Option<SessionId>) -> Result<(), StartError> {
         let session = asked_by.or_else(|| self.parts.conductor.session_under_way());
-        let began = self.parts.clock.now();
+        // Both clocks at once: a slow disk must not come between them.
+        let began = Stamp { wall: self.parts.clock.wall(), at: self.parts.clock.now() };
         let folder = starting::new_folder(&self.parts, asked_by);
         let Some(running) = starting::start(&self.parts, what, &folder, session, began)? else { return Ok(()) };
 
@@ -317,7 +319,7 @@ impl Shared {
             // Connect while the state is locked, so that a measurement does not disconnect the tap.
             self.parts.tap.connect(recorder.intake());
         }
-        state.active = Some(Active { what: running, session, by_protocol: asked_by.is_some(), began });
+        state.active = Some(Active { what: running, session, by_protocol: asked_by.is_some(), began: began.at });
         Ok(())
     }
 }

@@ -6,13 +6,13 @@ use super::parts::RecorderParts;
 use super::running::Running;
 use super::view::ViewRecorder;
 use parfocal_base::SOFTWARE;
-use parfocal_base::clock::Moment;
 use parfocal_base::ids::SessionId;
 use parfocal_devices::camera::calibration;
 use parfocal_recording::{
     CALIBRATION, FORMAT, Header, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader,
     ViewWriter, Writer, room,
 };
+use parfocal_records::store::Stamp;
 use parfocal_trial::protocol::Record;
 
 /// Why a recording was not started.
@@ -42,7 +42,8 @@ impl From<RecordingError> for StartError {
     }
 }
 
-/// Begins to record into `folder`; `None` if `what` is [`Record::None`]. `session` is the session under way.
+/// Begins to record into `folder`; `None` if `what` is [`Record::None`]. `session` is the session under way. Times count
+/// from `began`.
 ///
 /// # Errors
 /// If the camera has no mosaics, the disk has no room, or the recording cannot be written.
@@ -51,7 +52,7 @@ pub fn start(
     what: Record,
     folder: &Path,
     session: Option<SessionId>,
-    began: Moment,
+    began: Stamp,
 ) -> Result<Option<Running>, StartError> {
     let room = room(&parts.folder).map_err(|error| StartError::Failed(error.to_string()))?;
     if room.spare() == 0 {
@@ -79,9 +80,9 @@ fn record_mosaics(
     parts: &RecorderParts,
     folder: &Path,
     session: Option<String>,
-    began: Moment,
+    began: Stamp,
 ) -> Result<Recorder, StartError> {
-    let RecorderParts { clock, status, calibration, controls, size, .. } = parts;
+    let RecorderParts { status, calibration, controls, size, .. } = parts;
     let size = size.ok_or(StartError::NoMosaics)?;
     let status = status.borrow().clone();
 
@@ -89,7 +90,7 @@ fn record_mosaics(
         format: FORMAT.to_owned(),
         version: VERSION,
         software: SOFTWARE.to_owned(),
-        started: clock.wall(),
+        started: began.wall,
         camera: status.camera.name.to_string(),
         lens: status.lens.name.to_string(),
         simulated: status.camera.simulated || status.lens.simulated,
@@ -97,7 +98,7 @@ fn record_mosaics(
         camera_settings: controls.as_ref().map(|controls| controls.offered().by_name()).unwrap_or_default(),
         session,
         run: Some(parts.run),
-        monotonic_ns: Some(began.as_nanos().cast_signed()),
+        monotonic_ns: Some(began.at.as_nanos().cast_signed()),
         frames_lost: 0,
         ended: None,
     };
@@ -105,26 +106,26 @@ fn record_mosaics(
     let writer = Writer::create(folder, header, size, calibration)?;
     calibration::save(&folder.join(CALIBRATION), calibration, &[])
         .map_err(|error| StartError::Failed(error.to_string()))?;
-    Ok(Recorder::start(writer, began)?)
+    Ok(Recorder::start(writer, began.at)?)
 }
 
 fn record_view(
     parts: &RecorderParts,
     folder: &Path,
     session: Option<String>,
-    began: Moment,
+    began: Stamp,
 ) -> Result<ViewRecorder, StartError> {
     let header = ViewHeader {
         format: VIEW_FORMAT.to_owned(),
         version: VIEW_VERSION,
         software: SOFTWARE.to_owned(),
-        started: parts.clock.wall(),
+        started: began.wall,
         camera: parts.status.borrow().camera.name.to_string(),
         session,
         run: Some(parts.run),
-        monotonic_ns: Some(began.as_nanos().cast_signed()),
+        monotonic_ns: Some(began.at.as_nanos().cast_signed()),
         ended: None,
     };
     let writer = ViewWriter::create(folder, header)?;
-    Ok(ViewRecorder::start(writer, parts.live.follow(), began)?)
+    Ok(ViewRecorder::start(writer, parts.live.follow(), began.at)?)
 }
