@@ -29,7 +29,7 @@ const SEND_BUFFER: usize = 256 << 10;
 /// What the two halves of a connection share.
 #[derive(Default)]
 struct Shared {
-    /// Whether the client speaks version 3. Until it has spoken, it gets version 2, which all understand.
+    /// Whether the client has spoken version 3. Until then it gets version 2, which all understand.
     three: AtomicBool,
     /// It asked for the status.
     asked: Notify,
@@ -101,7 +101,7 @@ async fn listen(mut from: OwnedReadHalf, shared: &Shared) -> End {
             return End::Stranger("a message's checksum is wrong");
         }
 
-        shared.three.store(header.version == Version::Three, Ordering::Relaxed);
+        shared.three.fetch_or(header.version == Version::Three, Ordering::Relaxed);
         if header.kind == "GET_STATUS" {
             shared.asked.notify_one();
         }
@@ -177,4 +177,31 @@ async fn send(to: &mut OwnedWriteHalf, mut message: Bytes) -> Result<(), End> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::net::TcpListener;
+
+    use super::super::message::Envelope;
+    use super::*;
+
+    #[tokio::test]
+    async fn who_has_spoken_version_three_gets_it_from_then_on() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let mut client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
+        let (from, _to) = stream.into_split();
+
+        let message = Envelope { kind: "STRING", device: "Tablet", stamp: 0, id: 0 };
+        for version in [Version::Three, Version::Two] {
+            client.write_all(&message.seal(version, b"hello", &[])).await.unwrap();
+        }
+        drop(client);
+
+        let shared = Shared::default();
+        assert_eq!(shared.version(), Version::Two);
+        assert!(matches!(listen(from, &shared).await, End::Closed));
+        assert_eq!(shared.version(), Version::Three);
+    }
 }
