@@ -262,7 +262,8 @@ impl Firmware {
     /// Least and greatest focal power within the temperature limits, in the driver's units; zeros without limits.
     fn range(&self) -> (i16, i16) {
         let Some((high, low)) = self.limits else { return (0, 0) };
-        let lost = (f64::from(high - low) / 16.0 - FULL_RANGE_SPAN).max(0.0) * NARROWING;
+        let span = (f64::from(high) - f64::from(low)) / 16.0;
+        let lost = (span - FULL_RANGE_SPAN).max(0.0) * NARROWING;
         (self.units(LENS_DIOPTRES.0 + lost), self.units(LENS_DIOPTRES.1 - lost))
     }
 
@@ -401,5 +402,16 @@ mod tests {
         talk(&mut firmware, ten_dioptres);
         assert_eq!(firmware.commands, [(Moment::default(), 3000)]);
         assert!(talk(&mut firmware, "50724441000000006470").contains("0BB8"));
+    }
+
+    #[test]
+    fn no_temperature_limits_are_too_far_apart_to_be_answered() {
+        let mut firmware = Firmware::new(Model::default());
+        let widest = [&b"PwTA"[..], &i16::MAX.to_be_bytes(), &i16::MIN.to_be_bytes()].concat();
+        let request = [&widest[..], &checksum_of(&widest)].concat();
+        // Over 4096 °C, 81.5 dpt are lost at each end: nothing is left between them.
+        let answer = answers(&mut firmware, &request);
+        let [.., max, _, min, _, _, _, _, _] = answer[..] else { panic!("{answer:?}") };
+        assert!(max.cast_signed() < min.cast_signed(), "{answer:?}");
     }
 }
