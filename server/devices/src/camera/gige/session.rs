@@ -10,7 +10,7 @@ use super::device::{Arrival, Device, Setup};
 use super::shared::{Shared, words};
 use super::timestamps::Timestamps;
 use crate::camera::pool::MosaicPool;
-use crate::camera::{Frame, FrameImage, Setting};
+use crate::camera::{Frame, FrameImage, LEAST_FPS, Setting};
 use parfocal_base::guarded;
 use parfocal_imaging::MosaicFrame;
 
@@ -45,6 +45,9 @@ pub fn run(shared: &Shared, setup: &Setup, device: Option<Device>, size: (usize,
             Err(error) => error.to_string(),
         };
         let trouble = guarded(attempt).unwrap_or_else(|panic| format!("its driver failed: {panic}"));
+        if shared.stopping() {
+            return;
+        }
 
         shared.controls.offer(Vec::new());
         shared.set_condition(Err(trouble.into()));
@@ -101,7 +104,7 @@ impl<'a> Session<'a> {
         session
     }
 
-    /// Streams until the camera is lost or the thread should end; returns the reason.
+    /// Streams until the camera is lost or the thread should end; returns the reason if it is lost.
     fn stream(mut self) -> String {
         let mut last = self.shared.clock.now();
         let mut whole = last;
@@ -133,7 +136,7 @@ impl<'a> Session<'a> {
             }
         }
 
-        "closed".into()
+        String::new()
     }
 
     /// How long a working camera may send nothing.
@@ -145,11 +148,18 @@ impl<'a> Session<'a> {
     fn tell_torn(&mut self, torn: bool) {
         if torn != self.torn {
             self.torn = torn;
-            let words = words(&self.device);
-            let why = "; every frame arrives with parts missing: larger packets, a larger receive buffer, or fewer \
-                       frames a second";
-            self.shared.set_condition(Ok(if torn { Arc::from(format!("{words}{why}")) } else { words }));
+            self.tell_condition();
         }
+    }
+
+    /// Tells the camera's picture, and what keeps its frames from coming whole or often enough.
+    fn tell_condition(&self) {
+        let torn = "; every frame arrives with parts missing: larger packets, a larger receive buffer, or fewer frames \
+                    a second";
+        let mut words = words(&self.device).to_string();
+        words.push_str(if self.torn { torn } else { "" });
+        words.push_str(&too_slow(self.exposure, self.period));
+        self.shared.set_condition(Ok(words.into()));
     }
 
     fn deliver(&mut self, buffer: &Buffer) {
@@ -213,7 +223,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Publishes what can be changed, and notes the camera's exposure time.
+    /// Publishes what can be changed, and notes the camera's exposure time and frame rate.
     fn offer(&mut self) {
         let offers = self.device.offers();
         let value = |setting| offers.iter().find(|one| one.setting == setting).map(|one| one.value);
@@ -228,6 +238,23 @@ impl<'a> Session<'a> {
         }
         self.exposure = exposure;
         self.shared.controls.offer(offers);
+        self.tell_condition();
+    }
+}
+
+/// What to do if the camera makes fewer frames than the control loop needs: these would seem to fail to come. A
+/// specification may ask for so long an exposure, and a camera may have it from before. Empty if it makes enough.
+fn too_slow(exposure: Duration, period: Duration) -> String {
+    // A tenth more, because cameras round their rates.
+    const LONGEST: Duration = Duration::from_millis(1100 / LEAST_FPS as u64);
+
+    let needed = format!("the control loop needs {LEAST_FPS} frames a second");
+    if exposure > LONGEST {
+        format!("; {needed}, and an exposure takes {} ms: shorten it", exposure.as_millis())
+    } else if period > LONGEST {
+        format!("; {needed}, and the camera makes {:.1}: raise its frame rate", 1.0 / period.as_secs_f64())
+    } else {
+        String::new()
     }
 }
 
@@ -255,5 +282,13 @@ mod tests {
         assert_eq!(steps(Some(65_535), 0), 1, "a camera that counts from 0");
         assert_eq!(steps(Some(5000), 1), 1, "the camera restarted");
         assert_eq!(steps(Some(1 << 40), 3), 1);
+    }
+
+    #[test]
+    fn a_camera_too_slow_for_the_control_loop_is_told_what_to_change() {
+        let told = |exposure, period| too_slow(Duration::from_millis(exposure), Duration::from_millis(period));
+        assert!(told(500, 500).ends_with("needs 5 frames a second, and an exposure takes 500 ms: shorten it"));
+        assert!(told(20, 400).ends_with("and the camera makes 2.5: raise its frame rate"));
+        assert_eq!(told(200, 200) + &told(0, 0), "");
     }
 }
