@@ -10,7 +10,7 @@ use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
 use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::ids::SegmentId;
-use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
+use parfocal_devices::camera::{Camera, CameraError, CameraHealth, Controls, Frame, FrameImage};
 use parfocal_devices::lens::{Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use parfocal_imaging::RgbImage;
 use parfocal_pipeline::control::{Command, Drive};
@@ -245,12 +245,13 @@ pub struct FakeCamera {
     clock: Arc<dyn Clock>,
     shots: Receiver<Shot>,
     number: u64,
+    pub controls: Option<Controls>,
 }
 
 impl FakeCamera {
     pub fn new(clock: Arc<dyn Clock>) -> (Self, Sender<Shot>) {
         let (sender, shots) = channel();
-        (Self { clock, shots, number: 0 }, sender)
+        (Self { clock, shots, number: 0, controls: None }, sender)
     }
 }
 
@@ -266,6 +267,10 @@ impl Camera for FakeCamera {
             Err(RecvTimeoutError::Timeout) => Err(CameraError::Timeout(timeout)),
             Err(RecvTimeoutError::Disconnected) => Err(CameraError::Failed("the test is over".into())),
         }
+    }
+
+    fn controls(&self) -> Option<Controls> {
+        self.controls.clone()
     }
 
     fn health(&self) -> CameraHealth {

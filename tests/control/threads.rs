@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::step::{Hold, StepRecord};
+use parfocal_devices::camera::{Adjustable, Controls, Setting};
 use parfocal_imaging::Reconstructor;
 use parfocal_pipeline::control::{
     Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, LoopSettings, Rig,
@@ -30,8 +31,14 @@ struct Stage {
 
 impl Stage {
     fn new(telemetry_capacity: usize) -> Self {
+        Self::with_controls(telemetry_capacity, None)
+    }
+
+    /// A stage whose camera can be changed by `controls`.
+    fn with_controls(telemetry_capacity: usize, controls: Option<Controls>) -> Self {
         let clock = Arc::new(SystemClock);
-        let (fake_camera, camera) = FakeCamera::new(clock.clone());
+        let (mut fake_camera, camera) = FakeCamera::new(clock.clone());
+        fake_camera.controls = controls;
         let lens = FakeLens::at(power(0.5));
         let script = Script::new(Deed::GoTo(0.6));
         let rig = Rig {
@@ -104,6 +111,23 @@ fn a_hanging_policy_does_not_stop_the_view() {
     }
     stage.script.set(Deed::GoTo(0.7));
     stage.shoot_until(|record| record.held.is_none());
+    stage.control.stop();
+}
+
+#[test]
+fn a_policy_has_as_long_as_the_cameras_present_rate_leaves() {
+    let rate = |value| Adjustable { setting: Setting::FrameRate, value, min: 5.0, max: 100.0 };
+    let controls = Controls::default();
+    controls.offer(vec![rate(50.0)]);
+    let mut stage = Stage::with_controls(16, Some(controls.clone()));
+    controls.offer(vec![rate(8.0)]);
+    stage.status_until(|status| status.camera_offer.settings == [rate(8.0)]);
+
+    stage.script.set(Deed::Hang);
+    stage.handle.send(drive("scripted", None));
+    let late = stage.shoot_until(|record| record.held == Some(Hold::PolicySlow));
+    assert!(late.latency_micros >= 125_000, "one frame at 8 a second, not at 50: {late:?}");
+    stage.script.set(Deed::GoTo(0.7));
     stage.control.stop();
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -72,6 +73,16 @@ impl CameraOffer {
     /// The settings' values by their names, as JSON has them.
     pub fn by_name(&self) -> BTreeMap<String, f64> {
         self.settings.iter().map(|one| (one.setting.name().to_owned(), one.value)).collect()
+    }
+
+    /// Time between two frames, if the camera tells its rate: no less than an exposure takes, and no more than at
+    /// [`LEAST_FPS`].
+    pub fn frame_period(&self) -> Option<Duration> {
+        let value = |setting| self.settings.iter().find(|one| one.setting == setting).map(|one| one.value);
+        let by_rate = 1e6 / value(Setting::FrameRate).filter(|rate| *rate > 0.0)?;
+        let exposure = value(Setting::Exposure).unwrap_or(0.0);
+        let micros = [by_rate, exposure].into_iter().fold(0.0, f64::max).min(LONGEST_EXPOSURE);
+        Some(Duration::from_secs_f64(micros / 1e6))
     }
 }
 
@@ -200,5 +211,23 @@ mod tests {
         controls.offer(vec![Adjustable { setting: Setting::Exposure, value: 8000.0, min: 10.0, max: 1e6 }]);
         assert!(controls.ask(Setting::Exposure, 200_001.0).is_err());
         assert_eq!(controls.ask(Setting::Exposure, 200_000.0), Ok(()));
+    }
+
+    #[test]
+    fn frames_come_as_fast_as_rate_and_exposure_allow() {
+        let period = |rate: f64, micros: f64| {
+            let of = |setting, value| Adjustable { setting, value, min: 0.0, max: 1e9 };
+            let settings = vec![of(Setting::FrameRate, rate), of(Setting::Exposure, micros)];
+            CameraOffer { settings, trouble: None }.frame_period().map(|period| period.as_millis())
+        };
+        assert_eq!(
+            [period(50.0, 8000.0), period(50.0, 40_000.0), period(50.0, f64::NAN)],
+            [Some(20), Some(40), Some(20)]
+        );
+        assert_eq!([period(2.0, 8000.0), period(50.0, 1e6)], [Some(200); 2]);
+        for unknown in [0.0, -1.0, f64::NAN] {
+            assert_eq!(period(unknown, 8000.0), None, "{unknown}");
+        }
+        assert_eq!(CameraOffer::default().frame_period(), None);
     }
 }

@@ -77,6 +77,11 @@ impl Pilot {
         self.forgets = true;
     }
 
+    /// Waits at most `patience`, one frame period, for each answer from now on.
+    pub const fn wait_at_most(&mut self, patience: Duration) {
+        self.patience = patience;
+    }
+
     /// The policy in charge.
     pub const fn policy(&self) -> Option<&PolicyName> {
         self.policy.as_ref()

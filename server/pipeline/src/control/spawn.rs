@@ -52,7 +52,7 @@ pub struct Rig {
 /// How the loop runs.
 #[derive(Debug, Clone)]
 pub struct LoopSettings {
-    /// Time between two frames. It is also the longest wait for a policy's answer.
+    /// Time between two frames, unless the camera tells its own. It is also the longest wait for a policy's answer.
     pub frame_period: Duration,
     /// Capacity of the telemetry channel, in records. Further records are dropped.
     pub telemetry_capacity: usize,
@@ -99,6 +99,7 @@ impl ControlLoop {
             frames: frames.clone(),
             tap: tap.clone(),
             controls: controls.clone(),
+            frame_period: settings.frame_period,
             published_at: now,
             last_frame_at: now,
             camera_fault: None,
@@ -145,8 +146,10 @@ struct Worker {
     telemetry: mpsc::Sender<StepRecord>,
     frames: Arc<LatestSlot<ControlledFrame>>,
     tap: Tap,
-    /// Read only for the status.
+    /// Read only when a status is due.
     controls: Option<Controls>,
+    /// Time between two frames of a camera that does not tell it.
+    frame_period: Duration,
     published_at: Moment,
     last_frame_at: Moment,
     /// Why there are no usable frames: none come, or they are too small for a patch.
@@ -256,7 +259,10 @@ impl Worker {
         }
 
         self.published_at = now;
-        publisher.send_replace(Arc::new(self.status(now)));
+        let status = self.status(now);
+        // The operator may have changed the camera's frame rate.
+        self.stepper.wait_at_most(status.camera_offer.frame_period().unwrap_or(self.frame_period));
+        publisher.send_replace(Arc::new(status));
     }
 
     /// Why the lens is held; `None` if it is not.

@@ -105,6 +105,11 @@ impl Stepper {
         measured.map_or_else(|| self.lens.dynamics(), MeasuredDynamics::dynamics)
     }
 
+    /// Waits for a policy at most `patience` per frame from now on.
+    pub const fn wait_at_most(&mut self, patience: Duration) {
+        self.pilot.wait_at_most(patience);
+    }
+
     /// Carries out `command`. Drive and segment change together, between two frames.
     pub fn obey(&mut self, command: Command) {
         match command {
