@@ -353,6 +353,16 @@ fn after_an_outage_of_the_lens_the_policy_forgets_before_it_is_asked_again() {
 }
 
 #[test]
+fn after_an_outage_of_the_camera_the_policy_forgets_before_it_is_asked_again() {
+    let (mut fixture, diary) = diarist();
+    fixture.step_after(Duration::from_secs(1));
+    assert_eq!(*diary.lock().unwrap(), ["sees"]);
+    fixture.step_after(Duration::from_millis(1001));
+    fixture.step();
+    assert_eq!(*diary.lock().unwrap(), ["sees", "forgets", "sees", "sees"]);
+}
+
+#[test]
 fn the_patch_goes_where_people_point_and_the_policy_forgets_the_old_place_first() {
     let (mut fixture, diary) = diarist();
     let content = ContentArea { x: 32.0, y: 32.0, radius: 20.0, confidence: 1.0 };

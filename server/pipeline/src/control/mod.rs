@@ -42,6 +42,9 @@ use parfocal_devices::camera::{CameraHealth, CameraOffer, Controls, Frame};
 use parfocal_devices::lens::LensHealth;
 use parfocal_imaging::{ContentArea, PatchArea};
 
+/// After a longer gap between two frames they are not compared: the camera was away, and the tissue has moved.
+pub(crate) const GAP: Duration = Duration::from_secs(1);
+
 /// What drives the lens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
@@ -102,7 +105,8 @@ pub struct ControlledFrame {
     pub content_area: Option<ContentArea>,
     /// Where people have chosen to look; where the patch follows the tissue, its present place.
     pub aim: Aim,
-    /// How often the policy has been made to forget what it saw: because the patch jumped, or the focus was held.
+    /// How often the policy has been made to forget what it saw: because the patch jumped, the focus was held, or camera
+    /// or lens were away.
     pub jumps: u64,
     /// The record of its step.
     pub record: StepRecord,

@@ -7,11 +7,11 @@ use super::advice::Advice;
 use super::attribution::Attribution;
 use super::eye::{Eye, cells};
 use super::pilot::{HoldReason, Pilot};
-use super::{Aim, Command, ControlledFrame, Drive, Following, PictureGeometry};
+use super::{Aim, Command, ControlledFrame, Drive, Following, GAP, PictureGeometry};
 use parfocal_autofocus::tracking::{Tracked, Tracker};
 use parfocal_autofocus::{FieldOfView, Observation, Registry};
 use parfocal_base::PolicyName;
-use parfocal_base::clock::Clock;
+use parfocal_base::clock::{Clock, Moment};
 use parfocal_base::guarded;
 use parfocal_base::ids::SegmentId;
 use parfocal_base::step::Hold;
@@ -47,6 +47,8 @@ pub struct Stepper {
     jumps: u64,
     /// Where the patch was in the latest frame since then.
     latest_patch: Option<PatchArea>,
+    /// When the latest frame was exposed.
+    latest_frame: Option<Moment>,
     /// What people can point at.
     geometry: PictureGeometry,
     /// The last focal power that the lens accepted.
@@ -79,6 +81,7 @@ impl Stepper {
             following: Following::Screen,
             jumps: 0,
             latest_patch: None,
+            latest_frame: None,
             geometry: PictureGeometry::default(),
             asked: start,
             wanted: start,
@@ -140,6 +143,14 @@ impl Stepper {
         self.pilot.forget();
         self.jumps += 1;
         self.latest_patch = None;
+    }
+
+    /// What the policy saw before the camera was away is not compared with what it sees now.
+    fn notice_gap(&mut self, exposed_at: Moment) {
+        let latest = self.latest_frame.replace(exposed_at);
+        if latest.is_some_and(|latest| exposed_at.since(latest) > GAP) {
+            self.forget();
+        }
     }
 
     /// A chosen place is relative to the content area. Where that was found anew far from where it was, the patch shows
@@ -229,6 +240,7 @@ impl Stepper {
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
         // While the lens is disconnected, its focal power is unknown.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
+        self.notice_gap(frame.exposed_at);
         self.geometry.cells = cells(&frame.image);
         let content_area = self.geometry.content_area;
         let patch = self.eye.find(&frame.image, self.aim.place, content_area.as_ref())?;

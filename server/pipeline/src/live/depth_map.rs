@@ -3,13 +3,12 @@
 //! made only while somebody looks at it, by a thread that takes the latest frame whenever it is done with one.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use serde::Serialize;
 use tokio::sync::watch;
 
 use super::frame_thread::{FrameSlot, FrameThread};
-use crate::control::{ControlledFrame, Eye, cells};
+use crate::control::{ControlledFrame, Eye, GAP, cells};
 use parfocal_autofocus::belief::{SURE, Sides};
 use parfocal_autofocus::networks::compute_on_this_thread;
 use parfocal_autofocus::{Observation, Policy, PolicyError, Registry};
@@ -22,9 +21,6 @@ const BELIEVER: &str = "parfocal";
 
 /// Places are as far apart as if this many shared the whole picture.
 const PLACES: f64 = 24.0;
-
-/// After a longer gap between two frames they are not compared, and the trackers are not kept.
-const GAP: Duration = Duration::from_secs(1);
 
 /// Where the optima of the places of one frame are.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -246,6 +242,8 @@ fn places((width, height): (usize, usize), content: Option<&ContentArea>) -> Vec
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::control::Aim;
     use parfocal_base::IN_FOCUS;
