@@ -11,6 +11,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -39,6 +40,10 @@ impl Pty {
         unlockpt(&driver)?;
 
         let path = PathBuf::from(OsStr::from_bytes(ptsname(&driver, Vec::new())?.as_bytes()));
+
+        // Replies that nobody reads are lost, as on a real line. Waiting for a reader could last forever.
+        let flags = fcntl_getfl(&driver)?;
+        fcntl_setfl(&driver, flags | OFlags::NONBLOCK)?;
 
         // A serial port neither echoes nor changes line ends.
         let mut settings = tcgetattr(&driver)?;
@@ -101,7 +106,7 @@ impl Server {
                 if self.stopped_within(answer.takes) {
                     return;
                 }
-                // The other side may have closed the port.
+                // The other side may have closed the port, or read nothing for long.
                 let _ = self.port.write_all(&answer.bytes);
             }
         }
@@ -119,5 +124,31 @@ impl Server {
     fn stopped_within(&self, time: Duration) -> bool {
         let time = Timespec::try_from(time).unwrap_or_default();
         poll(&mut [PollFd::new(&*self.stop, PollFlags::IN)], Some(&time)).is_ok_and(|ready| ready > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rustix::fs::Mode;
+
+    use super::*;
+    use crate::lens::emulator::Model;
+    use parfocal_base::clock::SystemClock;
+
+    #[test]
+    fn a_client_that_reads_nothing_does_not_keep_the_unit_from_ending() {
+        let model = Model { latency: Duration::ZERO, ..Model::default() };
+        let firmware = Arc::new(Mutex::new(Firmware::new(model)));
+        let pty = Pty::open(firmware.clone(), Arc::new(SystemClock)).unwrap();
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
+        let mut client = File::from(rustix::fs::open(pty.path(), flags, Mode::empty()).unwrap());
+
+        // Each reply has nine bytes: together they are more than a terminal holds.
+        let temperature = hex::decode("544341B0D0").unwrap();
+        while firmware.lock().unwrap().requests < 20_000 {
+            let _ = client.write_all(&temperature);
+            std::thread::yield_now();
+        }
+        drop(pty);
     }
 }
