@@ -3,16 +3,17 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
 
 use parfocal_results::package::{self, PackageSource, Sessions, exports_of};
-use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports};
+use parfocal_results::study_export::{ExportProgress, StudyExportState, StudyExports, export_study};
 use parfocal_trial::erasure::{Erasable, NewErasure};
 use parfocal_trial::remark::NewComment;
 use serde_json::Value;
 
 use super::program::{command, done, parfocal, refused, text};
 use super::*;
-use crate::exports::{json, rows};
+use crate::exports::{failed, json, rows};
 
 /// A text longer than one segment of an SPSS string, with multi-byte characters where its segments meet.
 fn long_text() -> String {
@@ -86,6 +87,28 @@ fn python(package: &Path) -> Value {
 
 fn texts(rows: &Value) -> BTreeSet<String> {
     rows.as_array().unwrap().iter().map(|row| row["text"].as_str().unwrap().to_owned()).collect()
+}
+
+/// A spreadsheet would run such a name as a formula, so an apostrophe stands before it in the CSV files.
+#[tokio::test]
+async fn a_study_and_a_site_whose_names_begin_with_a_dash_are_exported_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    std::fs::create_dir(&data).unwrap();
+    let trial = a_trial(&data).await;
+    let definition = definition().replace(STUDY, "-scope").replace("\"leeds\"", "\"-leeds\"");
+    plan(&trial, definition).await.unwrap();
+    let open = Change::Open { despite_concerns: true };
+    trial.conductor.change_study(Role::Researcher, "-scope".to_owned(), open, signed("as planned")).await.unwrap();
+    let place = StudyPlace { study: "-scope".to_owned(), site: "-leeds".to_owned() };
+    let session = trial.conductor.create(Role::Operator, "S-02", "pair", Some(place)).await.unwrap();
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "smoke".to_owned() }).await.unwrap();
+
+    let out = folder.path().join("package");
+    export_study(&trial.access_log(), "-scope", false, &out, Arc::new(|_| ())).await.unwrap();
+    let checks = package::check(&out, None);
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+    assert!(std::fs::read_to_string(out.join("sessions.csv")).unwrap().contains("\n'-leeds,"));
 }
 
 #[tokio::test]

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::error::PackageError;
 use super::source::PackageSource;
-use super::table::{JoinedTable, Origin};
+use super::table::{JoinedTable, Origin, SITE};
 
 /// Whether any of `sources` has the table. Blinded exports lack the tables that reveal the policies.
 pub fn is_there(table: &JoinedTable, sources: &[PackageSource]) -> bool {
@@ -21,10 +21,11 @@ pub fn rows(
     for source in sources {
         let path = source.folder.join(table.table.file());
         let mut reader = csv::Reader::from_path(&path).map_err(PackageError::unreadable(&path))?;
+        let site = SITE.csv(&source.site.as_str().into());
         let mut row = csv::StringRecord::new();
         while reader.read_record(&mut row).map_err(PackageError::unreadable(&path))? {
             let cell = |(_, origin): &(_, Origin)| match origin {
-                Origin::Site => source.site.as_str(),
+                Origin::Site => site.as_str(),
                 Origin::Session => source.session.as_str(),
                 Origin::Cell(place) => row.get(*place).unwrap_or_default(),
             };

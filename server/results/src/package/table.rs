@@ -3,7 +3,7 @@
 use parfocal_records::store::export::{Column, TABLES, Table, Type, means};
 
 /// Column that tells the records of different databases apart.
-const SITE: Column = means("Site of the study that recorded it; numbers such as run are counted at each site")
+pub const SITE: Column = means("Site of the study that recorded it; numbers such as run are counted at each site")
     .column("site", Type::String);
 
 const SESSION: Column = means("Session's random id").column("session", Type::String);

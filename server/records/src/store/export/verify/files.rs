@@ -9,8 +9,8 @@ use std::rc::Rc;
 use ::csv::{Reader, StringRecord};
 use serde_json::Value;
 
-use crate::store::export::description::{ChainRow, PolicyStepRow, TelemetryRow};
-use crate::store::export::table::{FORMAT, Row};
+use crate::store::export::description::{ALL, ChainRow, PolicyStepRow, TelemetryRow};
+use crate::store::export::table::{Column, FORMAT, Row};
 
 /// The tables with a row for each step of a policy or each record of the whole chain. They can be gigabytes, so they
 /// are read row by row each time and never kept.
@@ -122,15 +122,17 @@ impl ExportFiles {
         place_among(&self.headers(file)?, file, column)
     }
 
-    /// The cells of a column of a CSV file.
+    /// The cells of a column of a CSV file, as they were recorded.
     ///
     /// # Errors
     /// If the file cannot be read or has no such column. The text names the file.
     pub fn cells(&self, file: &str, column: &str) -> Result<Vec<String>, String> {
         let place = self.place(file, column)?;
+        let described = described(file, column);
         let mut cells = Vec::new();
         self.each_row(file, |row| {
-            cells.push(row.get(place).unwrap_or_default().to_owned());
+            let cell = row.get(place).unwrap_or_default();
+            cells.push(described.map_or(cell, |column| column.read(cell)).to_owned());
             Ok(())
         })?;
         Ok(cells)
@@ -170,6 +172,12 @@ fn once<T>(kept: &ReadCache<T>, file: &str, read: impl FnOnce() -> Result<T, Str
 pub(super) fn place_among(headers: &StringRecord, file: &str, column: &str) -> Result<usize, String> {
     let place = headers.iter().position(|name| name == column);
     place.ok_or_else(|| format!("{file} has no column {column}"))
+}
+
+/// The description of `column` in CSV file `file`; `None` if there is none.
+fn described(file: &str, column: &str) -> Option<&'static Column> {
+    let table = ALL.iter().find(|table| table.file() == file)?;
+    table.columns.iter().find(|described| described.name == column)
 }
 
 /// Whether `file` has a long table, which is never kept.
