@@ -67,13 +67,12 @@ pub struct StoredSession {
 }
 
 impl StoredSession {
-    /// Its protocol. The session's own policies count as known, even if this version no longer has them.
+    /// Its protocol, whose policies this version need not have.
     ///
     /// # Errors
     /// If this version cannot read it.
     pub fn protocol(&self) -> Result<Protocol, ProtocolError> {
-        let known: Vec<PolicyName> = self.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
-        Protocol::parse(&self.made.protocol_toml, &self.made.protocol, &known)
+        Protocol::parse_kept(&self.made.protocol_toml, &self.made.protocol)
     }
 
     /// When the withdrawal of its participant was recorded, and by which role; `None` without a withdrawal.

@@ -42,7 +42,7 @@ impl Protocol {
         parse(source, known).map_err(|fault| fault.in_file(file, source))
     }
 
-    /// Reads a protocol that was stored with a study. It may name policies that this version does not have.
+    /// Reads a protocol that was stored with a session or a study. It may name policies that this version lacks.
     ///
     /// # Errors
     /// If this version cannot read the protocol for another reason.
