@@ -309,7 +309,7 @@ impl Shared {
         let session = asked_by.or_else(|| self.parts.conductor.session_under_way());
         // Both clocks at once: a slow disk must not come between them.
         let began = Stamp { wall: self.parts.clock.wall(), at: self.parts.clock.now() };
-        let folder = starting::new_folder(&self.parts, asked_by);
+        let folder = starting::new_folder(&self.parts.folder, asked_by, began.wall);
         let Some(running) = starting::start(&self.parts, what, &folder, session, began)? else { return Ok(()) };
 
         tracing::info!(folder = %running.folder().display(), "a recording began");

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use jiff::Timestamp;
+
 use super::parts::RecorderParts;
 use super::running::Running;
 use super::view::ViewRecorder;
@@ -42,8 +44,8 @@ impl From<RecordingError> for StartError {
     }
 }
 
-/// Begins to record into `folder`; `None` if `what` is [`Record::None`]. `session` is the session under way. Times count
-/// from `began`.
+/// Begins to record into `folder`; `None` if `what` is [`Record::None`]. `session` is the session under way. Times
+/// count from `began`.
 ///
 /// # Errors
 /// If the camera has no mosaics, the disk has no room, or the recording cannot be written.
@@ -67,13 +69,15 @@ pub fn start(
     }
 }
 
-/// A folder that no recording has yet, named after the session or, without one, after the time.
-pub fn new_folder(parts: &RecorderParts, session: Option<SessionId>) -> PathBuf {
-    let name = session
-        .map_or_else(|| parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(), |session| session.to_string());
+/// A folder in `recordings` that no recording has yet, named after the session or, without one, after the time `now`.
+pub fn new_folder(recordings: &Path, session: Option<SessionId>, now: Timestamp) -> PathBuf {
+    let name = match session {
+        Some(session) => session.to_string(),
+        None => now.strftime("%Y-%m-%dT%H-%M-%SZ").to_string(),
+    };
     let numbered = |number: u32| if number == 1 { name.clone() } else { format!("{name}-{number}") };
-    let mut names = (1..u32::MAX).map(|number| parts.folder.join(numbered(number)));
-    names.find(|folder| !folder.exists()).unwrap_or_else(|| parts.folder.join(&name))
+    let mut names = (1..u32::MAX).map(|number| recordings.join(numbered(number)));
+    names.find(|folder| !folder.exists()).unwrap_or_else(|| recordings.join(&name))
 }
 
 fn record_mosaics(
