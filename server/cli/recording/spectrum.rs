@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     };
     save(out, &table)?;
-    print(&format!("{}: {}\n", out.display(), summary(&spectrum)))
+    print(&format!("{}; the table is in {}\n", summary(&spectrum), out.display()))
 }
 
 fn summary(spectrum: &Spectrum) -> String {
