@@ -195,8 +195,7 @@ fn parse_range(text: &str) -> Result<WavelengthRange, String> {
 impl Destination {
     /// Saves `calibration` as the next version, dated today.
     fn save(&self, mut calibration: Calibration, changed: &[&str]) -> Result<(), Failure> {
-        let before = calibration.version.parse::<u32>().unwrap_or(0);
-        calibration.version = (before + 1).to_string();
+        calibration.version = calibration::next_version(Path::new(&self.out), &calibration.version);
         calibration.date = Some(SystemClock.wall().strftime("%Y-%m-%d").to_string());
 
         if let Some(name) = &self.name {

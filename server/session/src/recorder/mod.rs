@@ -176,8 +176,14 @@ impl Recordings {
         if let Some(active) = &state.active {
             let progress = active.what.progress();
             let seconds = parts.clock.now().since(active.began).as_secs_f64();
-            let measured = (progress.frames > 0).then(|| progress.bytes as f64 / progress.frames as f64);
-            report.bytes_per_second = measured.map(|bytes| bytes * status.camera.fps).or(report.bytes_per_second);
+            let frames = progress.frames as f64;
+            let rate = match active.what {
+                Running::Mosaic(_) => status.camera.fps,
+                // Viewers get fewer pictures than the camera takes.
+                Running::View(_) => frames / seconds,
+            };
+            let measured = Some(progress.bytes as f64 / frames * rate).filter(|bytes| bytes.is_finite());
+            report.bytes_per_second = measured.or(report.bytes_per_second);
             report.recording = Some(active.what.kind());
             report.folder = active.what.folder().file_name().map(|name| name.to_string_lossy().into_owned());
             report.by_protocol = active.by_protocol;

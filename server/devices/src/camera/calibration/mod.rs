@@ -161,6 +161,17 @@ pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
     .into())
 }
 
+/// The number of the version after `version` in `folder`: after one that is no number, or the last number of all, the
+/// first whose files are not there yet.
+pub fn next_version(folder: &Path, version: &str) -> String {
+    let next = version.parse::<u32>().ok().and_then(|number| number.checked_add(1)).unwrap_or(1);
+    let is_free = |version: &String| {
+        let files = [("calibration", "toml"), ("dark", "tiff"), ("white", "tiff")];
+        files.iter().all(|(what, ending)| !folder.join(format!("{}.{ending}", of_version(what, version))).exists())
+    };
+    (next..u32::MAX).map(|number| number.to_string()).find(is_free).unwrap_or_else(|| next.to_string())
+}
+
 /// Saves `calibration` in `folder` as the current one; the previous one stays there under its version's name. `changed`
 /// names the references that are new. Returns the file's path.
 ///
@@ -241,6 +252,21 @@ fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), CalibrationFaul
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_new_version_takes_no_earlier_ones_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let dark = Reference::PerPixel(MosaicFrame::new(8, 4, vec![7; 32]).unwrap());
+        let first = Calibration { version: "1".to_owned(), dark, ..Calibration::default() };
+        save(folder.path(), &first, &["dark"]).unwrap();
+        let named = Calibration { version: "spring".to_owned(), ..first };
+        save(folder.path(), &named, &[]).unwrap();
+
+        let next = |version| next_version(folder.path(), version);
+        assert_eq!(next("spring"), "2", "the files of version 1 are still in use");
+        assert_eq!([next("2"), next("4294967295")], ["3", "2"]);
+        assert_eq!(next_version(&folder.path().join("new"), "default"), "1");
+    }
 
     #[test]
     fn a_version_may_be_any_text() {
