@@ -13,7 +13,6 @@ use super::output::{Failure, print, print_json, wait_for};
 use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
 use parfocal_records::accounts::{Accounts, Cost, Passphrase};
-use parfocal_records::store::StoreError;
 use parfocal_trial::account::{AccountChange, AccountName, AccountRole};
 
 /// What `parfocal account` does.
@@ -155,16 +154,7 @@ async fn replace_passphrase(named: &NamedAccount) -> Result<(), Failure> {
 }
 
 async fn open(folder: &Path) -> Result<Accounts, Failure> {
-    let opened = Accounts::open(folder, Arc::new(SystemClock), Cost::default()).await;
-    opened.map_err(|error| match error {
-        StoreError::Missing(file) => format!(
-            "there is no database {}; start `parfocal serve` once, which makes it, or name the server's data folder \
-             with --data-dir",
-            file.display()
-        )
-        .into(),
-        error => error.into(),
-    })
+    Ok(Accounts::open(folder, Arc::new(SystemClock), Cost::default()).await?)
 }
 
 /// Prints what was done, with the chain's head.

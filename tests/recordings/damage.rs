@@ -74,6 +74,20 @@ fn a_damaged_frame_is_named_and_the_others_are_read() {
 }
 
 #[test]
+fn of_pictures_or_a_video_that_a_damaged_frame_ends_no_part_is_left() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 30);
+    damage_frame(&recording, 3);
+
+    for name in ["pictures", "video.mp4"] {
+        let out = folder.path().join(name);
+        let told = complaint(&parfocal(&["recording", "video", text(&recording), "--out", text(&out)]));
+        assert!(told.contains("frame 3") && told.contains(text(&out)), "{told}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the recording");
+}
+
+#[test]
 fn a_cut_or_missing_file_names_its_frames() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 60);

@@ -80,11 +80,11 @@ pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put_in_place(&beside, path, written)
 }
 
-/// Has `make` write a new file, which becomes `path` once it is whole: `make` gets another name in the same folder.
-/// What is there already stays.
+/// Has `make` write a new file or folder, which becomes `path` once it is whole: `make` gets another name in the same
+/// folder. What is there already stays.
 ///
 /// # Errors
-/// If there is a file at `path`, or it cannot be written. No part of it is left then.
+/// If there is something at `path`, or it cannot be written. No part of it is left then.
 pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
     let free = || -> io::Result<()> {
         if fs::symlink_metadata(path).is_ok() { Err(io::ErrorKind::AlreadyExists.into()) } else { Ok(()) }
@@ -92,12 +92,18 @@ pub fn create_with<E: From<io::Error>>(path: &Path, make: impl FnOnce(&Path) -> 
     free()?;
 
     let beside = partial(path);
+    // What an earlier attempt left that was killed.
+    remove(&beside);
     let whole = make(&beside).and_then(|()| {
         // Looked at again: making it may have taken minutes.
         free()?;
         Ok(File::open(&beside)?.sync_data()?)
     });
-    put_in_place(&beside, path, whole)
+    let placed = put_in_place(&beside, path, whole);
+    if placed.is_err() {
+        remove(&beside);
+    }
+    placed
 }
 
 /// The path at which a file is written before it is moved to `path`.
@@ -106,7 +112,7 @@ fn partial(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.partial"))
 }
 
-/// Moves the file at `beside` to `path`, or removes it if writing (`written`) or moving failed.
+/// Moves the file or folder at `beside` to `path`, or removes the file if writing (`written`) or moving failed.
 fn put_in_place<E: From<io::Error>>(beside: &Path, path: &Path, written: Result<(), E>) -> Result<(), E> {
     let moved = written.and_then(|()| Ok(fs::rename(beside, path)?));
 
@@ -116,6 +122,17 @@ fn put_in_place<E: From<io::Error>>(beside: &Path, path: &Path, written: Result<
     }
 
     moved
+}
+
+/// Removes the file or folder at `path`, if there is one.
+pub fn remove(path: &Path) {
+    // A folder may get another file meanwhile.
+    for _ in 0..10 {
+        let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        if removed.is_ok() || fs::symlink_metadata(path).is_err() {
+            return;
+        }
+    }
 }
 
 /// Writes a file and waits until the disk has it.

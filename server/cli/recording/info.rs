@@ -101,10 +101,9 @@ fn look(arguments: &Arguments, recording: &Recording) -> Info {
 fn describe(info: &Info) -> String {
     let Info { header, width, height, frames, seconds, bytes, .. } = info;
     let mut text = String::new();
-    let simulated = if header.simulated { " (simulated)" } else { "" };
 
     let _ = writeln!(text, "recording    {} by {}", header.started, header.software);
-    let _ = writeln!(text, "camera       {}, {width}x{height}{simulated}", header.camera);
+    let _ = writeln!(text, "camera       {}, {width}x{height}", header.camera);
     let _ = writeln!(text, "lens         {}", header.lens);
     let _ = writeln!(text, "calibration  {}", header.calibration);
     if let Some(session) = &header.session {

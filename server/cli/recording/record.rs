@@ -11,6 +11,7 @@ use crate::cli::interrupt::{Interrupt, let_lenses_go_first_at_sigquit};
 use crate::cli::output::{Failure, print, word};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, SystemClock};
+use parfocal_base::files::remove;
 use parfocal_base::{PolicyName, SOFTWARE};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
 use parfocal_devices::lens;
@@ -75,6 +76,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // First, because a disk that hangs must not keep the lens under current.
     control_loop.stop();
     let progress = recorder.stop();
+    if progress.frames == 0 {
+        // It would only be in the way of the next attempt.
+        remove(&arguments.out);
+    }
     outcome?;
     tell(arguments, &progress)
 }
@@ -192,13 +197,17 @@ fn tell(arguments: &Arguments, progress: &RecordingProgress) -> Result<(), Failu
         0 => String::new(),
         lost => format!(" ({lost} lost: this machine or its disk is too slow)"),
     };
-    let done = format!("{} frames in {out}{lost}", progress.frames);
+    let done = match progress.frames {
+        0 => format!("no frame was recorded{lost}"),
+        frames => format!("{frames} frames in {out}{lost}"),
+    };
 
     match &progress.ended {
         Some(Ended::DiskNearlyFull) => {
             Err(format!("stopped, because the disk of {out} is nearly full; free some space: {done}").into())
         }
         Some(Ended::Failed(problem)) => Err(format!("{problem}: {done}").into()),
+        Some(Ended::Stopped) | None if progress.frames == 0 => print(&format!("{done}\n")),
         Some(Ended::Stopped) | None => {
             let named = word(&arguments.out);
             print(&format!("{done}; check them with `parfocal recording info {named}`\n"))

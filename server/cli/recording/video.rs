@@ -1,13 +1,13 @@
 //! `parfocal recording video`: a recording as a video for people, or its frames as pictures.
 
 use std::fs;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use crate::cli::interrupt::undo_before_the_end;
 use crate::cli::output::{Failure, print, save};
-use parfocal_base::files::create_with;
+use parfocal_base::files::{create_with, remove};
 use parfocal_devices::camera::calibration;
 use parfocal_imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size, encode_png, encode_tiff};
 use parfocal_recording::{FrameRow, Recording};
@@ -61,23 +61,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = Recording::open(&arguments.folder)?;
     let calibration = calibration::of_recording(&recording)?;
     let frames = chosen(arguments, &recording)?;
+    if fs::symlink_metadata(&arguments.out).is_ok() {
+        bail!("{} exists already; give a name that is not taken", arguments.out.display());
+    }
+
     let mut developer = Developer::new(&calibration);
     let size = arguments.size.unwrap_or(Size::Cell);
     let mut develop = |mosaic: &MosaicFrame, picture: &mut RgbImage| {
         developer.develop(mosaic, size, picture, &mut GrayImage::default());
     };
 
-    if let Some(format) = format {
-        let made = create_with(&arguments.out, |file| -> Result<(), Failure> {
-            // Ctrl-C must not leave a part of a video beside the place of the whole one.
-            let part = file.to_owned();
-            undo_before_the_end(move || drop(fs::remove_file(&part)))?;
-            save_video(&Video { file, format }, &recording, &frames, &mut develop)
-        });
-        made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
-    } else {
-        save_pictures(arguments, &recording, &frames, &mut develop)?;
-    }
+    let made = create_with(&arguments.out, |part| -> Result<(), Failure> {
+        // Ctrl-C must not leave a part beside the place of the whole.
+        let left = part.to_owned();
+        undo_before_the_end(move || remove(&left))?;
+        match format {
+            Some(format) => save_video(&Video { file: part, format }, &recording, &frames, &mut develop),
+            None => save_pictures(part, arguments.pictures, &recording, &frames, &mut develop),
+        }
+    });
+    made.map_err(|failure| format!("cannot write {}: {failure}", arguments.out.display()))?;
     print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
 }
 
@@ -100,14 +103,7 @@ fn format(out: &Path) -> Result<Option<&'static str>, Failure> {
             ending.display()
         );
     };
-    if fs::symlink_metadata(out).is_ok() {
-        return Err(taken(out).into());
-    }
     Ok(Some(*format))
-}
-
-fn taken(out: &Path) -> String {
-    format!("{} exists already; give a name that is not taken", out.display())
 }
 
 /// Numbers of the frames within the requested span.
@@ -226,21 +222,18 @@ fn start_encoder(video: &Video, fps: f64, picture: &RgbImage) -> Result<Child, F
 }
 
 fn save_pictures(
-    arguments: &Arguments,
+    folder: &Path,
+    kind: Option<Pictures>,
     recording: &Recording,
     frames: &[usize],
     develop: &mut impl FnMut(&MosaicFrame, &mut RgbImage),
 ) -> Result<(), Failure> {
-    let out = &arguments.out;
-    fs::create_dir(out).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => taken(out),
-        _ => format!("cannot make the folder {}: {error}", out.display()),
-    })?;
+    fs::create_dir(folder)?;
 
     let mut picture = RgbImage::default();
     for &frame in frames {
         let mosaic = recording.frame(frame)?;
-        let (ending, written) = match arguments.pictures.unwrap_or(Pictures::Png) {
+        let (ending, written) = match kind.unwrap_or(Pictures::Png) {
             Pictures::Png => {
                 develop(&mosaic, &mut picture);
                 ("png", encode_png(&picture))
@@ -248,7 +241,7 @@ fn save_pictures(
             Pictures::Tiff => ("tiff", encode_tiff(&mosaic)),
         };
 
-        let path = out.join(format!("frame{frame:06}.{ending}"));
+        let path = folder.join(format!("frame{frame:06}.{ending}"));
         save(&path, &written.map_err(|error| format!("cannot write {}: {error}", path.display()))?)?;
     }
     Ok(())

@@ -47,7 +47,11 @@ pub enum StoreError {
         reason: String,
     },
     /// There is no database.
-    #[error("there is no database {}; name the server's data folder with --data-dir", .0.display())]
+    #[error(
+        "there is no database {}; start `parfocal serve` once, which makes it, or name the server's data folder with \
+         --data-dir",
+        .0.display()
+    )]
     Missing(PathBuf),
     /// The disk is full.
     #[error("the disk is full; make room and try again; what was saved before is safe")]

@@ -161,15 +161,18 @@ pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
     .into())
 }
 
-/// The number of the version after `version` in `folder`: after one that is no number, or the last number of all, the
-/// first whose files are not there yet.
+/// The number of the version after `version` in `folder`. After one that is no number it is the first whose files are
+/// not there yet.
 pub fn next_version(folder: &Path, version: &str) -> String {
-    let next = version.parse::<u32>().ok().and_then(|number| number.checked_add(1)).unwrap_or(1);
+    if let Some(next) = version.parse::<u32>().ok().and_then(|number| number.checked_add(1)) {
+        return next.to_string();
+    }
+
     let is_free = |version: &String| {
         let files = [("calibration", "toml"), ("dark", "tiff"), ("white", "tiff")];
         files.iter().all(|(what, ending)| !folder.join(format!("{}.{ending}", of_version(what, version))).exists())
     };
-    (next..u32::MAX).map(|number| number.to_string()).find(is_free).unwrap_or_else(|| next.to_string())
+    (1..u32::MAX).map(|number| number.to_string()).find(is_free).unwrap_or_else(|| "1".to_owned())
 }
 
 /// Saves `calibration` in `folder` as the current one; the previous one stays there under its version's name. `changed`

@@ -154,9 +154,10 @@ impl ScanError {
     /// A file cannot be written, after `kept` poses were stored.
     fn unwritable(path: &Path, kept: usize, error: &io::Error) -> Self {
         let path = path.display();
+        let poses_are = if kept == 1 { "pose is" } else { "poses are" };
         Self(match error.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => format!(
-                "no space is left on the disk of {path}: {kept} poses are saved; free some space and run the same \
+                "no space is left on the disk of {path}: {kept} {poses_are} saved; free some space and run the same \
                  command again to continue"
             ),
             _ => format!("cannot write {path}: {error}"),
