@@ -112,6 +112,15 @@ def test_the_vector_form_runs_on_after_a_scan() -> None:
     envs.close()
 
 
+def test_seeds_may_be_an_array() -> None:
+    envs = FocusVectorEnv(2, **FEW)
+    seeds: Any = np.array([5, 6])
+    _, of_array = envs.reset(seed=seeds)
+    _, of_list = envs.reset(seed=[5, 6])
+    assert (of_array["optimum"] == of_list["optimum"]).all()
+    envs.close()
+
+
 def test_observations_that_were_given_away_do_not_change() -> None:
     envs = FocusVectorEnv(2, **FEW)
     first, _ = envs.reset(seed=1)

@@ -269,7 +269,8 @@ class FocusVectorEnv(VectorEnv[Observation, npt.NDArray[Any], npt.NDArray[Any]])
         kinds = np.array(
             [0 if not on else 1 if one is None else 2 for on, one in zip(mask, seeds, strict=True)]
         )
-        numbers = np.array([(one or 0) % (1 << 64) for one in seeds], np.uint64)
+        # NumPy's own integers know no 2^64.
+        numbers = np.array([int(one or 0) % (1 << 64) for one in seeds], np.uint64)
         seen = self._simulation.reset(kinds.astype(np.uint8), numbers)
         self._fill(seen, mask)
         self._ended = seen.ended
