@@ -12,7 +12,7 @@ use parfocal_base::clock::SystemClock;
 use parfocal_base::notices::tell;
 use parfocal_imaging::PixelFormat;
 use parfocal_learning::training::recipe::LEG;
-use parfocal_learning::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
+use parfocal_learning::training::recipe::{MAX_UPDATES, Recipe, is_later_stage, names, shipped};
 use parfocal_learning::training::run::comparison::{TrainedRun, markdown};
 use parfocal_learning::training::run::resume::ResumeRequest;
 use parfocal_learning::training::run::{Run, Sources, TrainingProgress};
@@ -183,10 +183,9 @@ fn device(compute: Compute) -> Result<tch::Device, Failure> {
 }
 
 fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
-    let unknown = || format!("there is no recipe '{}'; there are: {}", arguments.policy, names().join(", "));
     let mut recipe = match own_recipe(arguments)? {
         Some(recipe) => recipe,
-        None => Recipe::parse(shipped(&arguments.policy).ok_or_else(unknown)?)?,
+        None => shipped_recipe(arguments)?,
     };
 
     if let Some(updates) = arguments.updates {
@@ -212,6 +211,23 @@ fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
         sources: sources(arguments),
     };
     Ok(Run::resume(&arguments.out, &request, device)?)
+}
+
+/// The recipe that ships under the given name. One that trains weights further needs some: its learning rate and its
+/// length suit only weights that have learned something already.
+fn shipped_recipe(arguments: &Training) -> Result<Recipe, Failure> {
+    let name = &arguments.policy;
+    let unknown = || format!("there is no recipe '{name}'; there are: {}", names().join(", "));
+    let recipe = Recipe::parse(shipped(name).ok_or_else(unknown)?)?;
+
+    if arguments.from.is_none() && is_later_stage(name) {
+        let policy = &recipe.policy;
+        bail!(
+            "the recipe '{name}' trains weights of {policy} further: give them by --from, such as \
+             --from policies/{policy}.safetensors"
+        );
+    }
+    Ok(recipe)
 }
 
 /// The recipe in the file that `--config` names.

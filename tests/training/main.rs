@@ -405,6 +405,7 @@ fn bad_input_is_answered_with_one_sentence() {
         (vec!["train", "parfocal", "--out", "/proc/x"], "cannot write to /proc/x"),
         (vec!["train", "parfocal", "--out", occupied], "choose a new or empty folder"),
         (vec!["train", "parfocal", "--out", out, "--resume"], "has no checkpoint to continue from"),
+        (vec!["train", "parfocal-adapted", "--out", out], "give them by --from, such as --from policies/parfocal.saf"),
         (
             vec!["train", "mgm-learned", "--out", out, "--config", few, "--from", foreign],
             "the weights belong to another network",

@@ -101,9 +101,17 @@ const SHIPPED: [(&str, &str); 13] = [
     ("parfocal-adapted", include_str!("../../../../../policies/parfocal-adapted.toml")),
 ];
 
+/// Endings of the names of recipes that train weights further.
+const LATER_STAGES: [&str; 4] = ["-refined", "-relief", "-glass", "-adapted"];
+
 /// The text of the recipe that ships under `name`.
 pub fn shipped(name: &str) -> Option<&'static str> {
     SHIPPED.iter().find(|recipe| recipe.0 == name).map(|recipe| recipe.1)
+}
+
+/// Whether the recipe that ships under `name` trains the weights of an earlier stage further.
+pub fn is_later_stage(name: &str) -> bool {
+    LATER_STAGES.iter().any(|ending| name.ends_with(ending))
 }
 
 /// Names of the recipes that ship.
@@ -192,8 +200,8 @@ mod tests {
     fn every_shipped_recipe_is_sound_and_makes_its_policy() {
         for name in names() {
             let recipe = Recipe::parse(shipped(name).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
-            let suffixes = ["-paper", "-refined", "-relief", "-glass", "-adapted"];
-            let policy = suffixes.iter().fold(name, |name, suffix| name.trim_end_matches(suffix));
+            let suffixes = LATER_STAGES.iter().chain(&["-paper"]);
+            let policy = suffixes.fold(name, |name, suffix| name.trim_end_matches(suffix));
             assert_eq!(recipe.policy, policy);
         }
     }
