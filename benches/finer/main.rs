@@ -60,7 +60,7 @@ fn largest(values: &[f64]) -> usize {
 }
 
 fn read(folder: &Path) -> Stack {
-    let whole = FocalStack::load(folder, None, 1, None).unwrap();
+    let whole = FocalStack::load(folder, None, 1, None, None).unwrap();
     // About 1000 pixels wide.
     let scale = (whole.size().0 + 500) / 1000;
     let fine: Vec<GrayImage> = whole.planes().iter().map(|plane| in_blocks(&plane.picture, scale.max(1))).collect();

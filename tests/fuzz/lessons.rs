@@ -81,7 +81,9 @@ pub fn stack(bytes: &[u8]) {
     STACK.with(|stack| {
         stack.with(bytes, |folder| {
             for list in [None, Some(folder.join(LIST))] {
-                let Ok(stack) = FocalStack::load(&folder.join("pictures"), list.as_deref(), 1, None) else { continue };
+                let Ok(stack) = FocalStack::load(&folder.join("pictures"), list.as_deref(), 1, None, None) else {
+                    continue;
+                };
                 let _ = check::check(&stack);
                 let _ = stack.even();
             }

@@ -198,3 +198,37 @@ fn uneven_positions_are_interpolated_and_said() {
     let expected = "the planes stand 1 apart: 12 are pictures as they were taken, 1 are mixed";
     assert!(told.contains(expected), "{told}");
 }
+
+#[test]
+fn the_bits_of_a_stack_may_be_said() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    fs::create_dir_all(&pictures).unwrap();
+    // Dark throughout: a sixteenth of what 16 bit can hold.
+    for (index, levels) in levels().into_iter().enumerate() {
+        let samples: Vec<u16> = levels.into_iter().map(|level| 16 * u16::from(level)).collect();
+        let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(200, 200, samples).unwrap();
+        picture.save(pictures.join(format!("{index}.png"))).unwrap();
+    }
+
+    let brightest = |out: &Path| {
+        let scan = ScanFolder::open(out).unwrap();
+        let pose = scan.poses().values().next().unwrap();
+        let levels = pose.images.iter().map(|image| scan.picture(pose, image).unwrap().data);
+        levels.flatten().fold(0.0, f32::max)
+    };
+    let make = |name: &str, bits: &[&str]| {
+        let out = folder.path().join(name);
+        let arguments = ["scan", "from-stack", text(&pictures), "--out", text(&out), "--size", "96", "--poses", "1"];
+        (parfocal(&[&arguments[..], bits].concat()), out)
+    };
+
+    let (output, guessed) = make("guessed", &[]);
+    assert!(notes(&output).contains("so they are read as 12 bit: 4095 is white"), "{}", notes(&output));
+    let (output, told) = make("told", &["--bits", "16"]);
+    assert!(!notes(&output).contains("is white"), "{}", notes(&output));
+    assert!(brightest(&guessed) > 10.0 * brightest(&told), "{} {}", brightest(&guessed), brightest(&told));
+
+    let refused = complaint(&make("too few", &["--bits", "10"]).0);
+    assert!(refused.contains("give --bits 12 or more"), "{refused}");
+}

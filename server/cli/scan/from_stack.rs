@@ -39,6 +39,10 @@ pub struct Arguments {
     /// length.
     #[arg(long, value_name = "FORMAT")]
     raw: Option<PixelFormat>,
+    /// Bits of the samples in 16-bit files, for example 12; by default the fewest that hold the largest sample of all
+    /// pictures.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
+    bits: Option<u8>,
     /// Planes that each pose sees, fewer than the stack has; by default about half of them, 21 at most.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(3..=1000))]
     planes: Option<u16>,
@@ -61,7 +65,8 @@ pub struct Arguments {
 /// # Errors
 /// If the pictures are not a focal stack, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into(), arguments.raw)?;
+    let list = arguments.list.as_deref();
+    let stack = FocalStack::load(&arguments.folder, list, arguments.scale.into(), arguments.raw, arguments.bits)?;
     for note in check(&stack)? {
         tell(format_args!("note: {note}"));
     }

@@ -36,7 +36,7 @@ fn clips_in(path: &Path) -> Result<Vec<Arc<Clip>>, LearningError> {
         return Ok(vec![clip(path, video(path)?)?]);
     };
 
-    let bits = sample_bits(path, &files)?;
+    let bits = sample_bits(path, &files, None)?;
     files.iter().map(|file| clip(file, vec![Arc::new(image(file, bits)?)])).collect()
 }
 

@@ -67,7 +67,7 @@ impl Stills {
             tell_unread(file, pages);
         }
 
-        let bits = sample_bits(folder, &files)?;
+        let bits = sample_bits(folder, &files, None)?;
         let picture = still(&files[0], bits)?;
         Ok(Self { files, bits, shown: 0, picture })
     }

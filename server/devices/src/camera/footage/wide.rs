@@ -60,13 +60,22 @@ impl WideSamples {
         (bits, Some(note))
     }
 
-    /// As [`WideSamples::guess`] for the pictures of `folder`; the note goes to standard error.
-    pub fn guess_aloud(&self, folder: &Path) -> u8 {
+    /// The bits that are `given`; if it is `None`, those of [`WideSamples::guess`] for the pictures of `folder`. The
+    /// note goes to standard error.
+    ///
+    /// # Errors
+    /// If a sample needs more bits than are given.
+    pub fn settle(&self, folder: &Path, given: Option<u8>) -> Result<u8, FootageError> {
+        if let Some(bits) = given {
+            self.check(bits)?;
+            return Ok(bits);
+        }
+
         let (bits, note) = self.guess();
         if let Some(note) = note {
             tell(format_args!("note: {}: {note}", folder.display()));
         }
-        bits
+        Ok(bits)
     }
 
     fn needed(&self) -> u8 {
@@ -74,12 +83,12 @@ impl WideSamples {
     }
 }
 
-/// Bits of the samples of the first pictures of `files`, all of `folder`, as [`WideSamples::guess_aloud`] finds them.
+/// Bits of the samples of the first pictures of `files`, all of `folder`, as [`WideSamples::settle`] finds them.
 /// Whoever reads a picture that is damaged, or none, says so.
 ///
 /// # Errors
-/// If a file cannot be read.
-pub fn sample_bits(folder: &Path, files: &[PathBuf]) -> Result<u8, FootageError> {
+/// If a file cannot be read, or a sample needs more bits than are `given`.
+pub fn sample_bits(folder: &Path, files: &[PathBuf], given: Option<u8>) -> Result<u8, FootageError> {
     let mut wide = WideSamples::default();
     for path in files {
         let unreadable = |error| FootageError::unreadable(path, error);
@@ -91,5 +100,5 @@ pub fn sample_bits(folder: &Path, files: &[PathBuf]) -> Result<u8, FootageError>
         let bytes = std::fs::read(path).map_err(unreadable)?;
         let _ = PictureFile::open(&bytes).and_then(|file| wide.see(path, &file, 0));
     }
-    Ok(wide.guess_aloud(folder))
+    wide.settle(folder, given)
 }

@@ -74,22 +74,23 @@ impl FocalStack {
     /// those of `list` (lines of `name,position`), else the one number in which the names differ, else
     /// the natural order of names. `folder` may also be a TIFF with a page for each position, which `list` counts
     /// from 1. Raw mosaics are read in the format `raw`, or if it is `None`, in the one of their length. Samples in
-    /// files of 16 bit are numbers of the fewest bits that hold the largest of all.
+    /// files of 16 bit are numbers of so many `bits`; if it is `None`, of the fewest that hold the largest of all.
     ///
     /// # Errors
-    /// If a picture or the list cannot be read, or the pictures are not a stack.
+    /// If a picture or the list cannot be read, a sample needs more bits, or the pictures are not a stack.
     pub fn load(
         folder: &Path,
         list: Option<&Path>,
         scale: usize,
         raw: Option<PixelFormat>,
+        bits: Option<u8>,
     ) -> Result<Self, LearningError> {
         if folder.is_file() && is_raw(folder) {
             let folder = folder.display();
             bail!("{folder} is one raw mosaic; a focal stack is a folder of at least {LEAST_PLANES}");
         }
         if folder.is_file() {
-            return Self::new(pages::planes(folder, list, scale)?);
+            return Self::new(pages::planes(folder, list, scale, bits)?);
         }
 
         let files = pictures_or_mosaics_in(folder, raw.is_some())?;
@@ -98,7 +99,7 @@ impl FocalStack {
             None => named(files),
         };
         let paths: Vec<PathBuf> = placed.iter().map(|(path, _)| path.clone()).collect();
-        let bits_of_samples = sample_bits(folder, &paths)?;
+        let bits_of_samples = sample_bits(folder, &paths, bits)?;
 
         let mut reconstructor = Reconstructor::default();
         let mut mosaics = RawMosaics::new(raw);
@@ -308,7 +309,7 @@ mod tests {
         }
 
         let expected: Vec<f32> = levels().into_iter().map(|sample| 255.0 * f32::from(sample) / 4095.0).collect();
-        for plane in FocalStack::load(folder.path(), None, 1, None).unwrap().planes() {
+        for plane in FocalStack::load(folder.path(), None, 1, None, None).unwrap().planes() {
             let mut pairs = plane.picture.data.iter().zip(&expected);
             assert!(pairs.all(|(found, expected)| (found - expected).abs() < 1e-2), "{}", plane.name);
         }

@@ -23,10 +23,16 @@ struct Depth {
 
 /// Reads the pages of the file at `path`, made smaller by blocks of `scale` x `scale` pixels. Positions are those of
 /// `list` (lines of `page,position`, pages counted from 1), else what the file says, else the order of the pages.
+/// Samples that fill 16 bit are numbers of so many `bits`, as for [`super::FocalStack::load`].
 ///
 /// # Errors
-/// If a page or the list cannot be read, or the pages vary in more than focus.
-pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<Vec<Plane>, LearningError> {
+/// If a page or the list cannot be read, the pages vary in more than focus, or a sample needs more bits.
+pub(super) fn planes(
+    path: &Path,
+    list: Option<&Path>,
+    scale: usize,
+    bits: Option<u8>,
+) -> Result<Vec<Plane>, LearningError> {
     let unusable = |error| LearningError::of(path, error);
     let bytes = std::fs::read(path).map_err(|error| LearningError::unreadable(path, &error))?;
     let file = PictureFile::open(&bytes).map_err(unusable)?;
@@ -42,7 +48,7 @@ pub(super) fn planes(path: &Path, list: Option<&Path>, scale: usize) -> Result<V
 
     let mut wide = WideSamples::default();
     depth.pages.iter().try_for_each(|&page| wide.see(path, &file, page)).map_err(unusable)?;
-    let file = file.with_bits(wide.guess_aloud(path));
+    let file = file.with_bits(wide.settle(path, bits)?);
 
     let name = file_name(path);
     let mut reconstructor = Reconstructor::default();

@@ -89,7 +89,7 @@ impl StackSource {
     /// # Errors
     /// If the stack cannot be read, or its pictures are not a stack.
     pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), LearningError> {
-        let stack = FocalStack::load(&self.folder, None, 1, self.raw)?;
+        let stack = FocalStack::load(&self.folder, None, 1, self.raw, None)?;
         let mut doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
         let stack = match stack.even() {
             Ok((even, note)) => {
