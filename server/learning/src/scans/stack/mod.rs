@@ -14,7 +14,8 @@ use super::mosaics::{RawMosaics, mosaics_in};
 use crate::LearningError;
 use parfocal_base::notices::tell;
 use parfocal_devices::camera::footage::{is_raw, pictures_in, sample_bits};
-use parfocal_imaging::{GrayImage, Picture, PictureFile, PixelFormat, Reconstructor, in_blocks};
+use parfocal_devices::camera::recorded::HEADER;
+use parfocal_imaging::{DecodeError, GrayImage, Picture, PictureFile, PixelFormat, Reconstructor, in_blocks};
 
 pub use plane::{LEAST_PLANES, Plane};
 use positions::{file_name, listed, named};
@@ -101,6 +102,7 @@ impl FocalStack {
         let paths: Vec<PathBuf> = placed.iter().map(|(path, _)| path.clone()).collect();
         let bits_of_samples = sample_bits(folder, &paths, bits)?;
 
+        let are_of_a_scan = are_of_a_scan(folder);
         let mut reconstructor = Reconstructor::default();
         let mut mosaics = RawMosaics::new(raw);
         let read = |(path, position): (PathBuf, f64)| {
@@ -109,7 +111,8 @@ impl FocalStack {
                 mosaics.read(&path, &bytes).map(Picture::Mosaic)
             } else {
                 let file = PictureFile::open(&bytes).and_then(PictureFile::single);
-                file.and_then(|file| file.with_bits(bits_of_samples).read(0, false))
+                let file = file.map(|file| file.with_bits(bits_of_samples));
+                file.and_then(|file| if are_of_a_scan { developed(&file) } else { file.read(0, false) })
             };
 
             let gray = picture.map_err(|error| LearningError::of(&path, error))?.into_gray(&mut reconstructor);
@@ -235,6 +238,20 @@ pub(super) fn cropped(picture: &GrayImage, (left, top): (usize, usize), size: (u
     GrayImage { width, height, data }
 }
 
+/// Whether `folder` holds the pictures of one pose of a recorded scan.
+fn are_of_a_scan(folder: &Path) -> bool {
+    let folder = folder.canonicalize().ok();
+    folder.as_deref().and_then(Path::parent).is_some_and(|scan| scan.join(HEADER).is_file())
+}
+
+/// A picture that a scan holds: gray, and never a mosaic, not even at the sensor's size.
+fn developed(file: &PictureFile<'_>) -> Result<Picture, DecodeError> {
+    let gray = file.read_any(0)?.into_luma8();
+    let width = gray.width() as usize;
+    let height = gray.height() as usize;
+    Ok(Picture::Gray(GrayImage { width, height, data: gray.into_raw().into_iter().map(f32::from).collect() }))
+}
+
 /// The pictures in a folder, or if it has none, or `raw` are wanted, its raw mosaics.
 fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, LearningError> {
     let mosaics = mosaics_in(folder);
@@ -259,6 +276,8 @@ fn pictures_or_mosaics_in(folder: &Path, raw: bool) -> Result<Vec<PathBuf>, Lear
 
 #[cfg(test)]
 mod tests {
+    use parfocal_imaging::SENSOR_SIZE;
+
     use super::*;
 
     fn plane(position: f64, level: f32) -> Plane {
@@ -313,6 +332,23 @@ mod tests {
             let mut pairs = plane.picture.data.iter().zip(&expected);
             assert!(pairs.all(|(found, expected)| (found - expected).abs() < 1e-2), "{}", plane.name);
         }
+    }
+
+    #[test]
+    fn pictures_of_a_scan_are_no_mosaics_even_at_the_sensors_size() {
+        let (width, height) = SENSOR_SIZE;
+        let scan = tempfile::tempdir().unwrap();
+        let pose = scan.path().join("pose0001");
+        std::fs::create_dir(&pose).unwrap();
+        for power in [0.0, 0.25, 0.5, 0.75, 1.0] {
+            let gray = image::GrayImage::from_pixel(width as u32, height as u32, image::Luma([90]));
+            gray.save(pose.join(format!("pose0001_f{power:.3}.png"))).unwrap();
+        }
+
+        let size = || FocalStack::load(&pose, None, 1, None, None).unwrap().size();
+        assert_eq!(size(), (width / 4, height / 4));
+        std::fs::write(scan.path().join(HEADER), "{}").unwrap();
+        assert_eq!(size(), (width, height));
     }
 
     #[test]
