@@ -22,7 +22,7 @@ use parfocal_imaging::PixelFormat;
 use parfocal_learning::evaluation::evaluate;
 use parfocal_learning::evaluation::report::EvaluatedScans;
 use parfocal_learning::evaluation::shard::{Part, PartOf, Shard, merge, no_shard};
-use parfocal_learning::evaluation::stacks::{Blur, FIRST_SEED, SEEDS, evaluate_stacks};
+use parfocal_learning::evaluation::stacks::{Blur, FIRST_SEED, SEEDS, evaluate_stacks, with_baselines};
 use parfocal_learning::scans::ScanSet;
 use parfocal_learning::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
 use parfocal_learning::scans::detail::{warning, without_detail};
@@ -267,7 +267,7 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
 
-    let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
+    let bar = progress(with_baselines(&policies).len() * sources.len() * 2 * SEEDS);
     let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, arguments.blur, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);

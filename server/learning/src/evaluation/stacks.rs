@@ -159,7 +159,18 @@ pub struct StackReport {
     pub standings: Vec<OverallRow>,
 }
 
-/// Evaluates `policies`, the oracle and the baseline on the stacks of `sources`. `seed` is the first of the courses'
+/// `policies`, and before them the baselines that are not among them: every evaluation on stacks runs these, too.
+pub fn with_baselines(policies: &[PolicyName]) -> Vec<PolicyName> {
+    let mut all = policies.to_vec();
+    for baseline in [STRONG_BASELINE, BASELINE].map(PolicyName::new) {
+        if !all.contains(&baseline) {
+            all.insert(0, baseline);
+        }
+    }
+    all
+}
+
+/// Evaluates `policies`, the oracle and the baselines on the stacks of `sources`. `seed` is the first of the courses'
 /// seeds.
 ///
 /// # Errors
@@ -172,13 +183,7 @@ pub fn evaluate_stacks(
     blur: Option<Blur>,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), LearningError> {
-    let mut policies = policies.to_vec();
-    for baseline in [STRONG_BASELINE, BASELINE].map(PolicyName::new) {
-        if !policies.contains(&baseline) {
-            policies.insert(0, baseline);
-        }
-    }
-
+    let policies = with_baselines(policies);
     let named: Vec<(String, &StackSource)> = names(sources).into_iter().zip(sources).collect();
     let read = |(name, source): &(String, &StackSource)| items(name, source, seed, blur);
     let items: Vec<Vec<Item>> = named.par_iter().map(read).collect::<Result<_, _>>()?;
