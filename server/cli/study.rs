@@ -274,7 +274,7 @@ fn whole(detail: &StudyDetail) -> String {
         );
     }
     for event in &detail.log {
-        let _ = writeln!(text, "{:.0} {} ({}): {}: {}", event.at, event.person, event.by, event.text, event.reason);
+        let _ = writeln!(text, "{:.0} {} ({}): {}", event.at, event.person, event.by, event.in_words());
     }
     text
 }

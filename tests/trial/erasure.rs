@@ -269,6 +269,8 @@ async fn an_erased_reason_is_nowhere_and_the_event_stays() {
     let log = trial.reports.session_detail(session).await.unwrap().log;
     assert!(log.iter().any(|line| line.text == "Session aborted"), "{log:?}");
     assert!(log.iter().any(|line| line.text == "Reason of an event erased: names a patient"), "{log:?}");
+    let log = studies::detail(&trial).await.log;
+    assert_eq!(log.last().unwrap().in_words(), format!("Emergency unblinding of the session of {PARTICIPANT}"));
 
     let out = folder.path().join("export");
     export(&trial.access_log(), session, &out, true).await.unwrap();

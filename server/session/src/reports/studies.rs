@@ -105,6 +105,13 @@ pub struct StudyLogLine {
     pub reason: String,
 }
 
+impl StudyLogLine {
+    /// What happened, and why. An erased reason leaves only what happened.
+    pub fn in_words(&self) -> String {
+        if self.reason.is_empty() { self.text.clone() } else { format!("{}: {}", self.text, self.reason) }
+    }
+}
+
 /// A study that accepts new sessions now, for the operator to choose. Says nothing of its policies.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct OpenStudy {
