@@ -12,7 +12,7 @@ use parfocal_trial::action::Action;
 use parfocal_trial::correction::{FieldChange, NewCorrection};
 use parfocal_trial::erasure::{Erasable, NewErasure};
 use parfocal_trial::question::AnswerValue;
-use parfocal_trial::remark::NewComment;
+use parfocal_trial::remark::{CommentContent, NewComment};
 use parfocal_trial::role::Role;
 use parfocal_trial::study::signature::Signature;
 use parfocal_trial::study::state::Change;
@@ -163,6 +163,36 @@ async fn a_note_that_was_changed_is_erased_in_all_its_versions() {
     assert_eq!(holding(folder.path(), "note on a vessel"), NOWHERE);
     let erasures = trial.store.reader().erasures(session).await.unwrap();
     assert_eq!(erasures.len(), 6, "the corrected value stays: {erasures:?}");
+    let checks = verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+}
+
+/// A researcher writes what a moment was marked for, or writes anew beside words that are erased.
+#[tokio::test]
+async fn a_note_is_erased_also_where_the_surgeon_left_no_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, comment) = session(&mut trial).await;
+    let mut mark = trial.comment("");
+    mark.said = CommentContent::Mark;
+    trial.conductor.comment(mark.clone()).await.unwrap();
+
+    let erase = async |key| trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, key)).await;
+    let refused = erase(mark.key).await.unwrap_err().to_string();
+    assert!(refused.contains("this comment has none"), "{refused}");
+    erase(comment.key).await.unwrap();
+
+    for record in [mark.key, comment.key] {
+        let change = FieldChange::Note { record, old: String::new(), new: words("note on") };
+        let correction = NewCorrection { change, reason: "on second thoughts".to_owned() };
+        trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+        erase(record).await.unwrap();
+    }
+    for gone in ["the vessel of Frau", "note on Frau"] {
+        assert_eq!(holding(folder.path(), gone), NOWHERE, "{gone}");
+    }
+    let shown = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap().comments;
+    assert!(shown.iter().all(|comment| comment.note.is_none()), "{shown:?}");
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
 }

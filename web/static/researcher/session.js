@@ -162,9 +162,9 @@ function besideComment(comment) {
   ) => make("button", { type: "button", className: `small ${level}`, onclick }, label);
   const write = () => (isVoice ? askTranscript(session, comment) : askNote(session, key, note ?? ""));
   const deeds = ended ? [button(isVoice ? "Transcribe…" : "Note…", "", write)] : [];
-  // If only the sound was erased, the typed words can still be erased.
-  const hasWords = !erased || (isVoice && note);
-  if (ended && kind !== "mark" && hasWords) {
+  // A mark has no words, but a note on it can have some. So can a note that was written after the words were erased.
+  const hasWords = note || (!erased && kind !== "mark");
+  if (ended && hasWords) {
     deeds.push(button("Erase…", "danger", () => askErasure(session, "comment", key)));
   }
   const player = voicePlayer(session, comment);

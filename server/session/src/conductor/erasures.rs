@@ -128,8 +128,8 @@ impl Shared {
         Ok(erased?)
     }
 
-    /// The record itself and the notes on it, because a note may repeat the words. An answer and a note are erased in
-    /// all their versions: a surgeon who goes on writing gives another answer to the same question, and a correction
+    /// The record itself and the notes on it, because a note may repeat the words. Of a record without words, such as a
+    /// mark, the notes alone. An answer and a note are erased in all their versions: a surgeon who goes on writing gives another answer to the same question, and a correction
     /// also has what stood there before it.
     async fn with_its_notes(
         &self,
@@ -139,40 +139,39 @@ impl Shared {
     ) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
         let corrections = reader.corrections(session).await?;
-        let (about, refusal) = match subject {
+        let (words, about, refusal) = match subject {
             Erasable::Comment => {
                 let comments = reader.comments(session).await?;
                 let comment = comments.iter().find(|(_, comment)| comment.key.to_string() == record);
                 let (_, comment) = comment.ok_or_else(no_such_record)?;
-                let about = if can_be_erased(&comment.said) { vec![record] } else { Vec::new() };
-                (about, "only words can be erased; this comment has none")
+                let words = if can_be_erased(&comment.said) { vec![record.clone()] } else { Vec::new() };
+                (words, vec![record], "only words can be erased; this comment has none")
             }
             Erasable::Answer => {
                 let answers = reader.answers(session).await?;
                 let answer = answers.iter().find(|(_, answer)| answer.key.to_string() == record);
                 let (_, answer) = answer.ok_or_else(no_such_record)?;
-                (versions_in_words(answer, &answers), "only words can be erased; this answer is a number")
+                let words = versions_in_words(answer, &answers);
+                let about = words.iter().cloned().chain([record]).collect();
+                (words, about, "only words can be erased; this answer is a number")
             }
             _ => {
                 let stored = corrections.iter().find(|stored| stored.number.to_string() == record);
                 let correction = stored.map(|stored| &stored.correction).ok_or_else(no_such_record)?;
                 let about = if correction.field == Field::Note { vec![correction.record.clone()] } else { Vec::new() };
-                (about, "only a note can be erased; this correction is a value")
+                (Vec::new(), about, "only a note can be erased; this correction is a value")
             }
         };
-        if about.is_empty() {
-            return Err(Refusal::conflict(refusal).into());
-        }
 
         let is_note = |correction: &Correction| correction.field == Field::Note && about.contains(&correction.record);
         let notes = corrections.iter().filter(|stored| is_note(&stored.correction));
-        let notes: Vec<_> = notes.map(|stored| (Erasable::Correction, stored.number.to_string())).collect();
+        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
 
-        let mut records = Vec::new();
-        if subject != Erasable::Correction {
-            records.extend(about.into_iter().map(|record| (subject, record)));
+        let words = words.into_iter().map(|record| (subject, record));
+        let records: Vec<_> = words.chain(notes).collect();
+        if records.is_empty() {
+            return Err(Refusal::conflict(refusal).into());
         }
-        records.extend(notes);
         Ok(records)
     }
 
