@@ -172,6 +172,7 @@ async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arr
     let timeline = trial.reports.timeline(Role::Researcher, session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!((&aside.value, aside.late, timeline.set_aside.len()), (&AnswerValue::Point(1), true, 1));
+    assert!(trial.store.reader().answers(session).await.unwrap().iter().any(|(_, answer)| answer.key == aside.key));
     assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);
 
     let out = folder.path().join("export");

@@ -61,7 +61,7 @@ test("the timeline is as long as the last thing that happened, whatever that is"
   assert.equal(lengthOf({ ...EMPTY, points: [point(1, 0), point(50, 0)] }), 50);
   assert.equal(lengthOf({ ...EMPTY, comments: [{ ...COMMENT, seconds: 61 }] }), 61);
   assert.equal(lengthOf(EMPTY, [{ from: 3, to: 65 }]), 65, "a recording goes on in the closing questions");
-  const aside = { at: "", late: true, question: "q", text: "", value: 1, seconds: 70 };
+  const aside = { key: "1", at: "", late: true, question: "q", text: "", value: 1, seconds: 70 };
   assert.equal(lengthOf({ ...EMPTY, set_aside: [aside] }), 70);
 });
 

@@ -2725,6 +2725,8 @@ export interface components {
             /** @description When it was stored, by the server's wall clock. */
             at: string;
             counted?: components["schemas"]["AnswerValue"] | null;
+            /** @description The answer's key. */
+            key: components["schemas"]["IdempotencyKey"];
             /** @description Whether it arrived too late. */
             late: boolean;
             /** @description The question's identifier. */

@@ -1411,6 +1411,9 @@ class SetAside(TypedDict):
 
     counted: NotRequired[AnswerValue | None]
 
+    key: IdempotencyKey
+    """The answer's key."""
+
     late: bool
     """Whether it arrived too late."""
 

@@ -181,7 +181,14 @@ function listSetAside(answers) {
     const when = make("span", { className: "when" }, clockText(answer.seconds));
     const where = answer.setting ? `Setting ${answer.setting}` : "Closing";
     const about = ` ${where}: ${answer.text || answer.question} `;
-    return make("li", {}, when, about, make("strong", {}, setAsideWords(answer)));
+    const erase = () => askErasure(session, "answer", answer.key);
+    // Otherwise it is erased with the answer that counts, in all its versions.
+    const isAlone = typeof answer.value === "string" && answer.value !== "" && answer.counted == null;
+    const deed =
+      ended &&
+      isAlone &&
+      make("button", { type: "button", className: "small danger", onclick: erase }, "Erase…");
+    return make("li", {}, when, about, make("strong", {}, setAsideWords(answer)), deed && " ", deed);
   });
   byId("aside").hidden = items.length === 0;
   byId("aside-list").replaceChildren(...items);

@@ -185,6 +185,8 @@ pub struct TimelineVoice {
 /// An answer that does not count: a later one from another device differs, or it arrived too late.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SetAside {
+    /// The answer's key.
+    pub key: IdempotencyKey,
     /// When it was stored, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
@@ -341,6 +343,7 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
     let points = aside.map(|((run, answer), _)| {
         let question = course.protocol.question(&answer.question, answer.segment.is_some());
         SetAside {
+            key: answer.key,
             at: answer.stamp.wall,
             seconds: seconds(start, runs.entered_at(*run, answer.stamp.at, &answer.origin)).max(0.0),
             setting: answer.segment.map(|segment| course.setting(segment)),
