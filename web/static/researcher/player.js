@@ -129,8 +129,8 @@ export class Player {
 
     if (event.key === "ArrowLeft") this.#step(-1);
     else if (event.key === "ArrowRight") this.#step(1);
-    // On a button or link the space bar has its usual effect.
-    else if (event.key === " " && !target.closest("button, a")) this.#toggle();
+    // On a button, a link or a line that unfolds something the space bar has its usual effect.
+    else if (event.key === " " && !target.closest("button, a, summary")) this.#toggle();
     else return;
     event.preventDefault();
   }
