@@ -4,10 +4,11 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { Pictures } from "../static/researcher/pictures.js";
-import { chosenPatchAt, momentText, valuesAt } from "../static/researcher/player_words.js";
+import { chosenPatchAt, momentText, valuesAt, whyNoPicture } from "../static/researcher/player_words.js";
 import { Playhead } from "../static/researcher/playhead.js";
 import { lastComment, metricPath, Scale, settingAt } from "../static/researcher/timeline.js";
 import { Track } from "../static/researcher/track.js";
+import { Refused } from "../static/shared/api.js";
 
 /**
  * A recording of `count` frames, one every `ms` milliseconds.
@@ -160,6 +161,17 @@ test("pictures are asked for a few at a time, the most urgent first, and no long
   await settled();
   assert.deepEqual(server.aborted, [6, 7]);
   assert.equal(server.asked.has(40), true);
+});
+
+test("only what is wrong with a frame is told of it: a server that is busy or restarts is asked again", () => {
+  assert.equal(whyNoPicture(new Refused(500, "frame 3 is damaged", true)), "frame 3 is damaged");
+  assert.equal(whyNoPicture(new Refused(409, "the participant withdrew", true)), "the participant withdrew");
+  assert.equal(whyNoPicture(new Refused(500, "a proxy’s error", false)), null);
+  assert.equal(whyNoPicture(new Refused(502, "a proxy’s error", false)), null);
+  assert.equal(whyNoPicture(new Refused(503, "busy", true)), null);
+  assert.equal(whyNoPicture(new Refused(507, "the disk cannot be read", true)), null);
+  assert.equal(whyNoPicture(new Refused(403, "sign in", true, true)), null);
+  assert.equal(whyNoPicture(new TypeError("no network")), null);
 });
 
 test("a frame that the server cannot read is told once, and a server that does not answer is no damage", async () => {

@@ -27,10 +27,10 @@ export class Pictures {
   /**
    * @param {object} options
    * @param {(frame: number, signal: AbortSignal) => Promise<Picture>} options.load
-   * @param {(error: unknown) => string | null} options.explain says why the server has no such picture; null if it did
-   *   not answer
+   * @param {(error: unknown) => string | null} options.explain says why the server has no such picture; null if it may
+   *   have one when it is asked again
    * @param {(frame: number) => void} options.arrived called when a picture, or the reason why there is none, arrives
-   * @param {(error: unknown) => void} options.failed called when the server does not answer
+   * @param {(error: unknown) => void} options.failed called when there is no picture for now
    * @param {number} [options.atOnce] how many pictures are requested at the same time
    * @param {number} [options.kept] how many pictures are kept
    */

@@ -4,7 +4,7 @@ import { getPicture, inWords, Refused } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { Pictures } from "./pictures.js";
 import { PlayerSpectra } from "./player_spectra.js";
-import { chosenPatchAt, momentText, valuesAt } from "./player_words.js";
+import { chosenPatchAt, DAMAGED, momentText, valuesAt, whyNoPicture } from "./player_words.js";
 import { Playhead } from "./playhead.js";
 import { lengthOf } from "./timeline.js";
 import { Track } from "./track.js";
@@ -57,8 +57,7 @@ export class Player {
     this.#playhead = new Playhead(this.#track);
     this.#pictures = new Pictures({
       load: (frame, signal) => this.#load(frame, signal),
-      // Who has to sign in first sees the frame afterwards.
-      explain: (error) => (error instanceof Refused && !error.needsSignIn ? error.message : null),
+      explain: whyNoPicture,
       arrived: (frame) => this.#arrived(frame),
       failed: (error) => this.#failed(error),
     });
@@ -270,7 +269,7 @@ export class Player {
     try {
       return await createImageBitmap(jpeg);
     } catch {
-      throw new Refused(500, "its picture is damaged.", true);
+      throw new Refused(DAMAGED, "its picture is damaged.", true);
     }
   }
 

@@ -1,5 +1,6 @@
 // Texts beside the playback.
 
+import { Refused } from "../shared/api.js";
 import { nearestPoint, powerOf, settingAt, spanAt } from "./timeline.js";
 
 /** Values further away in time than this are not shown for the moment on screen. In seconds. */
@@ -7,6 +8,21 @@ const NEAR = 2;
 
 /** Mosaic cells along each side of the patch. */
 const PATCH = 32;
+
+/** The server's status if a recording is damaged. */
+export const DAMAGED = 500;
+
+/**
+ * Says why there is no picture of a frame; null if the server may give one later: it is busy, restarts behind a proxy,
+ * cannot read its disk, or somebody has to sign in first.
+ *
+ * @param {unknown} error
+ */
+export function whyNoPicture(error) {
+  if (!(error instanceof Refused)) return null;
+  const isOfFrame = error.final || (error.ours && error.status === DAMAGED);
+  return isOfFrame ? error.message : null;
+}
 
 /**
  * A moment as `1:05.2`.
