@@ -12,7 +12,7 @@ const MIDDLE = 0.5;
 
 /** Steps between the times below the drawing, in seconds. */
 const TICK_STEPS = [5, 10, 15, 30, 60, 120, 300, 600];
-const LONGEST_TICK_STEP = 900;
+const QUARTER = 900;
 
 /** A time below the drawing needs this many pixels. */
 const TICK_WIDTH = 90;
@@ -90,8 +90,9 @@ export class Scale {
 
   /** The times to write below the drawing, in seconds. */
   ticks() {
-    const step =
-      TICK_STEPS.find((seconds) => this.total / seconds <= this.width / TICK_WIDTH) ?? LONGEST_TICK_STEP;
+    const shortest = (this.total * TICK_WIDTH) / this.width;
+    // A session that was left open overnight has its times quarters of an hour apart, or several of them.
+    const step = TICK_STEPS.find((seconds) => seconds >= shortest) ?? Math.ceil(shortest / QUARTER) * QUARTER;
     return Array.from({ length: Math.floor(this.total / step) + 1 }, (_, index) => index * step);
   }
 }
