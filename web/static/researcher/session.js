@@ -43,19 +43,35 @@ function withFocalPath() {
   return get("/api/researcher/sessions/{session}/timeline", { session });
 }
 
+/**
+ * Takes what was loaded, and lists its comments and answers. The drawing and the list tell a comment by its place among
+ * all, so both are made of the same timeline: while a session is under way, or a tablet sends late, there are more
+ * comments each time. The comment that was pointed out stays so.
+ *
+ * @param {Api.Timeline} loaded
+ */
+function take(loaded) {
+  const key = chosen === null ? null : timeline?.comments[chosen]?.key;
+  const kept = loaded.comments.findIndex((comment) => comment.key === key);
+  chosen = kept < 0 ? null : kept;
+  timeline = loaded;
+  listComments(loaded.comments);
+  listSetAside(loaded.set_aside);
+  markChosen();
+}
+
 async function load() {
   try {
     // The server records that somebody looked at the focal path. So it is loaded only if it is shown.
-    timeline = withPath
+    const loaded = withPath
       ? await withFocalPath()
       : await get("/api/researcher/sessions/{session}/course", { session });
     if (unblinded) {
       const detail = await get("/api/researcher/sessions/{session}", { session });
       policies = detail.unblinding?.policies ?? [];
     }
-    listComments(timeline.comments);
-    listSetAside(timeline.set_aside);
-    if (unblinded) await openPlayer(timeline);
+    take(loaded);
+    if (unblinded) await openPlayer(loaded);
     new ResizeObserver(draw).observe(byId("timeline"));
   } catch (error) {
     setText(byId("timeline-trouble"), inWords(error));
@@ -194,14 +210,18 @@ function listSetAside(answers) {
   byId("aside-list").replaceChildren(...items);
 }
 
+function markChosen() {
+  for (const [index, line] of lines.entries()) {
+    if (index === chosen) line.setAttribute("aria-current", "true");
+    else line.removeAttribute("aria-current");
+  }
+}
+
 /** @param {number} index */
 function choose(index) {
   chosen = index;
   pointOut(index);
-  for (const [other, line] of lines.entries()) {
-    if (other === index) line.setAttribute("aria-current", "true");
-    else line.removeAttribute("aria-current");
-  }
+  markChosen();
   const line = lines[index];
   if (!line) return;
   // If there is a player, the page must not scroll away from its picture.
@@ -295,9 +315,11 @@ function showKey(shown) {
 
 byId("show-path").onclick = async () => {
   try {
-    timeline = await withFocalPath();
+    const loaded = await withFocalPath();
+    setText(byId("timeline-trouble"), "");
     withPath = true;
     byId("show-path").hidden = true;
+    take(loaded);
     draw();
   } catch (error) {
     setText(byId("timeline-trouble"), inWords(error));
