@@ -150,6 +150,22 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
 }
 
 #[tokio::test]
+async fn a_recording_whose_session_has_just_ended_is_not_called_cut_short() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    unblind(&server, &session).await;
+    until(&server, |status| status["recording"].is_string()).await;
+    let young = get_json(&server, &session, "recordings").await;
+    let under_way = |said: &Value| said.as_str().unwrap().contains("holds no frame yet. If it is under way");
+    assert!(young["problems"].as_array().unwrap().iter().all(under_way), "{young}");
+
+    until(&server, |status| status["frames"].as_u64() >= Some(30)).await;
+    abort(&server, &session).await;
+    let found = get_json(&server, &session, "recordings").await;
+    assert_eq!((found["recordings"].as_array().unwrap().len(), &found["problems"]), (1, &json!([])), "{found}");
+}
+
+#[tokio::test]
 async fn the_view_is_played_as_it_was_recorded() {
     let server = start(Arc::new(tempfile::tempdir().unwrap()));
     let session = recorded(&server, "viewed").await;

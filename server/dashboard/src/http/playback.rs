@@ -29,6 +29,7 @@ pub(super) async fn recordings(
     Path(session): Path<SessionId>,
 ) -> Result<Json<SessionRecordings>, Error> {
     let by = by.for_session(&app, session).await?;
+    app.recordings.settle().await;
     let found = app.player.recordings(Role::Researcher, session).await?;
     if !found.recordings.is_empty() {
         let access_log = app.access_log(by);

@@ -171,7 +171,9 @@ fn add_recording(name: &str, recording: &AnyRecording, played: &Played, listed: 
 
     let times = recording.times();
     let Some(&first) = times.first() else {
-        listed.problems.push(format!("The recording {name} holds no frame."));
+        // Frames are stored many at once.
+        let advice = if played.ended { "" } else { " yet. If it is under way, load this page again in a moment" };
+        listed.problems.push(format!("The recording {name} holds no frame{advice}."));
         return;
     };
 

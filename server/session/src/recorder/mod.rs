@@ -33,6 +33,9 @@ const MEASURE: Duration = Duration::from_secs(10);
 /// Longest wait for that frame, and for the disk.
 const PATIENCE: Duration = Duration::from_secs(1);
 
+/// Who asks for a session's recordings waits at most this long until they are stored.
+const STORING: Duration = Duration::from_secs(5);
+
 /// Records at most one thing at a time. Clone freely.
 #[derive(Clone)]
 pub struct Recordings(Arc<Shared>);
@@ -120,6 +123,14 @@ impl Recordings {
     /// Ends the recording under way, if one is, and stores what was recorded.
     pub async fn stop(&self) {
         self.to_the_end(|this| async move { this.end().await }).await;
+    }
+
+    /// Waits until the recording of a session that is over is stored, unless the disk takes long. Until then, nobody can
+    /// tell it from one that was cut short.
+    pub async fn settle(&self) {
+        if timeout(STORING, self.notice_the_end()).await.is_err() {
+            tracing::warn!("a recording is still being stored");
+        }
     }
 
     /// Does `work` while nothing else begins or ends a recording, even if the caller is dropped, as a handler is when its
