@@ -1,6 +1,7 @@
 //! Playing recordings to the researcher: when, to whom, with which times, and the message if a recording is broken.
 
 use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
@@ -227,6 +228,23 @@ async fn a_session_that_asks_for_no_recording_has_nothing_to_play() {
     assert_eq!(found, json!({"recordings": [], "problems": []}));
 }
 
+#[tokio::test]
+async fn the_export_of_a_session_that_has_just_ended_holds_its_recording_to_the_end() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    until(&server, |status| status["frames"].as_u64() >= Some(30)).await;
+    abort(&server, &session).await;
+
+    let (status, export) = get(&server, "researcher", &session, "export.zip").await;
+    assert_eq!(status, StatusCode::OK);
+    let out = tempfile::tempdir().unwrap();
+    zip::ZipArchive::new(Cursor::new(export)).unwrap().extract(out.path()).unwrap();
+    let folder = std::fs::read_dir(out.path()).unwrap().next().unwrap().unwrap().path();
+    let rows = recording_rows(&folder);
+    let frames = Recording::open(&recordings(&server).join(&session)).unwrap().rows().len();
+    assert_eq!((rows[0]["ended"].as_str(), &rows[0]["frames"]), ("stopped", &frames.to_string()));
+}
+
 /// Exports `session`, checks the export with `parfocal verify`, and returns the rows of its `recordings.csv`.
 fn exported(server: &Server, session: &str, out: &Path) -> Vec<BTreeMap<String, String>> {
     let export = ["export", session, "--out", out.to_str().unwrap(), "--data-dir"];
@@ -235,7 +253,12 @@ fn exported(server: &Server, session: &str, out: &Path) -> Vec<BTreeMap<String, 
     let (verified, said) = parfocal(&["verify"], out);
     assert!(verified, "{said}");
 
-    let mut table = csv::Reader::from_path(out.join("recordings.csv")).unwrap();
+    recording_rows(out)
+}
+
+/// The rows of `recordings.csv` in the folder of an export.
+fn recording_rows(export: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut table = csv::Reader::from_path(export.join("recordings.csv")).unwrap();
     table.deserialize().map(Result::unwrap).collect()
 }
 

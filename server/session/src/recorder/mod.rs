@@ -33,7 +33,7 @@ const MEASURE: Duration = Duration::from_secs(10);
 /// Longest wait for that frame, and for the disk.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Who asks for a session's recordings waits at most this long until they are stored.
+/// Whoever plays or exports a session waits at most this long until its recording is stored.
 const STORING: Duration = Duration::from_secs(5);
 
 /// Records at most one thing at a time. Clone freely.
