@@ -1,5 +1,6 @@
 // Follows what the server makes in the background, such as an export: asks for its progress until it is finished. The
-// page may be closed meanwhile.
+// page may be closed meanwhile. The server keeps what it has made for a while only, so a page that somebody comes back
+// to asks whether it is still there.
 
 import { Refused } from "./api.js";
 import { tellTrouble } from "./trouble.js";
@@ -19,6 +20,7 @@ const ASK_AGAIN_MS = 1000;
 export function followUntilMade(get, show, trouble) {
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let timer;
+  let isReady = false;
 
   function askSoon() {
     clearTimeout(timer);
@@ -38,10 +40,14 @@ export function followUntilMade(get, show, trouble) {
   /** @param {State} state */
   function follow(state) {
     show(state);
+    isReady = state.state === "ready";
     if (state.state === "running") askSoon();
   }
 
   document.addEventListener("signed-in", ask);
+  document.addEventListener("visibilitychange", () => {
+    if (isReady && !document.hidden) ask();
+  });
   ask();
   return follow;
 }
