@@ -57,6 +57,10 @@ const MOST_PIXELS: u32 = 65_536;
 /// No screen shows more pictures a second.
 const MOST_A_SECOND: f64 = 1000.0;
 
+/// No device holds an entry for longer than a year. A device whose clock was set meanwhile, such as one that began in
+/// 1970 until it found the network, measures decades.
+const LONGEST_WAIT_MS: i64 = 366 * 24 * 60 * 60 * 1000;
+
 /// Device and time of a comment or answer, as the surgeon's page reports them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
 pub struct Origin {
@@ -73,11 +77,11 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// A copy without a negative wait. A wait whose clock is not named counts as measured by the wall clock, which is
-    /// the less certain one.
+    /// A copy without a wait that is negative or longer than a year. A wait whose clock is not named counts as measured
+    /// by the wall clock, which is the less certain one.
     #[must_use]
     pub fn plausible(self) -> Self {
-        let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);
+        let waited_millis = self.waited_millis.filter(|waited| (0..=LONGEST_WAIT_MS).contains(waited));
         let waited_by = waited_millis.map(|_| self.waited_by.unwrap_or(WaitClock::WallClock));
         Self { waited_millis, waited_by, ..self }
     }
@@ -165,5 +169,13 @@ mod tests {
         assert_eq!(sight(0, -0.5), Sight::default());
         assert_eq!(sight(u32::MAX, 1e9), Sight::default());
         assert_eq!(Sight::default().plausible(), Sight::default());
+
+        let day = 24 * 60 * 60 * 1000;
+        let origin =
+            |waited| Origin { waited_millis: Some(waited), waited_by: Some(WaitClock::WallClock), ..Origin::default() };
+        assert_eq!(origin(300 * day).plausible(), origin(300 * day));
+        for impossible in [-1, 50 * 365 * day, i64::MAX] {
+            assert_eq!(origin(impossible).plausible(), Origin::default(), "{impossible}");
+        }
     }
 }
