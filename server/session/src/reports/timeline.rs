@@ -391,13 +391,19 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
             }
             EventKind::SegmentFinished { .. } => inspecting = false,
             EventKind::Paused { inspected_ms, .. } | EventKind::ServerRestarted { inspected_ms } => {
-                if spans.last().is_none_or(|span| span.to.is_some()) {
+                let given = given.get(&number).copied().unwrap_or_default();
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    add_reason(&mut open.reason, kind.reason().unwrap_or_default());
+                    add_reason(&mut open.reason, given);
+                } else {
                     let restarted = matches!(kind, EventKind::ServerRestarted { .. });
                     let clock = since + milliseconds(inspected_ms.saturating_sub(before));
                     let frame = points.iter().rev().map(|point| point.seconds).find(|&seconds| seconds < at);
                     let ended = frame.map_or(clock, |frame| frame.max(clock)).min(at);
                     let from = if restarted && inspecting { ended } else { at };
-                    spans.push(PauseSpan { from, to: None, reason: in_words(kind, given.get(&number).copied()) });
+                    let mut reason = kind.in_words(|_| 0);
+                    add_reason(&mut reason, given);
+                    spans.push(PauseSpan { from, to: None, reason });
                 }
 
                 before = *inspected_ms;
@@ -415,13 +421,14 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     spans
 }
 
-/// The pause `paused` in words, with the reason that was `given` afterwards.
-fn in_words(paused: &EventKind, given: Option<&str>) -> String {
-    let words = paused.in_words(|_| 0);
-    match given {
-        Some(reason) if !reason.is_empty() => format!("{words}: {reason}"),
-        _ => words,
+/// Adds `reason` to a pause in words: one that was given afterwards, or that of a further pause in the same span. It is
+/// empty if none was given or it was erased.
+fn add_reason(words: &mut String, reason: &str) {
+    if reason.is_empty() {
+        return;
     }
+    words.push_str(if words.contains(": ") { "; " } else { ": " });
+    words.push_str(reason);
 }
 
 /// When no tablet showed the surgeon's page.
@@ -552,5 +559,19 @@ mod tests {
         };
         assert_eq!(words("phone"), "Paused: phone");
         assert_eq!(words(""), "Paused", "the reason was erased");
+    }
+
+    #[test]
+    fn a_pause_above_another_adds_its_reason() {
+        let paused = |reason: &str| EventKind::Paused { reason: reason.to_owned(), inspected_ms: 0 };
+        let given = EventKind::ReasonGiven { about: 2, reason: "phone".to_owned() };
+        let words = |first: &str, second: &str| {
+            let spans = pauses(&[(2.0, &paused(first)), (3.0, &paused(second)), (4.0, &given)], &[]);
+            assert_eq!(spans.len(), 1);
+            spans[0].reason.clone()
+        };
+        assert_eq!(words("", "bleeding"), "Paused: bleeding; phone");
+        assert_eq!(words("smoke", ""), "Paused: smoke; phone");
+        assert_eq!(words("", ""), "Paused: phone");
     }
 }
