@@ -86,6 +86,32 @@ async fn records_are_put_right_by_the_researcher_alone() {
 }
 
 #[tokio::test]
+async fn an_erased_reason_of_a_pause_is_not_asked_for_again() {
+    let server = Server::within();
+    let session = server.prepare("S-05", "practice").await;
+    let act = async |body: Value| server.post("/api/operator/actions", body).await;
+    act(json!({"session": session, "action": "start"})).await;
+    act(json!({"session": session, "action": "pause", "reason": "Mustermann bleeds"})).await;
+    act(json!({"session": session, "action": "abort", "reason": "enough"})).await;
+
+    let base = format!("/api/researcher/sessions/{session}");
+    let log = server.read(&base).await["log"].as_array().unwrap().clone();
+    let pause = log.iter().find(|line| line["text"] == "Paused: Mustermann bleeds").unwrap();
+    let erase = json!({
+        "subject": "event", "record": pause["erasable_event"].to_string(), "reason": "names a patient",
+    });
+    assert_eq!(post(&server, "researcher", &format!("{base}/erasures"), &erase).await.0, 204);
+
+    // A further event of the session, for which its state is made from all events again.
+    let view = act(json!({"session": session, "action": "withdraw", "reason": "wants no part in it"})).await;
+    assert_eq!(view["reason_wanted"], Value::Null);
+    let again = json!({
+        "session": session, "action": "give-reason", "event": pause["erasable_event"], "reason": "bleeding",
+    });
+    assert_eq!(post(&server, "operator", "/api/operator/actions", &again).await.0, 409);
+}
+
+#[tokio::test]
 async fn a_consent_that_makes_no_sense_is_refused_with_words() {
     let server = Server::within();
     let (session, _) = a_session(&server).await;

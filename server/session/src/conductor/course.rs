@@ -525,10 +525,11 @@ impl Course {
     /// Replaces events by `events` as read from the database, after a reason was erased.
     pub fn read_again(&mut self, events: impl IntoIterator<Item = Event>) {
         for event in events {
-            let kept = self.events.iter_mut().find(|kept| kept.number == event.number);
-            if let Some(kept) = kept {
-                *kept = event;
+            let Some(kept) = self.events.iter_mut().find(|kept| kept.number == event.number) else { continue };
+            if kept.kind.reason() != event.kind.reason() {
+                self.state.keep_erasure(event.number);
             }
+            *kept = event;
         }
     }
 

@@ -15,7 +15,7 @@ mod inspections;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -74,6 +74,8 @@ pub struct SessionState {
     unreasoned: Vec<u32>,
     /// The reasons that were given after their pauses, by the pauses' numbers.
     given_reasons: BTreeMap<u32, String>,
+    /// Numbers of the pauses whose reason was erased. They look like those that never had one.
+    erased_reasons: BTreeSet<u32>,
     /// Version of the consent text that the participant consented to last.
     consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
@@ -115,16 +117,22 @@ impl SessionState {
             pointed: Pointed { patch: PatchPlace::CENTRE, held: false },
             unreasoned: Vec::new(),
             given_reasons: BTreeMap::new(),
+            erased_reasons: BTreeSet::new(),
             consented: None,
             answers: BTreeMap::new(),
         }
     }
 
-    /// The state before the first event, but with the present answers and the consent.
+    /// The state before the first event, but with the present answers, the consent, and which reasons were erased.
     #[must_use]
     pub fn before_all_events(&self) -> Self {
         let state = Self::new(Arc::clone(&self.protocol), self.segments.clone());
-        Self { answers: self.answers.clone(), consented: self.consented.clone(), ..state }
+        Self {
+            answers: self.answers.clone(),
+            consented: self.consented.clone(),
+            erased_reasons: self.erased_reasons.clone(),
+            ..state
+        }
     }
 
     /// The session's protocol.
@@ -190,6 +198,11 @@ impl SessionState {
     /// Records a consent to version `text_version` of the consent text.
     pub fn keep_consent(&mut self, text_version: &str) {
         self.consented = Some(text_version.to_owned());
+    }
+
+    /// Notes that the reason of pause `event` was erased, so that nobody is asked for it again.
+    pub fn keep_erasure(&mut self, event: u32) {
+        self.erased_reasons.insert(event);
     }
 
     /// Number of segments that are done, including their questions.
@@ -278,7 +291,7 @@ impl SessionState {
                     Role::System => PauseCause::SmallPicture,
                     _ => PauseCause::Operator,
                 });
-                if reason.is_empty() {
+                if reason.is_empty() && !self.erased_reasons.contains(&event.number) {
                     self.unreasoned.push(event.number);
                 }
             }

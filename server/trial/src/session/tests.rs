@@ -213,6 +213,21 @@ fn the_reason_for_a_pause_can_be_given_once_and_afterwards() {
 }
 
 #[test]
+fn nobody_is_asked_for_a_reason_that_was_erased() {
+    let mut run = Run::inspecting(true);
+    run.act(Role::Operator, &Action::Pause { reason: "the drill".to_owned() }).unwrap();
+    let mut paused = run.log.pop().unwrap();
+    run.state.keep_erasure(paused.number);
+
+    let EventKind::Paused { reason, .. } = &mut paused.kind else { panic!("{paused:?}") };
+    reason.clear();
+    run.log.push(paused);
+    let mut state = run.state.before_all_events();
+    run.log.iter().for_each(|event| state.apply(event));
+    assert_eq!((state.paused(), state.unreasoned()), (Some(PauseCause::Operator), [].as_slice()));
+}
+
+#[test]
 fn the_operator_focuses_by_hand_while_the_session_is_paused_and_after_an_abort() {
     let by = |run: &Run, role| decide_by_hand(&run.state, role, FocalPower::MIDDLE, None);
     let mut run = Run::inspecting(true);
