@@ -37,7 +37,7 @@ pub struct Arguments {
 /// If something must be fixed before a trial, or standard output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let data = &arguments.data_dir;
-    let mut findings = machine(data, &SystemClock);
+    let mut findings = machine(data, &SystemClock, false);
     findings.extend(database(data, wait_for(look_at_database(data))?));
     if let Some(spec) = &arguments.lens {
         super::interrupt::let_lenses_go_first()?;

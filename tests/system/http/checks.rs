@@ -32,6 +32,7 @@ async fn the_operator_sees_the_checks_of_machine_devices_and_tablet() {
     }
     assert_eq!(about(&found, "data folder")["verdict"], "well");
     assert_eq!(about(&found, "database")["verdict"], "well");
+    assert_eq!(about(&found, "network")["found"], "Only this machine can connect to the server.");
     assert_eq!(about(&found, "tablet")["found"], "No surgeon's page is open.");
     assert!(about(&found, "lens")["found"].as_str().unwrap().contains("simulated lens"), "{found:?}");
 

@@ -25,10 +25,11 @@ pub use tablet::{Tablet, TabletPart, TriedTablet, tablets, tried};
 use parfocal_base::clock::Clock;
 
 /// Checks everything except the database and the devices: the folder `data` and its disk, clock, network and rights.
-pub fn machine(data: &Path, clock: &dyn Clock) -> Vec<Finding> {
+/// `local`: a server that no other machine can connect to asks.
+pub fn machine(data: &Path, clock: &dyn Clock, local: bool) -> Vec<Finding> {
     let mut findings = vec![folder::disk(data), folder::access(data)];
     findings.push(system::clock(clock));
-    findings.push(network::addresses());
+    findings.push(if local { network::this_machine_alone() } else { network::addresses() });
     findings.extend(network::camera_links());
     findings.push(system::real_time());
     findings.push(system::memory());

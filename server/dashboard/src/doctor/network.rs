@@ -32,6 +32,15 @@ pub fn addresses() -> Finding {
     Finding::well(NETWORK, format!("A tablet can reach this machine at {}.", found.join(" or at ")))
 }
 
+/// No other device can reach the server, whatever the machine's addresses.
+pub fn this_machine_alone() -> Finding {
+    Finding::advice(
+        NETWORK,
+        "Only this machine can connect to the server.",
+        "For a tablet, start it with --bind 0.0.0.0:8080 --tls, unless a proxy on this machine passes requests on.",
+    )
+}
+
 /// The address for links to this machine; `None` if it is not in a network.
 pub fn outward() -> Option<IpAddr> {
     reachable_at().first().copied()

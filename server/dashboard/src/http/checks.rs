@@ -39,7 +39,8 @@ pub(super) struct Checks {
 pub(super) async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;
     // A task of its own, because this handler is dropped when its browser gives up or the disk hangs.
-    let looking = tokio::spawn(look_at_machine(app.store.folder().to_owned(), Arc::clone(&app.clock), look));
+    let folder = app.store.folder().to_owned();
+    let looking = tokio::spawn(look_at_machine(folder, Arc::clone(&app.clock), app.address.loopback_only(), look));
     let mut findings = looking.await.map_err(|_| Error::Internal)??;
     let now = app.clock.wall();
     let local = app.address.authority().is_some();
@@ -48,14 +49,16 @@ pub(super) async fn checks(_: Operator, State(app): State<AppState>) -> Result<J
     Ok(Json(Checks { at: now, findings }))
 }
 
-/// Checks the machine, and the database in the data folder `folder`, while nobody else does.
+/// Checks the machine, and the database in the data folder `folder`, while nobody else does. `local`: no other machine
+/// can connect to the server.
 async fn look_at_machine(
     folder: PathBuf,
     clock: Arc<dyn Clock>,
+    local: bool,
     _look: OwnedMutexGuard<()>,
 ) -> Result<Vec<Finding>, Error> {
     let database = doctor::database(&folder, look_at_database(&folder).await);
-    let machine = spawn_blocking(move || doctor::machine(&folder, clock.as_ref()));
+    let machine = spawn_blocking(move || doctor::machine(&folder, clock.as_ref(), local));
     let mut findings = machine.await.map_err(|_| Error::Internal)?;
     findings.extend(database);
     Ok(findings)
