@@ -2672,7 +2672,7 @@ export interface components {
         SessionLine: {
             /**
              * Format: int64
-             * @description Number of comments recorded.
+             * @description Number of comments that the surgeon did not take back.
              */
             comments: number;
             /** @description Corrected code of the participant; none if it was not corrected. */

@@ -1266,7 +1266,7 @@ class SessionDetail(TypedDict):
     """A session in detail, for the researcher. Contains the policies only after it was unblinded."""
 
     comments: int
-    """Number of comments recorded."""
+    """Number of comments that the surgeon did not take back."""
 
     corrected_participant: NotRequired[str | None]
     """Corrected code of the participant; none if it was not corrected."""
@@ -1349,7 +1349,7 @@ class SessionLine(TypedDict):
     """A session in a list. Says nothing of policies."""
 
     comments: int
-    """Number of comments recorded."""
+    """Number of comments that the surgeon did not take back."""
 
     corrected_participant: NotRequired[str | None]
     """Corrected code of the participant; none if it was not corrected."""

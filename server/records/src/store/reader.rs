@@ -28,10 +28,9 @@ const SESSION_LINES: &str = "SELECT session, wall, participant, protocol, practi
              (SELECT count(*) FROM events AS e
                  WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
              (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
-             (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
-             (SELECT count(*) FROM comments AS c WHERE c.session = s.session AND kind <> 'withdrawal' AND NOT EXISTS
-                 (SELECT 1 FROM comments AS w WHERE w.session = c.session AND w.kind = 'withdrawal' AND w.text = c.key
-                     AND NOT w.late)) AS standing_comments,
+             (SELECT count(*) FROM comments AS c WHERE c.session = s.session AND kind <> 'withdrawal'
+                 AND NOT EXISTS (SELECT 1 FROM comments AS w WHERE w.session = s.session AND w.kind = 'withdrawal'
+                     AND w.text = c.key AND NOT w.late)) AS comments,
              (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
                  AS emergency,
              EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
@@ -289,7 +288,6 @@ fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
         finished_settings: row.try_get("finished")?,
         settings: row.try_get("settings")?,
         comments: row.try_get("comments")?,
-        standing_comments: row.try_get("standing_comments")?,
         unblinded: emergency.is_some(),
         emergency: emergency == Some(true),
         withdrawn: row.try_get("withdrawn")?,

@@ -132,12 +132,8 @@ pub struct SessionLine {
     pub finished_settings: i64,
     /// Number of settings in the session.
     pub settings: i64,
-    /// Number of comments recorded.
+    /// Number of comments that the surgeon did not take back.
     pub comments: i64,
-    /// Number of comments without those that were taken back, and without the records that take them back. For the page
-    /// alone.
-    #[serde(skip)]
-    pub standing_comments: i64,
     /// Whether it was unblinded.
     pub unblinded: bool,
     /// Whether it was unblinded in an emergency: while it was under way, or while its study was blinded.

@@ -129,8 +129,8 @@ impl Shared {
     }
 
     /// The record itself and the notes on it, because a note may repeat the words. Of a record without words, such as a
-    /// mark, the notes alone. An answer and a note are erased in all their versions: a surgeon who goes on writing gives another answer to the same question, and a correction
-    /// also has what stood there before it.
+    /// mark, the notes alone. An answer and a note are erased in all their versions: a surgeon who goes on writing gives
+    /// another answer to the same question, and a correction also has what stood there before it.
     async fn with_its_notes(
         &self,
         session: SessionId,

@@ -229,7 +229,7 @@ impl Blinded {
             status: line.status,
             settings: line.settings,
             finished_settings: line.finished_settings,
-            comments: line.comments,
+            comments: self.comments.len() as i64,
             unblinded: self.unblinded(),
             counts_until: self.grace.until(),
         }
