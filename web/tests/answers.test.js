@@ -3,26 +3,12 @@ import { test } from "node:test";
 
 import { sendLeftAnswers } from "../static/surgeon/answers.js";
 import { Drafts } from "../static/surgeon/drafts.js";
-import { Origins } from "../static/surgeon/origin.js";
-import { Outbox } from "../static/surgeon/outbox.js";
-import { countedIds, FakeDisk, FakeServer, FakeTime, fakeStore, settle, VIEW } from "./around.js";
+import { settle, VIEW } from "./around.js";
+import { outboxPage } from "./outbox_page.js";
 
 test("a text left half-written is sent once its questions are gone, and an unconfirmed ranking is removed", async () => {
-  const store = fakeStore();
-  const newId = countedIds();
-  const time = new FakeTime();
-  const origins = new Origins(store, time, newId);
-  const server = new FakeServer();
-  const spare = /** @type {FakeDisk<import("../static/surgeon/outbox.js").Entry>} */ (new FakeDisk());
-  const outbox = new Outbox({
-    store,
-    spare,
-    origins,
-    send: server.send,
-    newId,
-    wall: time.wall,
-    later: time.later,
-  });
+  const { store, origins, newId, server, open } = outboxPage();
+  const outbox = open();
   const drafts = new Drafts(store, origins, newId, "tab");
   drafts.open("answer.s/closing/remarks").write(" Half a thought ");
   drafts.open("answer.s/closing/order").write([2, 1]);

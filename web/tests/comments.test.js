@@ -6,27 +6,13 @@ import { test } from "node:test";
 import { Refused } from "../static/shared/api.js";
 import { Comments } from "../static/surgeon/comments.js";
 import { Drafts } from "../static/surgeon/drafts.js";
-import { Origins } from "../static/surgeon/origin.js";
-import { Outbox } from "../static/surgeon/outbox.js";
-import { countedIds, FakeDisk, FakeServer, FakeTime, fakeStore, settle, VIEW } from "./around.js";
+import { settle, VIEW } from "./around.js";
+import { outboxPage } from "./outbox_page.js";
 
 /** A page in setting 2 of session s. */
 function openPage() {
-  const store = fakeStore();
-  const time = new FakeTime();
-  const newId = countedIds();
-  const server = new FakeServer();
-  const origins = new Origins(store, time, newId);
-  const spare = /** @type {FakeDisk<import("../static/surgeon/outbox.js").Entry>} */ (new FakeDisk());
-  const outbox = new Outbox({
-    store,
-    spare,
-    origins,
-    send: server.send,
-    newId,
-    wall: time.wall,
-    later: time.later,
-  });
+  const { store, origins, newId, server, open } = outboxPage();
+  const outbox = open();
   const page = { place: { session: "s", segment: "a", setting: 2, frame: 7, run: 1 } };
   const here = () => page.place;
   const voice = { heldUp: 0, isKeeping: false, durable: true, trouble: null };

@@ -2,37 +2,22 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { Refused } from "../static/shared/api.js";
-import { Origins } from "../static/surgeon/origin.js";
-import { Outbox } from "../static/surgeon/outbox.js";
-import { countedIds, FakeDisk, FakeServer, FakeTime, fakeStore, settle } from "./around.js";
+import { settle } from "./around.js";
+import { outboxPage } from "./outbox_page.js";
 
 const fullDisk = () => new Refused(507, "the disk is full", true);
 const noNetwork = () => new TypeError("Failed to fetch");
 
-/** @typedef {import("../static/surgeon/outbox.js").Entry} Entry */
+/** @typedef {ReturnType<typeof outboxPage>} Page */
 
-/** A page on `store` and `spare`: an outbox, its server and its time. */
-function openPage(
-  store = fakeStore(),
-  time = new FakeTime(),
-  newId = countedIds(),
-  spare = /** @type {FakeDisk<Entry>} */ (new FakeDisk()),
-) {
-  const server = new FakeServer();
-  const origins = new Origins(store, time, newId);
-  const open = () =>
-    new Outbox({ store, spare, origins, send: server.send, newId, wall: time.wall, later: time.later });
-  return { store, spare, time, server, origins, newId, open };
-}
-
-/** @param {FakeServer} server */
+/** @param {Page["server"]} server */
 const texts = (server) => server.got.map(({ body }) => body.text);
 
-/** @param {ReturnType<typeof fakeStore>} store */
+/** @param {Page["store"]} store */
 const keptEntries = (store) => store.names("parfocal.outbox.").length;
 
 test("what the server has saved is taken off the device", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   outbox.add("/comments", { session: "s", text: "a" });
   assert.equal(keptEntries(page.store), 1, "it is on the device before it is sent");
@@ -44,7 +29,7 @@ test("what the server has saved is taken off the device", async () => {
 });
 
 test("without a network the waits double up to eight seconds, and a nudge tries at once", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = Array.from({ length: 8 }, noNetwork);
   outbox.add("/comments", { session: "s", text: "a" });
@@ -70,7 +55,7 @@ test("without a network the waits double up to eight seconds, and a nudge tries 
 });
 
 test("what is not answered for two seconds is told as kept here, and its request goes on", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   /** @type {(answer: Error | null) => void} */
   let answer = () => {};
@@ -101,7 +86,7 @@ test("what is not answered for two seconds is told as kept here, and its request
 });
 
 test("a reload sends what was left, in the order of entry", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const first = page.open();
   page.server.answers = [noNetwork(), noNetwork(), noNetwork()];
   first.add("/comments", { session: "s", text: "one" });
@@ -110,7 +95,7 @@ test("a reload sends what was left, in the order of entry", async () => {
   await settle();
   assert.equal(keptEntries(page.store), 2);
 
-  const later = openPage(page.store, page.time, page.newId);
+  const later = outboxPage(page.store, page.time, page.newId);
   later.open();
   await settle();
   assert.deepEqual(texts(later.server), ["one", "two"], "also with a clock that was set back between them");
@@ -118,7 +103,7 @@ test("a reload sends what was left, in the order of entry", async () => {
 });
 
 test("what a tablet forgot when it lost its power is sent from the spare copy, in order", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const first = page.open();
   page.server.answers = [noNetwork(), noNetwork(), noNetwork()];
   first.add("/comments", { session: "s", text: "one" });
@@ -128,7 +113,7 @@ test("what a tablet forgot when it lost its power is sent from the spare copy, i
   // Only what was said some seconds earlier had reached the disk.
   const forgotten = page.store.names("parfocal.outbox.").sort().at(-1) ?? "";
   page.store.kept.delete(forgotten);
-  const later = openPage(page.store, page.time, page.newId, page.spare);
+  const later = outboxPage(page.store, page.time, page.newId, page.spare);
   later.server.answers = [noNetwork()];
   const outbox = later.open();
   await outbox.ready;
@@ -145,13 +130,13 @@ test("what a tablet forgot when it lost its power is sent from the spare copy, i
 });
 
 test("a spare copy that cannot be read at first is read again", async () => {
-  const page = openPage();
+  const page = outboxPage();
   page.server.answers = [noNetwork()];
   page.open().add("/comments", { session: "s", text: "one" });
   await settle();
   page.store.kept.clear();
   page.spare.unreadable = true;
-  const later = openPage(page.store, page.time, page.newId, page.spare);
+  const later = outboxPage(page.store, page.time, page.newId, page.spare);
   const outbox = later.open();
   await outbox.ready;
   assert.equal(outbox.waiting.length, 0);
@@ -163,7 +148,7 @@ test("a spare copy that cannot be read at first is read again", async () => {
 });
 
 test("what this page or another tab has in hand is not taken from the spare copy", async () => {
-  const page = openPage();
+  const page = outboxPage();
   page.server.answers = Array.from({ length: 9 }, noNetwork);
   const first = page.open();
   first.add("/comments", { session: "s", text: "one" });
@@ -177,19 +162,19 @@ test("what this page or another tab has in hand is not taken from the spare copy
 });
 
 test("after a loss of power no number is given twice, so that the last answer is the last", () => {
-  const page = openPage();
+  const page = outboxPage();
   page.origins.stamp();
   const kept = new Map(page.store.kept);
   const said = [page.origins.stamp(), page.origins.stamp()].map(({ sequence }) => sequence ?? 0);
 
   page.store.kept.clear();
   for (const [name, text] of kept) page.store.kept.set(name, text);
-  const next = openPage(page.store, page.time, page.newId).origins.stamp().sequence ?? 0;
+  const next = outboxPage(page.store, page.time, page.newId).origins.stamp().sequence ?? 0;
   assert.ok(next > Math.max(...said), `${next} after ${said}`);
 });
 
 test("what one entry meets does not stop the others, unless nobody answers", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [noNetwork(), noNetwork()];
   outbox.add("/comments", { session: "s", text: "one" });
@@ -209,7 +194,7 @@ test("what one entry meets does not stop the others, unless nobody answers", asy
 });
 
 test("what the server refuses stays on the device, is counted, and is tried by the next page", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [new Refused(404, "no such session", true)];
   outbox.add("/comments", { session: "s", text: "a" });
@@ -220,7 +205,7 @@ test("what the server refuses stays on the device, is counted, and is tried by t
   assert.deepEqual([...outbox.sessions], ["s"]);
   assert.equal(page.time.nextIn, null, "the same page does not try again");
 
-  const later = openPage(page.store, page.time, page.newId);
+  const later = outboxPage(page.store, page.time, page.newId);
   later.open();
   await settle();
   assert.deepEqual(texts(later.server), ["a"]);
@@ -228,7 +213,7 @@ test("what the server refuses stays on the device, is counted, and is tried by t
 });
 
 test("a proxy's refusal is not the server's, and is tried again", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [new Refused(404, "Not found", false)];
   outbox.add("/comments", { session: "s", text: "a" });
@@ -241,7 +226,7 @@ test("a proxy's refusal is not the server's, and is tried again", async () => {
 });
 
 test("a new answer to a question replaces the one that was refused", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [new Refused(422, "not on the scale", true)];
   outbox.add("/answers", { session: "s", value: 9 }, "s/1/sharpness");
@@ -258,7 +243,7 @@ test("a new answer to a question replaces the one that was refused", async () =>
 });
 
 test("entries for a question are found with those for its parts, and not with its namesakes'", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = Array.from({ length: 4 }, noNetwork);
   outbox.add("/answers", { value: [1, 0] }, "s/1/sus/0");
@@ -272,7 +257,7 @@ test("entries for a question are found with those for its parts, and not with it
 });
 
 test("a draft that another tab has sent under the same key goes again under a new one", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [new Refused(409, "another text has this key", true)];
   outbox.add("/comments", { session: "s", text: "longer" }, null, { key: "draft-key" });
@@ -285,7 +270,7 @@ test("a draft that another tab has sent under the same key goes again under a ne
 });
 
 test("waiting for answers ends at once if one fails or the server does not answer", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [noNetwork()];
   outbox.add("/comments", { session: "s", text: "c" });
@@ -297,9 +282,9 @@ test("waiting for answers ends at once if one fails or the server does not answe
 });
 
 test("what a closed tab has left is sent by an open one", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const open = page.open();
-  const other = openPage(page.store, page.time, page.newId);
+  const other = outboxPage(page.store, page.time, page.newId);
   other.server.answers = Array.from({ length: 9 }, noNetwork);
   other.open().add("/comments", { session: "s", text: "from the closed tab" });
   await settle();
@@ -315,7 +300,7 @@ test("what a closed tab has left is sent by an open one", async () => {
 });
 
 test("a failing comment alone does not keep answers from being settled", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [fullDisk(), null];
   outbox.add("/comments", { session: "s", text: "c" });
@@ -324,7 +309,7 @@ test("a failing comment alone does not keep answers from being settled", async (
 });
 
 test("a device that stores nothing is reported as not durable, and still sends", async () => {
-  const page = openPage();
+  const page = outboxPage();
   page.store.full = true;
   const outbox = page.open();
   page.server.answers = [noNetwork()];
@@ -337,7 +322,7 @@ test("a device that stores nothing is reported as not durable, and still sends",
 });
 
 test("an entry that another tab has sent is no longer waiting here", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [noNetwork()];
   const { id } = outbox.add("/comments", { session: "s", text: "a" });
@@ -354,12 +339,12 @@ test("an entry that another tab has sent is no longer waiting here", async () =>
 });
 
 test("an entry that was refused here and that another tab has sent is no longer held here", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [new Refused(404, "no such session", true)];
   const { id } = outbox.add("/comments", { session: "s", text: "a" });
   await settle();
-  const other = openPage(page.store, page.time, page.newId);
+  const other = outboxPage(page.store, page.time, page.newId);
   other.open();
   await settle();
   assert.deepEqual(texts(other.server), ["a"]);
@@ -369,7 +354,7 @@ test("an entry that was refused here and that another tab has sent is no longer 
 });
 
 test("each entry has its number among all of the device, and its age", async () => {
-  const page = openPage();
+  const page = outboxPage();
   const outbox = page.open();
   page.server.answers = [noNetwork(), noNetwork()];
   outbox.add("/comments", { session: "s", text: "one" });
@@ -395,13 +380,13 @@ test("each entry has its number among all of the device, and its age", async () 
 });
 
 test("a wait over a reload, or with a sleep in it, is measured by the wall clock", async () => {
-  const page = openPage();
+  const page = outboxPage();
   page.server.answers = [noNetwork()];
   page.open().add("/comments", { session: "s", text: "kept" });
   await settle();
   page.time.wallMillis += 600_000;
 
-  const reloaded = openPage(page.store, page.time, page.newId);
+  const reloaded = outboxPage(page.store, page.time, page.newId);
   reloaded.open();
   await settle();
   assert.equal(reloaded.server.got[0]?.body.waited_millis, 600_000);
