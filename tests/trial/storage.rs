@@ -212,6 +212,31 @@ async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
 }
 
 #[tokio::test]
+async fn who_waits_for_the_telemetry_finds_every_step_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    // Nothing is written, so nobody waits.
+    trial.store.settle_telemetry().await;
+
+    let (sender, receiver) = tokio::sync::mpsc::channel(4096);
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
+    let pool = raw(folder.path()).await;
+    // One step, some, and more than a batch holds.
+    for (first, last) in [(1, 1), (2, 5), (6, 1000)] {
+        for frame in first..=last {
+            sender.send(step(frame, None)).await.unwrap();
+        }
+        tokio::join!(trial.store.settle_telemetry(), trial.store.settle_telemetry());
+        let steps: i64 = sqlx::query_scalar("SELECT count(*) FROM telemetry").fetch_one(&pool).await.unwrap();
+        assert_eq!(steps, last.cast_signed());
+    }
+
+    drop(sender);
+    writer.await.unwrap();
+    trial.store.settle_telemetry().await;
+}
+
+#[tokio::test]
 async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;

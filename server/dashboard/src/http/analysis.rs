@@ -36,6 +36,7 @@ async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analy
     let reader = app.store.reader();
     // A refused request is not recorded.
     check(reader, study).await?;
+    app.settle().await;
     let access = Access::AnalysisViewed { study: study.to_owned() };
     app.access_log(by.actor()).record(&access).await?;
     Ok(analyse(reader, study).await?)

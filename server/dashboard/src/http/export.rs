@@ -53,8 +53,7 @@ pub(super) async fn zip(
     Query(query): Query<ExportQuery>,
 ) -> Result<Response, Error> {
     let by = by.for_session(&app, session).await?;
-    // Otherwise the export of a session that has just ended would hold a recording without its end.
-    app.recordings.settle().await;
+    app.settle().await;
     let export = Export::prepare(&app.access_log(by), session, query.unblinded).await?;
     Ok(zip_download(folder_name(session, query.unblinded), async move |zip| export.into_zip(zip).await))
 }

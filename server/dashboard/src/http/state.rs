@@ -97,6 +97,12 @@ impl App {
         AccessLog::of_server(&self.store, by.into(), Arc::clone(&self.clock))
     }
 
+    /// Waits until the telemetry and the recording of a session that has just ended are stored, unless the disk takes
+    /// long. Whoever reads them before would miss their ends.
+    pub(super) async fn settle(&self) {
+        tokio::join!(self.recordings.settle(), self.store.settle_telemetry());
+    }
+
     /// The session on the screens, if it belongs to a study.
     pub(super) fn study_session(&self) -> Option<SessionId> {
         let view = self.operator_view.borrow();

@@ -50,7 +50,7 @@ pub(super) async fn start_study_export(
 ) -> Result<Json<StudyExportState>, Error> {
     by.personally()?;
     check(app.store.reader(), &study, wanted.unblinded).await?;
-    app.recordings.settle().await;
+    app.settle().await;
     Ok(Json(app.study_exports.start(app.access_log(by.actor()), &study, wanted.unblinded)))
 }
 

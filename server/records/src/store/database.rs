@@ -14,6 +14,7 @@ use sqlx::sqlite::{
     SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
 use tokio::sync::Mutex;
+use tokio::sync::mpsc::UnboundedSender;
 
 use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
@@ -24,6 +25,7 @@ use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
+use super::telemetry::Waiter;
 use super::values::nanoseconds;
 use super::writes::{Counts, Turn, Writes, write_on};
 use super::{Reader, Stamp, StoreError, chain};
@@ -70,6 +72,8 @@ pub(super) struct Inner {
     /// When this run began.
     pub(super) started: Stamp,
     pub(super) telemetry_counts: Counts,
+    /// Where those ask who wait for telemetry to be written; `None` before its writer runs.
+    pub(super) telemetry_waiters: std::sync::Mutex<Option<UnboundedSender<Waiter>>>,
     /// Width of the picture on the surgeon's tablet, pixels; 0 if none shows one.
     surgeon_picture: AtomicU32,
     pub(super) writes: Writes,
@@ -154,6 +158,7 @@ impl Store {
             run,
             started,
             telemetry_counts: Counts::default(),
+            telemetry_waiters: std::sync::Mutex::default(),
             surgeon_picture: AtomicU32::new(0),
             writes: Writes::default(),
             _lock: lock,

@@ -39,8 +39,8 @@ pub struct LensMotion {
 /// optimum, and whether the loop was held on request, for a pause or for a failed device.
 pub type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
 
-/// Figures of ended sessions, by session. Their telemetry no longer changes.
-pub type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<LensMotion>>>>;
+/// Figures of sessions, each with the number of the last row of telemetry that they come from.
+pub type KnownMotions = Arc<Mutex<BTreeMap<SessionId, (i64, Vec<LensMotion>)>>>;
 
 /// A setting's figures so far.
 #[derive(Default)]

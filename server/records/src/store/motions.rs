@@ -9,27 +9,33 @@ use super::{Reader, StoreError};
 use parfocal_base::ids::SessionId;
 
 impl Reader {
-    /// The same as [`Reader::motions`] for a session whose telemetry is complete. It is read once and then remembered,
-    /// because reading that of a whole study takes many seconds.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn motions_of_ended(&self, session: SessionId) -> Result<Vec<LensMotion>, StoreError> {
-        let remembered = self.ended.lock().unwrap_or_else(PoisonError::into_inner).get(&session).cloned();
-        if let Some(motions) = remembered {
-            return Ok(motions);
-        }
-
-        let motions = self.motions(session).await?;
-        self.ended.lock().unwrap_or_else(PoisonError::into_inner).insert(session, motions.clone());
-        Ok(motions)
-    }
-
-    /// How the lens was driven in each setting of `session` that has telemetry.
+    /// How the lens was driven in each setting of `session` that has telemetry. It is remembered until the session has
+    /// more telemetry, because reading that of a whole study takes many seconds.
     ///
     /// # Errors
     /// If the database fails.
     pub async fn motions(&self, session: SessionId) -> Result<Vec<LensMotion>, StoreError> {
+        // Read before the rest: what comes meanwhile is then read again.
+        let last: Option<i64> = sqlx::query_scalar(
+            "SELECT max((SELECT max(t.number) FROM telemetry AS t WHERE t.segment = s.number)) FROM segments AS s
+             WHERE session = ?",
+        )
+        .bind(session.to_string())
+        .fetch_one(self.pool())
+        .await?;
+        let Some(last) = last else { return Ok(Vec::new()) };
+
+        let known = self.motions.lock().unwrap_or_else(PoisonError::into_inner).get(&session).cloned();
+        if let Some((_, motions)) = known.filter(|(up_to, _)| *up_to == last) {
+            return Ok(motions);
+        }
+
+        let motions = self.read_motions(session).await?;
+        self.motions.lock().unwrap_or_else(PoisonError::into_inner).insert(session, (last, motions.clone()));
+        Ok(motions)
+    }
+
+    async fn read_motions(&self, session: SessionId) -> Result<Vec<LensMotion>, StoreError> {
         let segments: Vec<(i64, i64)> =
             sqlx::query_as("SELECT number, setting FROM segments WHERE session = ? ORDER BY setting")
                 .bind(session.to_string())

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
 use sqlx::{AssertSqlSafe, Connection as _, Row, migrate::Migrate};
 
-use super::motion::MotionsOfEnded;
+use super::motion::KnownMotions;
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::values::{moment, parsed, stamp, status};
 use super::{PathPoint, RunClocks, SessionLine, Stamp, StoreError};
@@ -42,8 +42,8 @@ const SESSION_LINES: &str = "SELECT session, wall, participant, protocol, practi
 #[derive(Clone, Debug)]
 pub struct Reader {
     pool: SqlitePool,
-    /// Figures from the telemetry of ended sessions, kept so that it is read only once.
-    pub(super) ended: MotionsOfEnded,
+    /// Figures from the telemetry of sessions, kept so that it is read only once.
+    pub(super) motions: KnownMotions,
 }
 
 impl Reader {
@@ -66,7 +66,7 @@ impl Reader {
     /// The same without the checks, for a database that the caller has made or checked.
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
         let pool = SqlitePoolOptions::new().max_connections(3).connect_with(reading(file)).await?;
-        Ok(Self { pool, ended: MotionsOfEnded::default() })
+        Ok(Self { pool, motions: KnownMotions::default() })
     }
 
     /// Opens a snapshot of the database `file`, which later writes do not change.
@@ -79,7 +79,7 @@ impl Reader {
     /// The same, for a database of any version.
     pub(super) async fn open_snapshot_unchecked(file: &Path) -> Result<Self, StoreError> {
         let pool = snapshot_pool(reading(there(file)?)).await?;
-        Ok(Self { pool, ended: MotionsOfEnded::default() })
+        Ok(Self { pool, motions: KnownMotions::default() })
     }
 
     /// A snapshot of the database, which later writes do not change. So everything that is read from it belongs
@@ -89,7 +89,7 @@ impl Reader {
     /// If the database fails.
     pub async fn snapshot(&self) -> Result<Self, StoreError> {
         let pool = snapshot_pool((*self.pool.connect_options()).clone()).await?;
-        Ok(Self { pool, ended: Arc::clone(&self.ended) })
+        Ok(Self { pool, motions: Arc::clone(&self.motions) })
     }
 
     pub(super) async fn check_version(&self) -> Result<(), StoreError> {

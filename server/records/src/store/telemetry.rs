@@ -2,12 +2,15 @@
 //! for it. Steps that belong to no setting of a session are deleted after a while.
 
 use std::collections::{BTreeSet, HashMap};
+use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use sqlx::sqlite::SqliteConnection;
-use tokio::sync::mpsc::Receiver;
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::select;
+use tokio::sync::mpsc::{Receiver, UnboundedReceiver, unbounded_channel};
+use tokio::sync::oneshot;
+use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::chain;
 use super::values::nanoseconds;
@@ -26,6 +29,8 @@ const BATCH_RECORDS: usize = 256;
 const MOST_WAITING: usize = 9_000;
 /// A failed batch is tried again after this time if no further record comes.
 const RETRY: Duration = Duration::from_secs(1);
+/// Whoever reads the telemetry of a session that has just ended waits at most this long for its last steps.
+const SETTLING: Duration = Duration::from_secs(5);
 /// Batches between two checkpoints: about every 16 s.
 const CHECKPOINT_BATCHES: u32 = 64;
 
@@ -35,16 +40,20 @@ pub const KEPT_OUTSIDE: i64 = 2_000_000;
 /// time, and few enough not to delay a comment.
 const LOOKED_AT: i64 = 4_000;
 
+/// Told when the steps that came before it are in the database.
+pub(super) type Waiter = oneshot::Sender<()>;
+
 /// Writes incoming steps until the sender is gone. A failing disk is logged, counted and tried again; it never ends
 /// this task.
 pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
+    let mut waiters = store.take_telemetry_waiters();
     let mut writer = Writer::default();
     let mut batches = 0_u32;
     let mut looked_at = 0;
     let mut open = true;
 
     while open {
-        open = writer.collect(&mut receiver).await;
+        open = writer.collect(&mut receiver, &mut waiters).await;
         writer.see(store.surgeon_picture());
         writer.flush(&store).await;
 
@@ -66,6 +75,8 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
 #[derive(Default)]
 struct Writer {
     waiting: Vec<StepRecord>,
+    /// Who waits for these steps to be written.
+    waiters: Vec<Waiter>,
     /// For each of them the width of the picture on the surgeon's tablet.
     seen: Vec<Option<u32>>,
     failing: bool,
@@ -77,31 +88,37 @@ struct Writer {
 }
 
 impl Writer {
-    /// Gathers the next batch. Returns `false` once the sender is gone. If an earlier batch could not be written,
-    /// returns after a while even without a new record, as when the camera is silent, so that it is tried again.
-    async fn collect(&mut self, receiver: &mut Receiver<StepRecord>) -> bool {
-        let first = if self.waiting.is_empty() {
-            receiver.recv().await
-        } else {
-            match timeout(RETRY, receiver.recv()).await {
-                Ok(first) => first,
-                Err(_) => return true,
-            }
-        };
-        let Some(first) = first else { return false };
-        self.waiting.push(first);
+    /// Gathers the next batch, until it is large or old enough or somebody waits for it. Returns `false` once the sender
+    /// is gone. If an earlier batch could not be written, returns after a while even without a new record, as when the
+    /// camera is silent, so that it is tried again.
+    async fn collect(&mut self, steps: &mut Receiver<StepRecord>, waiters: &mut UnboundedReceiver<Waiter>) -> bool {
+        let failed_before = !self.waiting.is_empty();
+        select! {
+            first = steps.recv() => match first {
+                Some(first) => self.waiting.push(first),
+                None => return false,
+            },
+            Some(waiter) = waiters.recv() => self.waiters.push(waiter),
+            () = sleep(RETRY), if failed_before => return true,
+        }
 
         let end = Instant::now() + BATCH_TIME;
         let enough = self.waiting.len() + BATCH_RECORDS;
-        while self.waiting.len() < enough {
+        while self.waiting.len() < enough && self.waiters.is_empty() {
             let room = enough - self.waiting.len();
-            match timeout_at(end, receiver.recv_many(&mut self.waiting, room)).await {
-                Ok(0) => return false,
-                Ok(_) => {}
-                Err(_) => break,
+            select! {
+                came = steps.recv_many(&mut self.waiting, room) => if came == 0 { return false },
+                Some(waiter) = waiters.recv() => self.waiters.push(waiter),
+                () = sleep_until(end) => break,
             }
         }
 
+        // Who waits, waits for every step that came before them.
+        while !self.waiters.is_empty()
+            && let Ok(step) = steps.try_recv()
+        {
+            self.waiting.push(step);
+        }
         true
     }
 
@@ -119,6 +136,10 @@ impl Writer {
                 self.latest = self.waiting.iter().map(|record| record.exposed_at).fold(self.latest, Moment::max);
                 self.waiting.clear();
                 self.seen.clear();
+                for waiter in self.waiters.drain(..) {
+                    // They may have given up.
+                    let _gone = waiter.send(());
+                }
                 if std::mem::take(&mut self.failing) {
                     tracing::info!("telemetry is being written again");
                 }
@@ -168,6 +189,27 @@ impl Writer {
 }
 
 impl Store {
+    /// Waits until the steps that the loop has taken so far are in the database, unless the disk takes long. Until then,
+    /// the telemetry of a session that has just ended lacks its last steps.
+    pub async fn settle_telemetry(&self) {
+        let (waiter, written) = oneshot::channel();
+        let asked = {
+            let waiters = self.inner.telemetry_waiters.lock().unwrap_or_else(PoisonError::into_inner);
+            waiters.as_ref().is_some_and(|waiters| waiters.send(waiter).is_ok())
+        };
+        // The writer has ended if it does not answer; then everything is written.
+        if asked && timeout(SETTLING, written).await.is_err() {
+            tracing::warn!("the last telemetry is still being written");
+        }
+    }
+
+    /// Those who wait for the writer from now on.
+    fn take_telemetry_waiters(&self) -> UnboundedReceiver<Waiter> {
+        let (sender, waiters) = unbounded_channel();
+        *self.inner.telemetry_waiters.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender);
+        waiters
+    }
+
     /// Deletes steps that belong to no setting of a session, among the `count` steps after step `from`, but never one
     /// of the latest `kept`. Returns the last step that it looked at, which is the next `from`.
     ///

@@ -112,7 +112,7 @@ async fn read_session(
         surgeon: session.surgeon().to_owned(),
         site: session.site.clone(),
         settings: settings.collect(),
-        motions: reader.motions_of_ended(session.session).await?,
+        motions: reader.motions(session.session).await?,
         comments: comments(reader, session, &corrections, &erased).await?,
         answers: answers(reader, clocks, session, &corrections, &erased).await?,
     };
