@@ -175,6 +175,9 @@ def test_what_a_package_lacks_of_a_session_is_noticed(tmp_path: Path) -> None:
     export = parfocal.load(package, verify="checksums")
     first, second = export.sessions
     assert set(export["telemetry"]["session"]) == {first, second}
+    columns = export.columns("telemetry")
+    assert list(columns.index) == list(export["telemetry"].columns)
+    assert columns["description"].str.len().gt(0).all()
 
     telemetry = package / "sessions" / first / "telemetry.csv"
     telemetry.write_bytes(b"".join(telemetry.read_bytes().splitlines(keepends=True)[:-1]))

@@ -39,6 +39,9 @@ _MOST = (1 << 63) - 1
 # Tables with a row for each frame. In a study's package only the sessions' own exports have them as CSV.
 _LONG = ("telemetry", "policy_steps")
 
+# The columns that tell apart the rows of a package's sessions, in their order.
+_OF_SESSIONS = ("site", "session")
+
 
 class _Files:
     """The files of an export, in a folder or a ZIP file, without those that operating systems add."""
@@ -222,8 +225,21 @@ class Export(Mapping[str, pd.DataFrame]):
         if name in self._resources:
             return self._resources[name]
         if name in self._joined:
-            return next(export._resources[name] for export in self.sessions.values() if name in export)
+            return self._joined_resource(name)
         raise KeyError(f"{name}: the export has no such table; it has {', '.join(self)}")
+
+    def _joined_resource(self, name: str) -> dict[str, Any]:
+        """Return the description of a joined table: its own columns, after those that tell its sessions apart."""
+        own = next(export._resources[name] for export in self.sessions.values() if name in export)
+        fields = self._fields(own)
+        known = {field["name"] for field in fields}
+        added = [
+            field
+            for field in self._fields(self._resource("sessions"))
+            if field["name"] in _OF_SESSIONS and field["name"] not in known
+        ]
+        added.sort(key=lambda field: _OF_SESSIONS.index(field["name"]))
+        return {**own, "schema": {**own.get("schema", {}), "fields": added + fields}}
 
     @staticmethod
     def _fields(resource: dict[str, Any]) -> list[dict[str, Any]]:
@@ -323,8 +339,7 @@ def _package(files: _Files, parent: str) -> dict[str, Any]:
     about = package.get("parfocal") if isinstance(package, dict) else None
     if not isinstance(about, dict):
         raise BadExport(f"{files.path} is a data package, but not one that parfocal wrote.")
-    # The first format did not yet state itself.
-    form = about.get("format", 1)
+    form = about.get("format")
     if not isinstance(form, int) or form > NEWEST_FORMAT:
         raise BadExport(
             f"{files.path} has format {form} and was written by parfocal {about.get('version', 'of another version')}; "

@@ -225,10 +225,15 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     lock["despite_outstanding"] = true.into();
     let page =
         async || server.look("researcher", &format!("/researcher/sessions/{}", session.as_str().unwrap())).await.1;
-    assert!(page().await.contains("correct-answer"));
+    // No other code is known, and nothing was answered.
+    let unlocked = page().await;
+    let offered = unlocked.contains("correct-participant") || unlocked.contains("correct-answer");
+    assert!(unlocked.contains("their code is added on the operator’s page first") && !offered, "{unlocked}");
+    server.post("/api/operator/participants", json!({"code": "S-09"})).await;
+    assert!(page().await.contains("correct-participant"));
     server.post(changes, lock).await;
     let locked = page().await;
-    assert!(locked.contains("The study is locked") && !locked.contains("correct-answer"), "{locked}");
+    assert!(locked.contains("The study is locked") && !locked.contains("correct-participant"), "{locked}");
     assert_eq!(refused(&server, "researcher", changes, signed("unblind")).await.0, 403);
 
     // The definition names who may unblind.

@@ -80,7 +80,7 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
 
     // If it cannot be written, it fails with a reason, is not recorded, and can be tried again.
     std::fs::write(&exports, "").unwrap();
-    assert_eq!(server.post(EXPORT, json!({})).await["state"], "running");
+    server.post(EXPORT, json!({})).await;
     let failed = ended(&server).await;
     assert!(failed["state"] == "failed" && failed["reason"].as_str().unwrap().contains("study-exports"), "{failed}");
     std::fs::remove_file(&exports).unwrap();

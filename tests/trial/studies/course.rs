@@ -329,9 +329,15 @@ async fn a_session_under_the_wrong_code_counts_for_the_right_surgeon_once_it_is_
     let mut trial = opened(folder.path()).await;
     let session = whole(&mut trial, "S-02", "leeds").await;
     assert!(refusal(prepare(&trial, "S-02", "leeds").await).contains("S-02"));
-    let change_to_s03 = FieldChange::Participant { old: "S-02".to_owned(), new: "S-03".to_owned() };
-    let correction = NewCorrection { change: change_to_s03, reason: "the wrong code was chosen".to_owned() };
-    trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+    let correct = async |old: &str, new: &str| {
+        let change = FieldChange::Participant { old: old.to_owned(), new: new.to_owned() };
+        let correction = NewCorrection { change, reason: "the wrong code was chosen".to_owned() };
+        trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+    };
+    correct("S-02", "S-03").await;
+    correct("S-03", "S-02").await;
+    assert_eq!(detail(&trial).await.study_sessions[0].corrected_participant, None, "it is the first code again");
+    correct("S-02", "S-03").await;
 
     assert!(refusal(prepare(&trial, "S-03", "leeds").await).contains("S-03"));
     whole(&mut trial, "S-02", "leeds").await;

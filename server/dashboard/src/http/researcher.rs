@@ -153,6 +153,12 @@ impl SessionPage {
         })
     }
 
+    /// Whether there are answers that can be corrected. A surgeon's own words cannot.
+    fn has_correctable_answers(&self) -> bool {
+        let line = &self.detail.line;
+        !line.withdrawn && self.detail.answers.iter().any(|answer| !matches!(answer.value, AnswerValue::Text(_)))
+    }
+
     fn ended(&self) -> bool {
         self.detail.line.status != SessionStatus::UnderWay
     }

@@ -34,8 +34,8 @@ const SESSION_LINES: &str = "SELECT session, wall, participant, protocol, practi
              (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
                  AS emergency,
              EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
-             (SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
-                 ORDER BY number DESC LIMIT 1) AS corrected_participant
+             nullif((SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
+                 ORDER BY number DESC LIMIT 1), s.participant) AS corrected_participant
          FROM sessions AS s";
 
 /// A database open for reading. Clone freely.

@@ -118,7 +118,7 @@ pub struct SessionLine {
     pub created: Timestamp,
     /// Code of the participant, as it was recorded.
     pub participant: String,
-    /// Corrected code of the participant; none if it was not corrected.
+    /// Corrected code of the participant; none if it was not corrected, or back to the first one.
     pub corrected_participant: Option<String>,
     /// Name of the protocol.
     pub protocol: String,

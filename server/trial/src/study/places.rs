@@ -18,7 +18,7 @@ pub struct Enrolled {
     pub session: SessionId,
     /// The participant's code.
     pub participant: String,
-    /// The corrected code; none if it was not corrected.
+    /// The corrected code; none if it was not corrected, or back to the first one.
     pub corrected_participant: Option<String>,
     /// Name of the site.
     pub site: String,

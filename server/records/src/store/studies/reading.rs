@@ -83,8 +83,8 @@ impl Reader {
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'aborted') AS aborted,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'unblinded') AS unblinded,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn,
-                 (SELECT new_value FROM corrections AS c WHERE c.session = m.session AND field = 'participant'
-                     ORDER BY number DESC LIMIT 1) AS corrected_participant
+                 nullif((SELECT new_value FROM corrections AS c WHERE c.session = m.session AND field = 'participant'
+                     ORDER BY number DESC LIMIT 1), s.participant) AS corrected_participant
              FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid";
         self.rows(sql, &study, enrolled).await
     }

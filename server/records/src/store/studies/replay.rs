@@ -103,7 +103,10 @@ fn apply(enrolled: &mut Enrolled, change: &Change) {
         Change::Aborted => enrolled.status = SessionStatus::Aborted,
         Change::Unblinded => enrolled.unblinded = true,
         Change::Withdrawn => enrolled.withdrawn = true,
-        Change::Corrected(participant) => enrolled.corrected_participant = Some(participant.clone()),
+        // A code that was corrected back is the first one again.
+        Change::Corrected(participant) => {
+            enrolled.corrected_participant = Some(participant.clone()).filter(|code| *code != enrolled.participant);
+        }
     }
 }
 
