@@ -80,9 +80,9 @@ fn tables(folder: &Path, sources: &[PackageSource]) -> Result<Verdict, String> {
     }
 
     let left_out = left_out(folder).map_err(|error| error.to_string())?;
-    let again = tempfile::tempdir().map_err(|error| format!("a temporary folder: {error}"))?;
-    let again = again.path().join("package");
-    write(sources, Sessions::Copied, &left_out, &again, &mut |_, _| ()).map_err(|error| error.to_string())?;
+    let temporary = tempfile::tempdir().map_err(|error| format!("a temporary folder: {error}"))?;
+    let again = temporary.path().join("package");
+    write(sources, Sessions::Linked, &left_out, &again, &mut |_, _| ()).map_err(|error| error.to_string())?;
 
     let listed = std::fs::read_to_string(folder.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
     let joined = std::fs::read_to_string(again.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;

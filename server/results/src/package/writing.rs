@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufWriter, Write};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -43,6 +44,9 @@ pub enum Sessions {
     Copied,
     /// They are moved into the package, which must be on the same disk. If writing the package fails, they are lost.
     Moved,
+    /// They stay where they are, and the package has symbolic links to them: for a check, which compares the package and
+    /// removes it.
+    Linked,
 }
 
 /// Writes the package of `sources` to the folder `out`, which must be new or empty and appears complete or not at all.
@@ -161,13 +165,16 @@ fn join_tables(
 
 /// Puts an export into the package `folder`. Returns the export at its new place.
 fn take(source: &PackageSource, sessions: Sessions, folder: &Path) -> Result<PackageSource, PackageError> {
+    let above = folder.join(SESSIONS);
+    fs::create_dir_all(&above).map_err(PackageError::unwritable(&above))?;
+
     let place = folder.join(source.place());
     match sessions {
         Sessions::Copied => copy_folder(&source.folder, &place)?,
-        Sessions::Moved => {
-            let above = folder.join(SESSIONS);
-            fs::create_dir_all(&above).map_err(PackageError::unwritable(&above))?;
-            fs::rename(&source.folder, &place).map_err(PackageError::unwritable(&place))?;
+        Sessions::Moved => fs::rename(&source.folder, &place).map_err(PackageError::unwritable(&place))?,
+        Sessions::Linked => {
+            let whole = fs::canonicalize(&source.folder).map_err(PackageError::unreadable(&source.folder))?;
+            symlink(whole, &place).map_err(PackageError::unwritable(&place))?;
         }
     }
     Ok(source.at(place))
