@@ -61,6 +61,7 @@ Object.assign(globalThis, {
 
 const { get, post } = await import("../static/shared/api.js");
 await import("../static/shared/sign_in.js");
+const { tellTrouble } = await import("../static/shared/trouble.js");
 
 /** The server's answers, in order. @type {{ status: number, body: unknown }[]} */
 const answers = [];
@@ -102,4 +103,18 @@ test("a dialog that was cancelled opens again only for what somebody does, until
 
   await look();
   assert.ok(dialog().open, "a sign-in that ends later is asked for again");
+});
+
+test("what was refused because nobody was signed in is no longer said once somebody is", async () => {
+  const refused = new FakeElement();
+  const wrong = new FakeElement();
+  const told = (/** @type {any} */ element) => (/** @type {unknown} */ error) => tellTrouble(element, error);
+  await post("/api/operator/focus", { focal_power: 0.5 }).catch(told(refused));
+  answers.push({ status: 409, body: { error: "a session is under way" } });
+  await post("/api/operator/focus", { focal_power: 0.5 }).catch(told(wrong));
+  assert.deepEqual([refused.textContent, wrong.textContent], ["no", "a session is under way"]);
+
+  answers.push({ status: 200, body: { display: "Dr Ada", role: "operator" } });
+  await send();
+  assert.deepEqual([refused.textContent, wrong.textContent], ["", "a session is under way"]);
 });

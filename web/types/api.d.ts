@@ -2675,7 +2675,7 @@ export interface components {
              * @description Number of comments that the surgeon did not take back.
              */
             comments: number;
-            /** @description Corrected code of the participant; none if it was not corrected. */
+            /** @description Corrected code of the participant; none if it was not corrected, or back to the first one. */
             corrected_participant?: string | null;
             /** @description When the session was made, by the server's wall clock. */
             created: string;
@@ -3012,7 +3012,7 @@ export interface components {
         };
         /** @description A session of a study. */
         StudySession: {
-            /** @description The corrected code; none if it was not corrected. */
+            /** @description The corrected code; none if it was not corrected, or back to the first one. */
             corrected_participant?: string | null;
             /** @description The participant's code. */
             participant: string;

@@ -1269,7 +1269,7 @@ class SessionDetail(TypedDict):
     """Number of comments that the surgeon did not take back."""
 
     corrected_participant: NotRequired[str | None]
-    """Corrected code of the participant; none if it was not corrected."""
+    """Corrected code of the participant; none if it was not corrected, or back to the first one."""
 
     created: str
     """When the session was made, by the server's wall clock."""
@@ -1352,7 +1352,7 @@ class SessionLine(TypedDict):
     """Number of comments that the surgeon did not take back."""
 
     corrected_participant: NotRequired[str | None]
-    """Corrected code of the participant; none if it was not corrected."""
+    """Corrected code of the participant; none if it was not corrected, or back to the first one."""
 
     created: str
     """When the session was made, by the server's wall clock."""
@@ -1715,7 +1715,7 @@ class StudySession(TypedDict):
     """A session of a study."""
 
     corrected_participant: NotRequired[str | None]
-    """The corrected code; none if it was not corrected."""
+    """The corrected code; none if it was not corrected, or back to the first one."""
 
     participant: str
     """The participant's code."""

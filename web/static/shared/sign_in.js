@@ -5,7 +5,7 @@
 
 import { inWords, keep, onSignInNeeded, post } from "./api.js";
 import { make, setText } from "./dom.js";
-import { tellTrouble } from "./trouble.js";
+import { serverAnswered, tellTrouble } from "./trouble.js";
 
 /** @type {HTMLDialogElement | null} */
 let dialog = null;
@@ -84,6 +84,7 @@ function makeDialog() {
       setText(trouble, "");
       passphrase.value = "";
       dialog?.close();
+      serverAnswered();
       document.dispatchEvent(new Event("signed-in"));
     } catch (error) {
       setText(trouble, inWords(error));

@@ -1,5 +1,5 @@
-// Messages on a page that say why something was not done. If the server did not answer, they disappear when it answers
-// again.
+// Messages on a page that say why something was not done. If the server did not answer, or nobody was signed in, they
+// disappear once that has changed.
 
 import { inWords, Refused } from "./api.js";
 import { setText } from "./dom.js";
@@ -15,7 +15,7 @@ const waiting = new Set();
  * @param {string} [noAnswer] the text if the server did not answer
  */
 export function tellTrouble(element, error, noAnswer) {
-  if (error instanceof Refused) tell(element, inWords(error));
+  if (error instanceof Refused && !error.needsSignIn) tell(element, inWords(error));
   else tellUntilAnswered(element, inWords(error, noAnswer));
 }
 
