@@ -25,9 +25,8 @@ use super::insert::Insert;
 use super::lock::{FolderLock, LOCK};
 use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
-use super::telemetry::Waiter;
 use super::values::nanoseconds;
-use super::writes::{Counts, Turn, Writes, write_on};
+use super::writes::{Counts, Turn, Waiter, Writes, write_on};
 use super::{Reader, Stamp, StoreError, chain};
 
 /// A start of the server, and what it ran with.

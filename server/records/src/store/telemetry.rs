@@ -14,6 +14,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::chain;
 use super::values::nanoseconds;
+use super::writes::Waiter;
 use super::{Store, StoreError};
 use parfocal_base::FocalPower;
 use parfocal_base::PolicyName;
@@ -39,9 +40,6 @@ pub const KEPT_OUTSIDE: i64 = 2_000_000;
 /// Steps that are looked at between two checkpoints to delete those of no setting. This is more than arrive in that
 /// time, and few enough not to delay a comment.
 const LOOKED_AT: i64 = 4_000;
-
-/// Told when the steps that came before it are in the database.
-pub(super) type Waiter = oneshot::Sender<()>;
 
 /// Writes incoming steps until the sender is gone. A failing disk is logged, counted and tried again; it never ends
 /// this task.

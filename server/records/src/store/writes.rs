@@ -9,7 +9,7 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::histogram::Histogram;
 use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
-use tokio::sync::MutexGuard;
+use tokio::sync::{MutexGuard, oneshot};
 use tokio::time::Instant;
 
 use super::StoreError;
@@ -31,6 +31,9 @@ pub struct Counts {
     /// Records dropped because the disk failed for too long.
     pub lost: AtomicU64,
 }
+
+/// Somebody who waits for telemetry. Told when the steps that came before it are in the database.
+pub(super) type Waiter = oneshot::Sender<()>;
 
 /// How writing to the database went since the server's start.
 #[derive(Debug)]
