@@ -133,3 +133,38 @@ def test_what_cannot_be_opened_is_refused_with_a_sentence(made: Path, tmp_path: 
     (copy / "zarr.json").write_text("{")
     with pytest.raises(parfocal.BadRecording, match=r"cannot be opened.*recording info"):
         parfocal.open_recording(copy)
+
+
+def flip(file: Path, at: int) -> None:
+    content = bytearray(file.read_bytes())
+    content[at] ^= 0x10
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["mosaic/c/0/0/0", "cell_row/c/0", "focal_power_asked/c/0"])
+def test_a_file_that_was_not_copied_is_named_and_not_read_as_zeros(
+    made: Path, tmp_path: Path, name: str
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(made, copy)
+    (copy / name).unlink()
+    with pytest.raises(parfocal.BadRecording, match=f"copy lacks its file {name}"):
+        parfocal.open_recording(copy)
+
+
+def test_damage_is_told_with_the_recordings_folder(made: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(made, copy)
+    flip(copy / "mosaic" / "c" / "0" / "0" / "0", -1)  # The checksum of the places of all frames.
+    recording = parfocal.open_recording(copy)
+    with pytest.raises(parfocal.BadRecording, match=r"copy cannot be read.*recording info"):
+        recording.isel(frame=slice(0, 2)).rgb(1)
+
+    flip(copy / "red" / "c" / "0", 3)
+    with pytest.raises(parfocal.BadRecording, match=r"copy cannot be read.*recording info"):
+        parfocal.open_recording(copy)
+    flip(copy / "red" / "c" / "0", 3)
+
+    (copy / "calibration" / "calibration.toml").write_text("")
+    with pytest.raises(parfocal.BadRecording, match=r"calibration.toml is empty"):
+        parfocal.open_recording(copy)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import itertools
+import json
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +47,9 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
 
     def cube(self, frame: int) -> xr.DataArray:
         """Return the raw counts of one frame as a cube: cell_y, cell_x, wavelength."""
-        return self._cube(self._frame(frame)).astype(np.uint16).rename("counts").assign_attrs(units="count")
+        with self._reading():
+            cube = self._cube(self._frame(frame)).astype(np.uint16)
+        return cube.rename("counts").assign_attrs(units="count")
 
     def reflectance(self, frame: int | None = None) -> xr.DataArray:
         """Return reflectances, 0 for dark and 1 for the white reference: of one frame, or of all.
@@ -57,7 +63,8 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
                 "The recording has no white reference, so its counts say nothing about reflectance. Use cube() for "
                 "counts, or record again with a calibration of 'parfocal calibrate'."
             )
-        balanced = self._balanced(frame)
+        with self._reading():
+            balanced = self._balanced(frame)
         correction = self._correction()
         if not np.array_equal(correction, np.eye(_BANDS)):
             rows = xr.DataArray(correction, dims=["wavelength", "from_wavelength"])
@@ -69,10 +76,24 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
     def rgb(self, frame: int) -> npt.NDArray[np.uint8]:
         """Return one frame's picture in sRGB, one pixel a mosaic cell: height, width, 3."""
         weights = np.stack([self[colour].to_numpy() for colour in ("red", "green", "blue")], axis=-1)
-        linear = np.clip(self._balanced(frame).to_numpy() @ weights.astype(np.float32), 0.0, 1.0)
+        with self._reading():
+            balanced = self._balanced(frame).to_numpy()
+        linear = np.clip(balanced @ weights.astype(np.float32), 0.0, 1.0)
         encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         picture: npt.NDArray[np.uint8] = np.rint(255.0 * encoded).astype(np.uint8)
         return picture
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Turn the errors of damaged files into one that names the recording."""
+        try:
+            yield
+        except (OSError, RuntimeError, ValueError) as error:
+            folder = self.encoding.get("source", "The recording")
+            raise BadRecording(
+                f"{folder} cannot be read: {str(error).rstrip('.')}. 'parfocal recording info' says which frames are damaged; copy "
+                "the recording again, or leave them out."
+            ) from error
 
     def _frame(self, frame: int) -> xr.DataArray:
         count = self.sizes["frame"]
@@ -156,16 +177,50 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
     if missing:
         raise BadRecording(f"{folder} lacks its array '{min(missing)}'. Copy the recording again.")
 
+    _check_files(folder)
+    dataset = _with_values(folder, dataset)
     arrays = {str(name): dataset[name].variable for name in dataset.data_vars}
     coordinates = {str(name): dataset[name].variable for name in dataset.coords}
-    return Recording({**arrays, **_references(folder, dataset)}, coords=coordinates, attrs=attributes)
+    recording = Recording({**arrays, **_references(folder, dataset)}, coords=coordinates, attrs=attributes)
+    recording.encoding["source"] = str(folder)
+    return recording
+
+
+def _check_files(folder: Path) -> None:
+    """Refuse a recording that lacks a file. Zarr would give zeros for what was in it, without a word."""
+    described = json.loads((folder / "zarr.json").read_text(encoding="utf-8"))
+    for name, array in described["consolidated_metadata"]["metadata"].items():
+        chunk = array["chunk_grid"]["configuration"]["chunk_shape"]
+        counts = [-(-length // size) for length, size in zip(array["shape"], chunk, strict=True)]
+        for place in itertools.product(*map(range, counts)):
+            file = Path(name, "c", *map(str, place))
+            if not (folder / file).is_file():
+                others = "; if there is no other copy, 'parfocal recording cube' reads the other frames"
+                raise BadRecording(
+                    f"{folder} lacks its file {file}. Copy the recording again{others if name == 'mosaic' else ''}."
+                )
+
+
+def _with_values(folder: Path, dataset: xr.Dataset) -> xr.Dataset:
+    """Read all but the mosaics now, so that damage is noticed here."""
+    try:
+        values = dataset.drop_vars("mosaic").load()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise BadRecording(
+            f"{folder} cannot be read: {str(error).rstrip('.')}. Copy the recording again; "
+            f"'parfocal recording info {folder}' says what is damaged."
+        ) from error
+    return values.assign(mosaic=dataset["mosaic"])
 
 
 def _references(folder: Path, dataset: xr.Dataset) -> dict[str, xr.Variable]:
     """Read dark, white and the spectral correction from the recording's own calibration."""
     file = folder / "calibration" / "calibration.toml"
     try:
-        calibration = tomllib.loads(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
+        if not text.strip():
+            raise BadRecording(f"{file} is empty. Copy the recording again.")
+        calibration = tomllib.loads(text)
         return _calibrated(file, calibration, dataset)
     except FileNotFoundError:
         raise BadRecording(f"{folder} lacks its calibration ({file}). Copy the recording again.") from None
