@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::time::Duration;
 
@@ -62,6 +63,10 @@ pub fn failed(checks: &[Check]) -> Vec<&str> {
     checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).map(|check| check.name).collect()
 }
 
+pub fn is_its_owners_alone(folder: &Path) -> bool {
+    folder.metadata().unwrap().permissions().mode() & 0o077 == 0
+}
+
 #[tokio::test]
 async fn a_blinded_export_holds_everything_but_the_policies() {
     let data = tempfile::tempdir().unwrap();
@@ -69,6 +74,7 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     let out = data.path().join("export");
     let summary = export(&trial.access_log(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
+    assert!(is_its_owners_alone(&out), "no other account of the machine may read what was said");
 
     // The blur rate of the optics that the policies were given.
     assert_eq!(rows(&out, "runs")[0]["blur"], "6.2");

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::program::{command, done, parfocal, refused, text};
 use super::*;
-use crate::exports::{failed, json, rows};
+use crate::exports::{failed, is_its_owners_alone, json, rows};
 
 /// A text longer than one segment of an SPSS string, with multi-byte characters where its segments meet.
 fn long_text() -> String {
@@ -69,6 +69,7 @@ async fn package(folder: &Path) -> PathBuf {
     data_of(&data, 5, &["leeds", "leeds", "london"]).await;
     let out = folder.join("package");
     exported(&data, &out, &["--unblinded"]);
+    assert!(is_its_owners_alone(&out), "it has the policies");
     out
 }
 

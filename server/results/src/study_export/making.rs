@@ -19,7 +19,7 @@ use parfocal_base::files::{files_below, folder_of};
 use parfocal_base::ids::SessionId;
 use parfocal_base::priority;
 use parfocal_recording::room;
-use parfocal_records::store::export::{Export, check_new};
+use parfocal_records::store::export::{Export, check_new, private_folder};
 use parfocal_records::store::{AccessLog, Reader};
 use parfocal_trial::study::places::Enrolled;
 use parfocal_trial::study::stage::Stage;
@@ -147,7 +147,7 @@ impl Making {
         let parent = folder_of(&self.out);
         let unwritable = |error| StudyExportError::unwritable(parent, &error);
         std::fs::create_dir_all(parent).map_err(unwritable)?;
-        let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;
+        let exports = private_folder(parent, ".parfocal-exports-").map_err(unwritable)?;
 
         let sources = self.export_sessions(runtime, exports.path())?;
         // The joined tables take about as much space again as the exports.

@@ -1,7 +1,8 @@
 //! Where an export goes: a folder that appears whole or not at all, or a ZIP file that is sent while it is made.
 
-use std::fs::File;
+use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Read, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -91,6 +92,15 @@ pub fn check_new(out: &Path) -> Result<(), ExportError> {
     if is_new_or_empty(out).map_err(unwritable)? { Ok(()) } else { Err(ExportError::Exists(out.to_owned())) }
 }
 
+/// Makes a folder in `parent` that only its owner can look into. Its name begins with `prefix`. What participants said
+/// goes into it, and perhaps the policies.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn private_folder(parent: &Path, prefix: &str) -> io::Result<TempDir> {
+    tempfile::Builder::new().prefix(prefix).permissions(Permissions::from_mode(0o700)).tempdir_in(parent)
+}
+
 /// A folder being written, beside its place and under another name until it is complete.
 pub struct NewFolder {
     out: PathBuf,
@@ -108,7 +118,7 @@ impl NewFolder {
         check_new(out)?;
         let parent = folder_of(out);
         std::fs::create_dir_all(parent).map_err(unwritable)?;
-        let temporary = tempfile::Builder::new().prefix(".parfocal-export-").tempdir_in(parent).map_err(unwritable)?;
+        let temporary = private_folder(parent, ".parfocal-export-").map_err(unwritable)?;
         Ok(Self { out: out.to_owned(), temporary, file: None })
     }
 

@@ -24,7 +24,7 @@ pub(super) use self::description::{
     AccessRow, ActorRow, ChainRow, ChainSaltRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, PolicyStepRow,
     RunRow, StudyEventRow, TelemetryRow, VoicePieceRow, WeightsRow, WithdrawalRow,
 };
-pub use self::destination::{NewFolder, ZipStream, check_new};
+pub use self::destination::{NewFolder, ZipStream, check_new, private_folder};
 pub use self::error::ExportError;
 pub use self::folder::Folder;
 pub use self::table::{Cell, Meaning, Row, means, table};
