@@ -39,10 +39,11 @@ impl Protocol {
     /// # Errors
     /// If the text is not a valid protocol. The error describes the first fault, with its line and key.
     pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
-        parse(source, known).map_err(|fault| fault.in_file(file, source))
+        parse(source, known, known).map_err(|fault| fault.in_file(file, source))
     }
 
-    /// Reads a protocol that was stored with a session or a study. It may name policies that this version lacks.
+    /// Reads a protocol that was stored with a session or a study. It may name policies that this version lacks, and
+    /// its texts are those that surgeons have read, whatever this version refuses in a new one.
     ///
     /// # Errors
     /// If this version cannot read the protocol for another reason.
@@ -54,7 +55,7 @@ impl Protocol {
 
         let kept: Result<Policies, Fault> = toml::from_str(source).map_err(Fault::from);
         let Policies { policies } = kept.map_err(|fault| fault.in_file(file, source))?;
-        Self::parse(source, file, &policies)
+        parse(source, &policies, &[]).map_err(|fault| fault.in_file(file, source))
     }
 }
 
@@ -162,11 +163,11 @@ impl FileQuestion {
     }
 }
 
-/// Reads and checks `source`.
-fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
+/// Reads and checks `source`. `known` are the available policies, `secret` those that no text for surgeons may name.
+fn parse(source: &str, known: &[PolicyName], secret: &[PolicyName]) -> Result<Protocol, Fault> {
     let file: File = toml::from_str(source)?;
     let language = language(file.language.as_ref())?;
-    let reader = Reader { known, language };
+    let reader = Reader { known, secret, language };
     identifier(&file.name, "name")?;
 
     let policies = reader.policies(&file.policies)?;
@@ -338,6 +339,7 @@ pub(crate) fn identifier(value: &Spanned<String>, key: &str) -> Result<(), Fault
 
 struct Reader<'a> {
     known: &'a [PolicyName],
+    secret: &'a [PolicyName],
     language: Language,
 }
 
@@ -367,7 +369,7 @@ impl Reader<'_> {
     /// Checks a text for surgeons: it must be neither empty nor too long, and must not name a policy.
     fn shown(&self, value: &Spanned<String>, key: &str) -> Result<String, Fault> {
         let text = text(value, key, LONGEST_TEXT)?;
-        match named_policy(&text, self.known) {
+        match named_policy(&text, self.secret) {
             None => Ok(text),
             Some(name) => {
                 Err(Fault::new(value.span(), key, format!("names the policy '{name}', which surgeons must not know")))

@@ -144,15 +144,22 @@ impl Protocol {
     }
 }
 
-/// The first of `policies` that `text` names, in upper or lower case. A name of letters alone ("fixed") is also an
-/// ordinary word, which texts may use.
+/// The first of `policies` that `text` names, in upper or lower case, and with dashes, spaces or other signs between the
+/// words. A name of letters alone ("fixed") is also an ordinary word, which texts may use.
 pub(crate) fn named_policy<'a>(
     text: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
 ) -> Option<&'a PolicyName> {
-    let text = text.to_lowercase();
+    let text = words(text);
     let is_word = |policy: &PolicyName| policy.as_str().chars().all(char::is_alphabetic);
-    policies.into_iter().find(|policy| !is_word(policy) && text.contains(&policy.as_str().to_lowercase()))
+    policies.into_iter().find(|policy| !is_word(policy) && text.contains(&words(policy.as_str())))
+}
+
+/// The words of `text` in lower case, with one dash between each and the next.
+fn words(text: &str) -> String {
+    let text = text.to_lowercase();
+    let words: Vec<&str> = text.split(|sign: char| !sign.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    words.join("-")
 }
 
 #[cfg(test)]
@@ -355,6 +362,17 @@ mod tests {
         let said =
             error(&PAPER.replace("text = \"How does the focus feel now?\"", "text = \"Is MGM-hill-climber good?\""));
         assert!(said.contains("mgm-hill-climber") && said.contains("must not know"), "{said}");
+
+        for spelt in ["the MGM hill climber", "mgm\u{2011}hill\u{2011}climber", "MGM  hill-climber"] {
+            let said = error(&PAPER.replace("How does the focus feel now?", spelt));
+            assert!(said.contains("names the policy 'mgm-hill-climber'"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_protocol_that_was_kept_is_read_though_a_new_one_would_be_refused() {
+        let kept = PAPER.replace("How does the focus feel now?", "How is the MGM hill climber?");
+        Protocol::parse_kept(&kept, "the protocol of a session").unwrap();
     }
 
     #[test]
