@@ -1,8 +1,8 @@
 //! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged, and matches its
 //! commitments.
 
-use std::fs::File;
-use std::io::Read;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -32,9 +32,7 @@ pub struct Arguments {
 /// If a check failed.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.path;
-    if !path.exists() {
-        bail!("{} does not exist; give an export, a data folder or a database", path.display());
-    }
+    look_at(path)?;
 
     if begins_with(path, b"PK\x03\x04") {
         bail!(
@@ -62,6 +60,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Err(format!("{failed} of {} checks failed: do not rely on this {what}", checks.len()).into())
 }
 
+/// Fails if there is nothing at `path`, or if it is a folder that this account may not read: an export is its owner's
+/// alone.
+fn look_at(path: &Path) -> Result<(), Failure> {
+    let seen = fs::metadata(path).and_then(|about| if about.is_dir() { fs::read_dir(path).map(drop) } else { Ok(()) });
+    seen.map_err(|error| {
+        let path = path.display();
+        match error.kind() {
+            ErrorKind::NotFound => format!("{path} does not exist; give an export, a data folder or a database").into(),
+            _ => format!("cannot read {path}: {error}").into(),
+        }
+    })
+}
+
 /// Why the database at `path` was not verified.
 fn unopened(path: &Path, error: StoreError) -> Failure {
     match error {
@@ -72,6 +83,12 @@ fn unopened(path: &Path, error: StoreError) -> Failure {
         StoreError::Damaged(_) if path.is_file() && !begins_with(path, b"SQLite format 3\0") => {
             let path = path.display();
             format!("{path} is not a database; name an export's folder, or copy the database again, if it was one")
+                .into()
+        }
+        // It would speak of a data folder, and the file may be a backup.
+        StoreError::Damaged(problem) if path.is_file() => {
+            let path = path.display();
+            format!("{path} is damaged or cut short ({problem}); copy it again, if it is a copy, and keep this one")
                 .into()
         }
         error => error.into(),

@@ -91,6 +91,14 @@ async fn what_is_no_whole_database_is_named_and_not_taken_for_the_data_folders()
     }
     trial.store.close().await;
 
+    // A copy of a backup that was cut short.
+    let cut = folder.path().join("cut.db");
+    std::fs::write(&cut, &std::fs::read(data.join("parfocal.db")).unwrap()[..20_000]).unwrap();
+    let output = parfocal(&["verify", cut.to_str().unwrap()], None);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(told(&output).contains("cut.db is damaged or cut short"), "{}", told(&output));
+    assert!(!told(&output).contains("data folder"), "{}", told(&output));
+
     let zip = folder.path().join("export.zip");
     std::fs::write(&zip, b"PK\x03\x04 and so on").unwrap();
     let output = parfocal(&["verify", zip.to_str().unwrap()], None);
@@ -107,6 +115,16 @@ async fn what_is_no_whole_database_is_named_and_not_taken_for_the_data_folders()
     std::fs::create_dir(&nothing).unwrap();
     let output = parfocal(&["verify", nothing.to_str().unwrap()], None);
     assert!(told(&output).contains("nothing is neither an export nor a data folder"), "{}", told(&output));
+
+    // As a pipe leaves it whose sender failed.
+    let empty = folder.path().join("empty.db");
+    std::fs::write(&empty, "").unwrap();
+    for (command, data) in [("verify", None), ("restore", Some(folder.path().join("elsewhere")))] {
+        let output = parfocal(&[command, empty.to_str().unwrap()], data.as_deref());
+        assert_eq!(output.status.code(), Some(1));
+        let told = told(&output);
+        assert!(told.contains("empty.db") && told.contains("is empty") && !told.contains("-wal"), "{told}");
+    }
 
     // Nothing is said of a data folder, which may be well.
     let output = parfocal(&["restore", zip.to_str().unwrap()], Some(&folder.path().join("elsewhere")));

@@ -13,7 +13,7 @@ use tempfile::{NamedTempFile, PersistError, TempPath};
 
 use super::export::verify::{Check, Verdict};
 use super::lock::{FolderLock, LOCK};
-use super::schema::DATABASE;
+use super::schema::{DATABASE, sibling};
 use super::verify::checks;
 use super::{Access, AccessLog, Head, Reader, StoreError};
 use parfocal_base::boxed;
@@ -225,10 +225,13 @@ fn put_in_place(
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
     let is_new = !folder.exists();
     DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
-    let lock = FolderLock::of(folder)?;
 
-    let restored = restore_locked(folder, file, clock).await;
-    if is_new && restored.is_err() {
+    let (lock, restored) = match FolderLock::of(folder) {
+        Ok(lock) => (Some(lock), restore_locked(folder, file, clock).await),
+        Err(error) => (None, Err(error.into())),
+    };
+    let is_anothers = matches!(restored, Err(BackupError::Store(StoreError::InUse { .. })));
+    if is_new && restored.is_err() && !is_anothers {
         // A server would start with an empty database in a folder that was left here.
         let _ = std::fs::remove_file(folder.join(LOCK));
         let _ = std::fs::remove_dir(folder);
@@ -354,17 +357,12 @@ fn put_back(database: &Path, kept: &Path) {
     }
 }
 
-/// The path of the file whose name is that of `path` and then `suffix`.
-fn sibling(path: &Path, suffix: &str) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    path.with_file_name(name + suffix)
-}
-
 /// Verifies the copy at `path` and returns its head. Errors call it `what`.
 async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
     let snapshot = Reader::open_snapshot(path).await.map_err(|error| match error {
         // It would speak of the data folder, which may be well.
         StoreError::Damaged(problem) => BackupError::Unsound { what: what.to_owned(), problem },
+        StoreError::Empty(_) => BackupError::Unsound { what: what.to_owned(), problem: "it is empty".to_owned() },
         error => error.into(),
     })?;
     let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {

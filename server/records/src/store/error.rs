@@ -38,6 +38,9 @@ pub enum StoreError {
          file, or copy that file too"
     )]
     WithoutLog,
+    /// The file has nothing in it.
+    #[error("{} is empty: it was cut short while it was written or copied; copy it again", .0.display())]
+    Empty(PathBuf),
     /// The folder cannot be used.
     #[error("the data folder {} cannot be used: {reason}", .folder.display())]
     Folder {
@@ -68,7 +71,7 @@ pub enum StoreError {
     /// The file cannot be opened.
     #[error(
         "the database cannot be opened; you must be able to write to it and to its folder: \
-         change their permissions, or copy the data folder to a place where you can write and name it with --data-dir"
+         run this as the user that runs the server, change their permissions, or copy the data folder to a place where you can write and name it with --data-dir"
     )]
     Shut,
     /// Words were erased from their records, but not yet from the files.
@@ -96,6 +99,7 @@ impl StoreError {
             | Self::Newer { .. }
             | Self::Outdated
             | Self::WithoutLog
+            | Self::Empty(_)
             | Self::Folder { .. }
             | Self::Missing(_)
             | Self::ErasureUnfinished => false,

@@ -1,6 +1,8 @@
 //! Reads lists and timelines for the pages. Other programs can use it too while the server runs.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +12,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRo
 use sqlx::{AssertSqlSafe, Connection as _, Row, migrate::Migrate};
 
 use super::motion::KnownMotions;
-use super::schema::{DATABASE, MIGRATOR, check_names};
+use super::schema::{DATABASE, MIGRATOR, check_names, sibling};
 use super::values::{moment, parsed, stamp, status};
 use super::{PathPoint, RunClocks, SessionLine, Stamp, StoreError};
 use parfocal_base::FocalPower;
@@ -248,9 +250,19 @@ impl Reader {
     }
 }
 
-/// `file`, or an error if it does not exist.
-fn there(file: &Path) -> Result<&Path, StoreError> {
-    if file.is_file() { Ok(file) } else { Err(StoreError::Missing(file.to_owned())) }
+/// The database `file`, or an error if it does not exist, is empty, or is in a folder that this account may not open.
+pub(super) fn there(file: &Path) -> Result<&Path, StoreError> {
+    match fs::metadata(file) {
+        Ok(about) if about.is_file() && about.len() == 0 && !has_log(file) => Err(StoreError::Empty(file.to_owned())),
+        Ok(about) if about.is_file() => Ok(file),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(StoreError::Shut),
+        Ok(_) | Err(_) => Err(StoreError::Missing(file.to_owned())),
+    }
+}
+
+/// Whether the database `file` has a log beside it, which may hold all of its records.
+fn has_log(file: &Path) -> bool {
+    fs::metadata(sibling(file, "-wal")).is_ok_and(|log| log.len() > 0)
 }
 
 /// How the database `file` is opened for reading.

@@ -1,5 +1,7 @@
 //! The database's name and its schema.
 
+use std::path::{Path, PathBuf};
+
 use sqlx::migrate::Migrator;
 use sqlx::sqlite::SqlitePool;
 
@@ -20,4 +22,10 @@ pub(super) async fn check_names(pool: &SqlitePool) -> Result<(), StoreError> {
         Some(error) => Err(StoreError::Damaged(format!("its schema is not UTF-8 text: {error}"))),
         None => Ok(()),
     }
+}
+
+/// The path of the file whose name is that of `path` and then `suffix`, such as that of a database's log.
+pub(super) fn sibling(path: &Path, suffix: &str) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(name + suffix)
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::writing::{insert_change, insert_study};
 use super::{NewStudy, StudyChange};
 use crate::store::lock::FolderLock;
+use crate::store::reader::there;
 use crate::store::schema::DATABASE;
 use crate::store::writer::Writer;
 use crate::store::{Reader, Store, StoreError};
@@ -31,10 +32,7 @@ impl StudyBook {
     /// If there is no database, a server has it open, or it is of another version.
     pub async fn open(folder: &Path) -> Result<Self, StoreError> {
         let file = folder.join(DATABASE);
-        if !file.is_file() {
-            return Err(StoreError::Missing(file));
-        }
-
+        there(&file)?;
         let lock = Arc::new(FolderLock::of(folder)?);
         Ok(Self { writer: Writer::of_command(&file).await?, _lock: Some(lock) })
     }
