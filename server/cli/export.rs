@@ -17,7 +17,7 @@ use parfocal_results::study_export::{ExportProgress, export_study};
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Id of the session, as on the researcher's page.
-    #[arg(required_unless_present = "study", conflicts_with = "study")]
+    #[arg(required_unless_present = "study", conflicts_with = "study", value_parser = session)]
     session: Option<SessionId>,
     /// All sessions of a study in one package: CSV, Parquet, and files for R, SPSS and REDCap.
     #[arg(long, value_name = "STUDY")]
@@ -109,4 +109,8 @@ fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
         summary.sessions,
         summary.folder.display(),
     ))
+}
+
+fn session(text: &str) -> Result<SessionId, String> {
+    text.parse().map_err(|_| "must be a session's whole id, as on the researcher's page".to_owned())
 }
