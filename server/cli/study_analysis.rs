@@ -74,6 +74,7 @@ async fn package_of(arguments: &Arguments) -> Result<Option<&Path>, Failure> {
         return Ok(None);
     }
 
+    package::may_read(folder)?;
     if !package::is_package(folder) {
         if is_path || folder.exists() && !is_study(arguments).await {
             bail!(

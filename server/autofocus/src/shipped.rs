@@ -1,6 +1,7 @@
 //! The policies that ship with the program, and the use of weights that people trained themselves.
 
 use std::fmt::Display;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::belief::BeliefTracker;
@@ -97,18 +98,26 @@ pub struct FolderError(String);
 /// If there are no weights at all, or some are damaged or cannot be read.
 pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, FolderError> {
     let file_of = |name: &str| folder.join(format!("{name}.safetensors"));
-    let there: Vec<_> = SHIPPED.iter().filter(|shipped| file_of(shipped.name).exists()).collect();
+    let unfit =
+        |file: &Path, reason: &dyn Display| FolderError(format!("cannot use the weights {}: {reason}", file.display()));
+
+    let mut there = Vec::new();
+    for shipped in &SHIPPED {
+        let file = file_of(shipped.name);
+        match std::fs::read(&file) {
+            Ok(bytes) => there.push((shipped, file, bytes)),
+            Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {}
+            Err(error) => return Err(unfit(&file, &error)),
+        }
+    }
     if there.is_empty() {
         let names: Vec<_> = SHIPPED.iter().map(|shipped| format!("{}.safetensors", shipped.name)).collect();
         let names = names.join(", ");
         return Err(FolderError(format!("there are no weights in {}: none of {names}", folder.display())));
     }
 
-    there.into_iter().try_fold(registry, |registry, &Shipped { name, summary, design, .. }| {
-        let file = file_of(name);
-        let unfit = |reason: &dyn Display| FolderError(format!("cannot use the weights {}: {reason}", file.display()));
-        let bytes = std::fs::read(&file).map_err(|error| unfit(&error))?;
-        build(design, &bytes).map_err(|error| unfit(&error))?;
+    there.into_iter().try_fold(registry, |registry, (&Shipped { name, summary, design, .. }, file, bytes)| {
+        build(design, &bytes).map_err(|error| unfit(&file, &error))?;
         Ok(registry.made_of_weights(name, summary, bytes.into(), move |bytes| build(design, bytes)))
     })
 }

@@ -1,6 +1,7 @@
 //! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures of at most 480
 //! lines.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -59,8 +60,10 @@ fn image(path: &Path, bits: u8) -> Result<GrayImage, LearningError> {
 }
 
 fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, LearningError> {
-    if !path.is_file() {
-        return Err(unreadable(path, "there is no such file"));
+    match std::fs::metadata(path) {
+        Ok(about) if about.is_file() => {}
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(unreadable(path, &error.to_string())),
+        Ok(_) | Err(_) => return Err(unreadable(path, "there is no such file")),
     }
 
     let filters = format!("{SQUARE_PIXELS},scale=-2:'min({LINES},ih)'");

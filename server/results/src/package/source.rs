@@ -1,6 +1,7 @@
 //! A session's export as part of a package: verified, and identified by study, site and chain.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -112,11 +113,24 @@ impl PackageSource {
     }
 }
 
+/// Fails if `path` is a folder that this account may not read. An export is its owner's alone, and looks to others as
+/// if it held nothing.
+///
+/// # Errors
+/// As it says.
+pub fn may_read(path: &Path) -> Result<(), PackageError> {
+    match std::fs::read_dir(path) {
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(PackageError::unreadable(path)(error)),
+        _ => Ok(()),
+    }
+}
+
 /// The folders of the exports in `path`: `path` itself if it is an export, or those of a package.
 ///
 /// # Errors
 /// If it is neither, or cannot be read.
 pub fn exports_of(path: &Path) -> Result<Vec<PathBuf>, PackageError> {
+    may_read(path)?;
     let sessions = path.join(SESSIONS);
     if !sessions.is_dir() {
         return if is_export(path) { Ok(vec![path.to_owned()]) } else { Err(PackageError::not_an_export(path)) };

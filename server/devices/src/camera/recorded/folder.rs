@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 use image::DynamicImage;
@@ -37,11 +38,12 @@ impl ScanFolder {
     /// If there is no scan, or its description cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self, ScanError> {
         let file = path.join(HEADER);
-        if !file.is_file() {
-            return Err(ScanError(format!("{} is not a recorded scan: it has no {HEADER}", path.display())));
-        }
-
-        let text = fs::read_to_string(&file).map_err(ScanError::unreadable(&file))?;
+        let text = fs::read_to_string(&file).map_err(|error| match error.kind() {
+            ErrorKind::NotFound | ErrorKind::NotADirectory => {
+                ScanError(format!("{} is not a recorded scan: it has no {HEADER}", path.display()))
+            }
+            _ => ScanError::unreadable(&file)(error),
+        })?;
         let header: Header = serde_json::from_str(&text).map_err(|error| ScanError::nonsense(&file, error))?;
         check_header(&header).map_err(|reason| ScanError::nonsense(&file, reason))?;
 
@@ -53,11 +55,10 @@ impl ScanFolder {
     /// Reads every whole line. A last line without its end was being written when the power failed, and is left out.
     fn read_poses(&mut self) -> Result<(), ScanError> {
         let file = self.path.join(POSES);
-        if !file.exists() {
-            return Ok(());
-        }
-
-        let text = fs::read(&file).map_err(ScanError::unreadable(&file))?;
+        let text = match fs::read(&file) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            text => text.map_err(ScanError::unreadable(&file))?,
+        };
         let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         self.whole_bytes = whole as u64;
 
