@@ -107,6 +107,29 @@ fn a_cut_or_missing_file_names_its_frames() {
 }
 
 #[test]
+fn a_recording_whose_bands_or_calibration_are_damaged_is_not_called_whole() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 2);
+    done(&["recording", "info", text(&recording)]);
+
+    let row = recording.join("cell_row/c/0");
+    flip(&row, 5);
+    assert!(check(&recording).contains("the values of `cell_row` do not match their checksum"));
+    flip(&row, 5);
+
+    let widths = recording.join("fwhm/c/0");
+    let before = fs::read(&widths).unwrap();
+    fs::remove_file(&widths).unwrap();
+    assert!(check(&recording).contains("the values of `fwhm` cannot be read"));
+    fs::write(&widths, before).unwrap();
+
+    fs::write(recording.join(CALIBRATION).join("calibration.toml"), "").unwrap();
+    assert!(check(&recording).contains("calibration.toml is empty"));
+    let spectrum = parfocal(&["recording", "spectrum", text(&recording), "--at", "30,20"]);
+    assert!(complaint(&spectrum).contains("calibration.toml is empty"), "it would be taken for a typical unit's");
+}
+
+#[test]
 fn a_calibration_that_does_not_fit_the_recording_is_refused_by_all_that_use_it() {
     let folder = TempDir::new().unwrap();
     let recording = made_up(&folder, 2);

@@ -219,6 +219,7 @@ fn exposed_at(folder: &TempDir, times: &[u64]) -> PathBuf {
     let path = folder.path().join("recording");
     let calibration = Calibration::default();
     let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
+    camera::calibration::save(&path.join(CALIBRATION), &calibration, &[]).unwrap();
     let recorder = Recorder::start(writer, Moment::default()).unwrap();
     for (number, &exposed_at) in (1..).zip(times) {
         recorder.intake().offer(CapturedFrame {

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::view_info;
 use crate::cli::output::{Failure, print_result};
+use parfocal_devices::camera::calibration;
 use parfocal_recording::{AnyRecording, Header, Recording};
 
 /// Bytes per sample when four samples of 10 bit are packed into five bytes.
@@ -39,7 +40,7 @@ struct Info {
     bytes: u64,
     /// `bytes` divided by the size of the samples packed at 10 bit; `None` without frames.
     share_of_packed: Option<f64>,
-    /// Descriptions of the frames that cannot be read.
+    /// Descriptions of the frames and files that cannot be read.
     damaged: Vec<String>,
 }
 
@@ -82,6 +83,8 @@ fn look(arguments: &Arguments, recording: &Recording) -> Info {
     let (width, height) = recording.size();
     let packed = PACKED * (width * height * frames) as f64;
     let bytes = recording.bytes();
+    let mut damaged = recording.check();
+    damaged.extend(calibration::of_recording(recording).err().map(|fault| fault.to_string()));
 
     Info {
         path: arguments.folder.display().to_string(),
@@ -94,7 +97,7 @@ fn look(arguments: &Arguments, recording: &Recording) -> Info {
         frames_missing: recording.missing(),
         bytes,
         share_of_packed: (frames > 0).then(|| bytes as f64 / packed),
-        damaged: recording.check(),
+        damaged,
     }
 }
 

@@ -16,6 +16,10 @@ pub const MOSAIC: &str = "mosaic";
 /// The file that describes an array or group.
 pub const DESCRIPTION: &str = "zarr.json";
 
+/// Names of the arrays that describe the bands: those of numbers, and those of places in a mosaic cell.
+pub const BAND_NUMBERS: [&str; 5] = ["wavelength", "fwhm", "red", "green", "blue"];
+pub const BAND_PLACES: [&str; 2] = ["cell_row", "cell_column"];
+
 /// What an array's `zarr.json` says.
 struct Array<'a> {
     shape: &'a [usize],

@@ -1,20 +1,22 @@
 //! Reads a recording.
 
 use std::fs::{self, File};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::Value;
+use zarrs::array::FillValue;
+use zarrs::array::data_type::{float64, int64};
 
-use super::codec::Coder;
+use super::codec::{Coder, plain_codecs};
 use super::columns::{Coders, FrameRow};
 use super::error::RecordingError;
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
-use super::layout::{DESCRIPTION, MOSAIC};
+use super::layout::{BAND_NUMBERS, BAND_PLACES, DESCRIPTION, MOSAIC};
 use super::shard::{Index, SHARD_FRAMES};
 use super::view;
-use parfocal_imaging::{CELL, MosaicFrame};
+use parfocal_imaging::{BANDS, CELL, MosaicFrame};
 
 /// Longest side of a mosaic that a description may give, samples.
 const LARGEST_SIDE: u64 = 1 << 14;
@@ -156,13 +158,43 @@ impl Recording {
         mosaic.ok_or_else(|| damaged(format!("frame {number} does not match its checksum")))
     }
 
-    /// Reads every frame, and returns what is wrong with those that cannot be read. Damage of a whole file is reported
-    /// once.
+    /// Reads every frame and what describes the bands, and returns what is wrong with those that cannot be read. Damage
+    /// of a whole file is reported once.
     pub fn check(&self) -> Vec<String> {
         let problem = |number| self.frame(number).err().map(|error: RecordingError| error.to_string());
         let mut problems: Vec<String> = (0..self.rows.len()).into_par_iter().filter_map(problem).collect();
         problems.dedup();
+
+        let bands = self.check_bands().unwrap_or_else(|error| vec![error.to_string()]);
+        problems.extend(bands);
         problems
+    }
+
+    /// What is wrong with the arrays that describe the bands. This program takes the bands from the calibration; others
+    /// read the arrays.
+    fn check_bands(&self) -> Result<Vec<String>, RecordingError> {
+        let numbers = Coder::new(float64(), FillValue::from(f64::NAN), &[BANDS], plain_codecs())?;
+        let places = Coder::new(int64(), FillValue::from(0_i64), &[BANDS], plain_codecs())?;
+
+        let numbers = BAND_NUMBERS
+            .map(|name| (name, fs::read(self.band_file(name)).map(|stored| numbers.decode::<f64>(stored).is_ok())));
+        let places = BAND_PLACES
+            .map(|name| (name, fs::read(self.band_file(name)).map(|stored| places.decode::<i64>(stored).is_ok())));
+        let problem = |(name, is_whole): (&str, io::Result<bool>)| {
+            let damage = match is_whole {
+                Ok(true) => return None,
+                Ok(false) => "do not match their checksum".to_owned(),
+                Err(error) => format!("cannot be read: {error}"),
+            };
+            let path = self.band_file(name);
+            Some(format!("{}: the values of `{name}` {damage}; restore it from a copy", path.display()))
+        };
+        Ok(numbers.into_iter().chain(places).filter_map(problem).collect())
+    }
+
+    /// The one file of the array `name`, which describes the bands.
+    fn band_file(&self, name: &str) -> PathBuf {
+        self.folder.join(name).join("c/0")
     }
 
     fn shard(&self, number: usize) -> PathBuf {

@@ -44,6 +44,12 @@ pub fn read_into(calibration: Calibration, path: &Path) -> Result<Calibration, C
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
     let text = fs::read_to_string(&path)
         .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
+    // Taken for a calibration without references, it would change every picture and spectrum without a word.
+    if text.trim().is_empty() {
+        return Err(
+            format!("the calibration {} is empty; restore it from a copy, or make it again", path.display()).into()
+        );
+    }
 
     let folder = path.parent().unwrap_or(Path::new("."));
     let changed = calibration.changed_by_toml(&text, |name| picture(folder, name));
