@@ -267,3 +267,14 @@ fn a_disk_that_something_else_fills_costs_only_what_was_not_stored() {
     assert!(found["frames"].as_u64().unwrap() >= 25 && found["damaged"] == serde_json::json!([]), "{found}");
     assert!(told.contains(&format!("{} frames in", found["frames"])), "{told} {found}");
 }
+
+#[test]
+fn a_recording_for_which_the_disk_has_no_room_leaves_no_folder() {
+    let Some(disk) = SmallDisk::mount(1) else { return };
+    let mut filler = File::create(disk.0.path().join("filler")).unwrap();
+    while filler.write_all(&[0; 4096]).is_ok() {}
+
+    let out = disk.0.path().join("recording");
+    let told = complaint(&parfocal(&["recording", "record", "--out", text(&out), "--seconds", "1"]));
+    assert!(told.contains("no space is left") && !out.exists(), "{told}");
+}

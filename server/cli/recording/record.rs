@@ -25,6 +25,8 @@ use parfocal_recording::{
 const TICK: Duration = Duration::from_millis(20);
 /// Longest wait for the first or next frame.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// Most seconds that can be asked for: 115 days.
+const LONGEST: f64 = 1e7;
 
 /// Arguments of `parfocal recording record`.
 #[derive(Debug, clap::Args)]
@@ -145,7 +147,7 @@ fn recorder(
     began: parfocal_base::clock::Moment,
 ) -> Result<Recorder, Failure> {
     let writer = Writer::create(&arguments.out, header, size, calibration)?;
-    calibration::save(&arguments.out.join(CALIBRATION), calibration, &[])?;
+    calibration::save(&arguments.out.join(CALIBRATION), calibration, &[]).inspect_err(|_| remove(&arguments.out))?;
     Ok(Recorder::start(writer, began)?)
 }
 
@@ -216,6 +218,8 @@ fn tell(arguments: &Arguments, progress: &RecordingProgress) -> Result<(), Failu
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 1e7);
-    seconds.map(Duration::from_secs_f64).ok_or_else(|| "must be a positive number of seconds".to_owned())
+    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST);
+    seconds
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| format!("must be a number of seconds above 0, at most {LONGEST}"))
 }

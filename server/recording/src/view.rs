@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RecordingError;
 use super::header::Ended;
-use super::writing::make_folder;
+use super::writing::in_new_folder;
 use parfocal_base::files::replace;
 
 /// Value of [`ViewHeader::format`].
@@ -64,9 +64,12 @@ impl ViewWriter {
     /// Begins a recording in `folder`, which must not exist.
     ///
     /// # Errors
-    /// If the folder exists or cannot be written.
+    /// If the folder exists or cannot be written. No folder of its own is left then.
     pub fn create(folder: &Path, header: ViewHeader) -> Result<Self, RecordingError> {
-        make_folder(folder)?;
+        in_new_folder(folder, || Self::begin(folder, header))
+    }
+
+    fn begin(folder: &Path, header: ViewHeader) -> Result<Self, RecordingError> {
         let failed = |error: io::Error| RecordingError::unwritable(folder, 0, &error);
         let pictures = File::create_new(folder.join(PICTURES)).map_err(failed)?;
         let mut index = File::create_new(folder.join(INDEX)).map_err(failed)?;

@@ -12,7 +12,7 @@ use super::error::RecordingError;
 use super::header::{Ended, Header};
 use super::layout::{BandArray, DESCRIPTION, MOSAIC, band_arrays, group, growing};
 use super::shard::{Index, SHARD_FRAMES};
-use parfocal_base::files::{replace, replace_with};
+use parfocal_base::files::{remove, replace, replace_with};
 use parfocal_imaging::Calibration;
 
 /// A recording under way.
@@ -38,15 +38,22 @@ impl Writer {
     /// Begins a recording of mosaics of `size` (width and height in samples) in `folder`, which must not exist.
     ///
     /// # Errors
-    /// If the folder exists or cannot be written.
+    /// If the folder exists or cannot be written. No folder of its own is left then.
     pub fn create(
         folder: &Path,
         header: Header,
         size: (usize, usize),
         calibration: &Calibration,
     ) -> Result<Self, RecordingError> {
-        make_folder(folder)?;
+        in_new_folder(folder, || Self::begin(folder, header, size, calibration))
+    }
 
+    fn begin(
+        folder: &Path,
+        header: Header,
+        size: (usize, usize),
+        calibration: &Calibration,
+    ) -> Result<Self, RecordingError> {
         let mut fixed = Vec::new();
         for BandArray { name, description, stored } in band_arrays(calibration)? {
             put(&folder.join(name).join("c/0"), 0, &stored)?;
@@ -173,11 +180,17 @@ impl Writer {
     }
 }
 
-/// Makes the folder of a recording, which must be new.
+/// Makes the folder of a recording, which must be new, and begins the recording in it by `begin`. If that fails, the
+/// folder is removed, because it would be in the way of the next attempt.
 ///
 /// # Errors
-/// If it exists or cannot be made.
-pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
+/// If the folder exists or cannot be made, or `begin` fails.
+pub fn in_new_folder<T>(folder: &Path, begin: impl FnOnce() -> Result<T, RecordingError>) -> Result<T, RecordingError> {
+    make_folder(folder)?;
+    begin().inspect_err(|_| remove(folder))
+}
+
+fn make_folder(folder: &Path) -> Result<(), RecordingError> {
     let failed = |error: io::Error| RecordingError::unwritable(folder, 0, &error);
     make_parent(folder).map_err(failed)?;
     fs::create_dir(folder).map_err(|error| match error.kind() {

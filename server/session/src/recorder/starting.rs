@@ -8,6 +8,7 @@ use super::parts::RecorderParts;
 use super::running::Running;
 use super::view::ViewRecorder;
 use parfocal_base::SOFTWARE;
+use parfocal_base::files::remove;
 use parfocal_base::ids::SessionId;
 use parfocal_devices::camera::calibration;
 use parfocal_recording::{
@@ -108,8 +109,10 @@ fn record_mosaics(
     };
 
     let writer = Writer::create(folder, header, size, calibration)?;
-    calibration::save(&folder.join(CALIBRATION), calibration, &[])
-        .map_err(|error| StartError::Failed(error.to_string()))?;
+    calibration::save(&folder.join(CALIBRATION), calibration, &[]).map_err(|error| {
+        remove(folder);
+        StartError::Failed(error.to_string())
+    })?;
     Ok(Recorder::start(writer, began.at)?)
 }
 
