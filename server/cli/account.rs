@@ -44,7 +44,7 @@ pub enum Action {
 pub struct Add {
     #[command(flatten)]
     named: NamedAccount,
-    /// What the person may do.
+    /// What the person may do: lead, operator, researcher or monitor.
     #[arg(long, value_name = "ROLE", value_parser = role)]
     role: AccountRole,
     /// The person's name as it appears in signatures; the account's name by default.

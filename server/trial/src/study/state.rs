@@ -154,7 +154,9 @@ impl StudyState {
             Stage::Planned | Stage::Closed if !has_accounts => Err(Refusal::conflict(NO_ACCOUNTS)),
             Stage::Planned if !concerns.is_empty() && !despite_concerns => {
                 let concerns = concerns.join(" ");
-                Err(Refusal::Conflict(format!("{concerns} Plan a new study, or confirm it (despite_concerns)")))
+                Err(Refusal::Conflict(format!(
+                    "{concerns} Plan a new study, or confirm it (despite_concerns; as a command, --despite-concerns)"
+                )))
             }
             Stage::Planned | Stage::Closed => Ok(()),
             Stage::Open => Err(Refusal::conflict("the study is open already")),
@@ -191,7 +193,7 @@ impl StudyState {
         if outstanding > 0 && !despite_outstanding {
             return Err(Refusal::Conflict(format!(
                 "for {outstanding} of its sessions, a surgeon's device may still hold comments or answers, which would \
-                 then not count; wait, or confirm it (despite_outstanding)"
+                 then not count; wait, or confirm it (despite_outstanding; as a command, --despite-outstanding)"
             )));
         }
         Ok(())
