@@ -26,7 +26,7 @@ const PLANES: usize = 21;
 pub struct Arguments {
     /// Folder of pictures or raw mosaics of one still scene, each at another position of focus. The position is
     /// the one number in which the names differ, or else the order of the names. Or a TIFF with a page for each
-    /// position: plain, OME-TIFF or `ImageJ`'s.
+    /// position: plain, OME-TIFF or ImageJ's.
     folder: PathBuf,
     /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]

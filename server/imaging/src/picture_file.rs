@@ -77,7 +77,7 @@ impl<'a> PictureFile<'a> {
         }
     }
 
-    /// What a TIFF says about its pages: OME-XML, `ImageJ`'s lines, or any other text.
+    /// What a TIFF says about its pages: OME-XML, ImageJ's lines, or any other text.
     pub fn description(&self) -> Option<String> {
         match &self.contents {
             Contents::Tiff(tiff) => tiff.description(),

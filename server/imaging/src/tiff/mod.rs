@@ -70,7 +70,7 @@ impl Tiff {
         self.pages.len()
     }
 
-    /// What the file says about itself: OME-XML, `ImageJ`'s lines, or any other text.
+    /// What the file says about itself: OME-XML, ImageJ's lines, or any other text.
     pub(super) fn description(&self) -> Option<String> {
         match &self.page(0).ok()?.tag(tag::DESCRIPTION)?.value {
             TagValue::Ascii(text) => Some(text.clone()),

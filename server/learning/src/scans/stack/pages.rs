@@ -1,4 +1,4 @@
-//! Focal stacks in one file: a TIFF with a page for each position of focus, plain, or as OME or `ImageJ` write it.
+//! Focal stacks in one file: a TIFF with a page for each position of focus, plain, or as OME or ImageJ write it.
 
 use std::path::Path;
 
@@ -106,7 +106,7 @@ fn only_focus(depths: usize, channels: usize, times: usize, count: usize) -> Res
     Ok(())
 }
 
-/// `ImageJ`'s lines of `key=value`.
+/// ImageJ's lines of `key=value`.
 fn of_image_j(description: &str, count: usize) -> Result<Depth, String> {
     let value =
         |key: &str| description.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).map(str::trim);
