@@ -12,6 +12,7 @@ use super::wait::until;
 struct Spoken {
     protocol: &'static str,
     code: &'static str,
+    picture: &'static str,
     ready: &'static str,
     notice: &'static str,
     left: &'static str,
@@ -31,6 +32,7 @@ struct Spoken {
 const GERMAN: Spoken = Spoken {
     protocol: "german",
     code: "de",
+    picture: "Livebild",
     ready: "Sie werden 2 Einstellungen nacheinander ansehen.",
     notice: "Einstellung 1 von 2",
     left: "noch ",
@@ -56,6 +58,7 @@ const GERMAN: Spoken = Spoken {
 const FRENCH: Spoken = Spoken {
     protocol: "french",
     code: "fr",
+    picture: "Image en direct",
     ready: "Vous regarderez 2 réglages, l’un après l’autre.",
     notice: "Réglage 1 sur 2",
     left: "reste ",
@@ -78,6 +81,7 @@ const FRENCH: Spoken = Spoken {
 const SPANISH: Spoken = Spoken {
     protocol: "spanish",
     code: "es",
+    picture: "Imagen en directo",
     ready: "Verá 2 ajustes, uno tras otro.",
     notice: "Ajuste 1 de 2",
     left: "quedan ",
@@ -180,6 +184,7 @@ async fn a_trial(spoken: &Spoken, large: bool) {
     // What a reload brings is in the session's language from the first.
     surgeon.reload().await;
     surgeon.sees("#panel", spoken.paused).await;
+    assert_eq!(surgeon.attribute(".viewer-picture", "aria-label").await.as_deref(), Some(spoken.picture));
     until("the session to go on", || async {
         surgeon.try_click("#panel button").await;
         surgeon.count("#panel button").await == 0

@@ -28,8 +28,10 @@ function bundleOf(code) {
   return bundle;
 }
 
-let spoken = ENGLISH;
-let bundle = bundleOf(ENGLISH);
+const ofPage = globalThis.document?.documentElement?.lang ?? ENGLISH;
+/** The page's own language at first, so that whatever is said while the page is built is in it. */
+let spoken = knows(ofPage) ? ofPage : ENGLISH;
+let bundle = bundleOf(spoken);
 
 /** The code of the language that is spoken. */
 export function language() {

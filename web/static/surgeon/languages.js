@@ -1,16 +1,10 @@
 // The languages of the pages that surgeons see, and how such a page shows which one it speaks.
 
 import { setText } from "../shared/dom.js";
-import { knows, language, partsOf, say, sayAttribute, speak } from "../shared/language.js";
+import { knows, language, partsOf, say, sayAttribute } from "../shared/language.js";
 
 /** Languages that are written from right to left. */
 const RIGHT_TO_LEFT = ["ar", "fa", "he", "ur"];
-
-/** Speaks the language in which the server sent the page. */
-export function speakAsThePage() {
-  speak(document.documentElement.lang);
-  remember();
-}
 
 /** The scripts that are being loaded, by their language. @type {Map<string, Promise<boolean>>} */
 const loading = new Map();
@@ -42,7 +36,7 @@ async function load(code) {
 }
 
 /** Tells the server the language, so that this tablet stays in it on pages that are loaded without a session. */
-function remember() {
+export function keepLanguage() {
   // biome-ignore lint/suspicious/noDocumentCookie: older tablets have no Cookie Store API.
   document.cookie = `parfocal-language=${language()}; path=/; max-age=31536000; samesite=strict`;
 }
@@ -52,7 +46,7 @@ export function showLanguage() {
   const root = document.documentElement;
   root.lang = language();
   root.dir = RIGHT_TO_LEFT.includes(language()) ? "rtl" : "ltr";
-  remember();
+  keepLanguage();
 
   for (const element of document.querySelectorAll("[data-l10n-id]")) {
     const id = element.getAttribute("data-l10n-id") ?? "";

@@ -5,10 +5,10 @@ import { say } from "../shared/language.js";
 import { sendLeftAnswers } from "./answers.js";
 import { Comments } from "./comments.js";
 import { drafts, lastView, openHolding, openOutbox, openVoiceOutbox } from "./device.js";
-import { speakAsThePage } from "./languages.js";
+import { keepLanguage } from "./languages.js";
 import { forgetPage } from "./offline.js";
 
-speakAsThePage();
+keepLanguage();
 const outbox = openOutbox();
 const voice = openVoiceOutbox();
 let began = 0;

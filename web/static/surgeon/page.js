@@ -30,7 +30,7 @@ import {
   store,
 } from "./device.js";
 import { followDimmer } from "./dimmer.js";
-import { learn, showLanguage, speakAsThePage } from "./languages.js";
+import { keepLanguage, learn, showLanguage } from "./languages.js";
 import { closeMicrophone, mayOpenMicrophone, openMicrophone, record, whyNoMicrophone } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { nowWords } from "./now.js";
@@ -136,7 +136,7 @@ function here() {
 
 /* Language */
 
-speakAsThePage();
+keepLanguage();
 
 /** Puts all words on the page into the language that is spoken now. What is drawn with the session follows anyway. */
 function drawWords() {

@@ -7,12 +7,12 @@ import { say } from "../shared/language.js";
 import { storeOn } from "../shared/storage.js";
 import { tellTrouble } from "../shared/trouble.js";
 import { uuid } from "../shared/uuid.js";
-import { speakAsThePage } from "../surgeon/languages.js";
+import { keepLanguage } from "../surgeon/languages.js";
 import { Origins } from "../surgeon/origin.js";
 import { tryAll } from "./trials.js";
 import { partWords, summary } from "./words.js";
 
-speakAsThePage();
+keepLanguage();
 const store = storeOn(() => localStorage);
 /** Names the tablet as the surgeon's page does. */
 const origins = new Origins(store, { page: () => performance.now(), wall: () => Date.now() }, uuid);
