@@ -3,7 +3,7 @@
 
 use super::driver::{Browser, Driver};
 use super::large_text::look;
-use super::screenshots::shoot;
+use super::screenshots::{resize, shoot};
 use super::theatre::{Theatre, kill};
 use super::wait::until;
 
@@ -177,10 +177,18 @@ async fn a_trial(spoken: &Spoken, large: bool) {
     look(surgeon, &named("4-display")).await;
     surgeon.click("#overlays summary").await;
 
+    surgeon.focus("#view").await;
+    surgeon.type_into("#view", "++").await;
+    surgeon.sees(".viewer-unzoom", "×").await;
     surgeon.click("#pause").await;
     surgeon.sees("#panel", spoken.paused).await;
     surgeon.sees("#panel button", spoken.go_on).await;
     look(surgeon, &named("5-paused")).await;
+    if !large {
+        resize(surgeon, 1180, 820).await;
+        let (card, unzoom) = (surgeon.area(".panel-card").await, surgeon.area(".viewer-unzoom").await);
+        assert!(unzoom.bottom() <= card.top, "{unzoom:?} lies on {card:?}");
+    }
     // What a reload brings is in the session's language from the first.
     surgeon.reload().await;
     surgeon.sees("#panel", spoken.paused).await;
