@@ -221,6 +221,13 @@ async fn in_a_session_each_tap_and_each_hold_is_an_event_and_outlives_a_reload()
     theatre.surgeon.sees("#panel", "Continue").await;
     assert_eq!(kinds(&theatre.server).await, expected);
     assert!(theatre.surgeon.is("#centre", "disabled").await, "one points only while a setting is inspected");
+
+    // Nobody needs to read it any more once the setting has ended.
+    theatre.operator.click_labelled("#session-actions", "Resume").await;
+    theatre.operator.click_labelled("#session-actions", "End setting 1").await;
+    theatre.operator.click("#reason-go").await;
+    theatre.surgeon.sees("#change-title", "Setting 2 of ").await;
+    assert_eq!(theatre.surgeon.text("#trouble").await, "");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -157,7 +157,7 @@ function speakAsTheSession() {
  * @param {string} code
  */
 async function learnLanguage(code) {
-  if (!(await learn(code)) || code === language() || code !== state?.language) return;
+  if (!(await learn(code)) || code !== state?.language) return;
   speakAsTheSession();
   drawState();
 }
@@ -186,11 +186,10 @@ function followLastView() {
 /** @param {View | null} next */
 function follow(next) {
   known = true;
-  if (next?.session !== state?.session) {
-    // What went wrong in one session is not for the next participant to read.
-    tell(byId("trouble"), "");
-    talk.trouble = "";
-  }
+  // What went wrong in one session is not for the next participant to read.
+  if (next?.session !== state?.session) talk.trouble = "";
+  // Nobody needs it either once the session has moved on.
+  if (next?.session !== state?.session || next?.phase !== state?.phase) tell(byId("trouble"), "");
   state = next;
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
