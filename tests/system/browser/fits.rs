@@ -1,6 +1,7 @@
-//! What is needed most has room: the box to write in, the slider in a pause, and a list of sessions on a telephone.
+//! What is needed most has room: the box to write in, the slider in a pause, and the researcher's pages on a
+//! telephone.
 
-use super::driver::Driver;
+use super::driver::{Browser, Driver};
 use super::instruments::prepare;
 use super::screenshots::resize;
 use super::theatre::Theatre;
@@ -26,9 +27,26 @@ async fn the_box_is_wide_enough_to_write_in_and_a_pause_brings_the_slider_under_
     let (slider, picture) = (operator.area("#focal-power").await, operator.area("#view").await);
     assert!(slider.top >= picture.bottom() && slider.bottom() <= 900.0, "{slider:?} under {picture:?}");
 
+    // A reason may be one long word.
+    let reason = "Lampenwechsel".repeat(8);
+    theatre.say_why_paused(&reason).await;
+    operator.sees("#log", &reason).await;
+
     operator.open(&server.link("researcher")).await;
     resize(operator, 390, 844).await;
     operator.sees("tbody", "S-31").await;
-    let beyond = operator.run("return document.documentElement.scrollWidth - innerWidth", &[]).await;
+    fits_across(operator).await;
+
+    operator.click("td a.button").await;
+    operator.sees(".events", &reason).await;
+    fits_across(operator).await;
+    resize(operator, 768, 1024).await;
+    fits_across(operator).await;
+}
+
+/// Nothing lies beyond the page's right edge.
+async fn fits_across(page: &Browser) {
+    let measure = "const { scrollWidth, clientWidth } = document.documentElement; return scrollWidth - clientWidth";
+    let beyond = page.run(measure, &[]).await;
     assert_eq!(beyond, 0, "the page scrolls sideways");
 }

@@ -218,7 +218,7 @@ async fn a_study_is_led_from_the_pages() {
     page.click("#unblind").await;
     confirm(&page, "The analysis begins", PASSPHRASE).await;
     page.sees("#stage", "unblinded").await;
-    page.sees(".study-events", "Study unblinded: The analysis begins").await;
+    page.sees(".events", "Study unblinded: The analysis begins").await;
     shoot(&page, "study-5-unblinded").await;
     export_with_policies(&page, &mut server).await;
 
