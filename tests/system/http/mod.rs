@@ -18,6 +18,7 @@ mod privacy;
 mod real_time;
 mod recordings;
 mod records;
+mod refused_bodies;
 mod restart;
 mod roles;
 mod seed;

@@ -33,6 +33,7 @@ mod playback;
 mod ranges;
 mod recording;
 mod records;
+mod request_body;
 mod researcher;
 pub mod roles;
 mod routes;
@@ -74,9 +75,6 @@ use utoipa_axum::router::OpenApiRouter;
 use error::Error;
 use transport::Transport;
 
-/// Largest request body in bytes: the longest comment in JSON, with some margin.
-const BODY_LIMIT: usize = 256 * 1024;
-
 /// Time limit for a handler to begin its answer; streams begin at once.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
@@ -96,12 +94,13 @@ pub fn router(app: AppState) -> Router {
     // From the outside in.
     let layers = ServiceBuilder::new()
         .layer(TraceLayer::new_for_http().make_span_with(span))
+        .layer(middleware::from_fn(request_body::read_on))
         .layer(middleware::from_fn(security::headers))
         .layer(middleware::from_fn(error::render))
         .layer(CatchPanicLayer::custom(|_| axum::response::IntoResponse::into_response(Error::Internal)))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), security::guard))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, TIMEOUT))
-        .layer(RequestBodyLimitLayer::new(BODY_LIMIT))
+        .layer(RequestBodyLimitLayer::new(request_body::LIMIT))
         .layer(Extension(document));
 
     router.fallback(|| async { StatusCode::NOT_FOUND }).layer(layers).with_state(app)
