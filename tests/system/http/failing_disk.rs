@@ -56,6 +56,30 @@ async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
     assert_eq!(comments(&server).await, number);
 }
 
+#[tokio::test]
+async fn nothing_is_acknowledged_while_the_database_is_not_in_its_folder() {
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let server = Server::on(Arc::clone(&data), &LISTEN);
+    let session = server.prepare("S-05", "practice").await;
+    let elsewhere = tempfile::tempdir().unwrap();
+    let away = elsewhere.path().join("data");
+
+    std::fs::rename(data.path(), &away).unwrap();
+    let (status, told) = send(&server, comment(&session, 1, "kept by the tablet")).await;
+    assert_eq!(status, StatusCode::INSUFFICIENT_STORAGE, "{told}");
+    assert!(told.contains("deleted or moved away") && told.contains("put it back there"), "{told}");
+
+    std::fs::rename(&away, data.path()).unwrap();
+    let (status, told) = send(&server, comment(&session, 1, "kept by the tablet")).await;
+    assert_eq!(status, StatusCode::NO_CONTENT, "{told}");
+
+    // The server could still write to the deleted file, and all of it would be gone at its end.
+    std::fs::remove_file(data.path().join("parfocal.db")).unwrap();
+    let (status, told) = send(&server, comment(&session, 2, "lost otherwise")).await;
+    assert_eq!(status, StatusCode::INSUFFICIENT_STORAGE, "{told}");
+    assert_eq!(comments(&server).await, 1);
+}
+
 #[test]
 fn a_disk_without_room_is_named_at_the_start() {
     let Some(disk) = SmallDisk::mount() else { return };

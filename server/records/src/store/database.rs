@@ -10,11 +10,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use jiff::Timestamp;
+use prometheus_client::metrics::histogram::Histogram;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
 use tokio::sync::Mutex;
 use tokio::sync::mpsc::UnboundedSender;
+use tokio::task::spawn_blocking;
 
 use parfocal_base::boxed;
 use parfocal_base::clock::Moment;
@@ -77,7 +79,7 @@ pub(super) struct Inner {
     surgeon_picture: AtomicU32,
     pub(super) writes: Writes,
     /// Released when dropped, or by the kernel however the process ends.
-    _lock: FolderLock,
+    lock: Arc<FolderLock>,
 }
 
 /// A data folder that no other process can change, but whose database is not open yet.
@@ -139,6 +141,9 @@ impl Store {
         let telemetry = connect(relaxed.clone()).await?;
         let checkpoints = connect(relaxed).await?;
 
+        // From now on they must stay where they are.
+        lock.check_in_place()?;
+
         let reader = Reader::open_file(&file).await?;
         let started = Stamp { wall: run.wall, at: run.at };
         let run = begin_run(&trial, run).await?;
@@ -160,7 +165,7 @@ impl Store {
             telemetry_waiters: std::sync::Mutex::default(),
             surgeon_picture: AtomicU32::new(0),
             writes: Writes::default(),
-            _lock: lock,
+            lock: Arc::new(lock),
         };
 
         Ok(Self { inner: Arc::new(inner) })
@@ -211,13 +216,33 @@ impl Store {
     }
 
     /// Waits for the turn to write records.
-    pub(super) async fn turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, &self.inner.writes.records)
+    ///
+    /// # Errors
+    /// If the database was deleted or moved away.
+    pub(super) async fn turn(&self) -> Result<Turn<'_>, StoreError> {
+        self.turn_timed_in(&self.inner.writes.records).await
     }
 
     /// Waits for the turn to write telemetry.
-    pub(super) async fn telemetry_turn(&self) -> Turn<'_> {
-        self.inner.writes.begin(self.inner.turn.lock().await, &self.inner.writes.telemetry)
+    ///
+    /// # Errors
+    /// If the database was deleted or moved away.
+    pub(super) async fn telemetry_turn(&self) -> Result<Turn<'_>, StoreError> {
+        self.turn_timed_in(&self.inner.writes.telemetry).await
+    }
+
+    async fn turn_timed_in<'a>(&'a self, times: &'a Histogram) -> Result<Turn<'a>, StoreError> {
+        let turn = self.inner.writes.begin(self.inner.turn.lock().await, times);
+
+        // A disk that hangs must not block a thread that serves others.
+        let lock = Arc::clone(&self.inner.lock);
+        let checked = spawn_blocking(move || lock.check_in_place()).await;
+        // Without an answer, which a runtime that ends may not give, writing shows how the disk is.
+        let in_place = checked.unwrap_or(Ok(()));
+        if in_place.is_err() {
+            self.inner.writes.note(&in_place);
+        }
+        in_place.map(|()| turn)
     }
 
     /// Writes records, in a turn and a transaction of their own. All of them are on disk when this returns; if it
@@ -226,7 +251,7 @@ impl Store {
         &self,
         write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        let turn = self.turn().await;
+        let turn = self.turn().await?;
         turn.write(&self.inner.trial, write).await
     }
 
@@ -235,7 +260,7 @@ impl Store {
         &self,
         write: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        let turn = self.telemetry_turn().await;
+        let turn = self.telemetry_turn().await?;
         turn.write(&self.inner.telemetry, write).await
     }
 

@@ -93,7 +93,7 @@ impl Store {
     /// As [`Store::erase`].
     pub async fn finish_erasures(&self) -> Result<bool, StoreError> {
         // The whole database may be written anew: nobody else writes meanwhile, or waits for a connection in vain.
-        let _turn = self.turn().await;
+        let _turn = self.turn().await?;
         scrub(&self.inner.trial).await
     }
 }

@@ -56,6 +56,13 @@ pub enum StoreError {
         .0.display()
     )]
     Missing(PathBuf),
+    /// The database of a running server was deleted or moved away.
+    #[error(
+        "the database was deleted or moved away from the data folder {} while the server runs, and nothing can be \
+         saved; put it back there, or end the server and restore a backup with `parfocal restore`",
+        .0.display()
+    )]
+    Gone(PathBuf),
     /// The disk is full.
     #[error("the disk is full; make room and try again; what was saved before is safe")]
     Full,
@@ -93,7 +100,13 @@ impl StoreError {
     /// Whether the disk or the database failed, and did not merely refuse a request.
     pub const fn is_of_the_disk(&self) -> bool {
         match self {
-            Self::Full | Self::ReadOnly | Self::Disk(_) | Self::Damaged(_) | Self::Shut | Self::Locked => true,
+            Self::Gone(_)
+            | Self::Full
+            | Self::ReadOnly
+            | Self::Disk(_)
+            | Self::Damaged(_)
+            | Self::Shut
+            | Self::Locked => true,
             Self::Database(error) => matches!(error, sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut),
             Self::InUse { .. }
             | Self::Newer { .. }

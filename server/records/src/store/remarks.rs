@@ -119,7 +119,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn note_holding(&self, holding: &Holding, stamp: Stamp) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let _turn = self.turn().await?;
         sqlx::query(
             "INSERT INTO surgeon_devices (session, device, holding, run, monotonic_ns) VALUES (?, ?, ?, ?, ?)
              ON CONFLICT (session, device) DO UPDATE

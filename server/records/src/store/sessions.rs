@@ -166,7 +166,7 @@ impl Store {
         segment: SegmentId,
         inspected: Duration,
     ) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let _turn = self.turn().await?;
         sqlx::query(
             "INSERT INTO session_clocks (session, segment, inspected_ms) VALUES (?, ?, ?)
              ON CONFLICT (session) DO UPDATE SET segment = excluded.segment, inspected_ms = excluded.inspected_ms",

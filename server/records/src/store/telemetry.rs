@@ -214,7 +214,7 @@ impl Store {
     /// # Errors
     /// If the disk or database fails.
     pub async fn forget_steps_outside(&self, from: i64, count: i64, kept: i64) -> Result<i64, StoreError> {
-        let _turn = self.telemetry_turn().await;
+        let _turn = self.telemetry_turn().await?;
 
         let bounds = sqlx::query_as(
             "SELECT (SELECT min(number) FROM telemetry WHERE number > ?), (SELECT max(number) FROM telemetry)",
