@@ -279,6 +279,42 @@ def test_a_process_drives_a_lens_fails_and_comes_back(tmp_path: Path) -> None:
     wait_until(lambda: not running(str(order)))
 
 
+def test_a_policy_in_use_can_be_chosen_again_and_for_a_session(tmp_path: Path) -> None:
+    order = tmp_path / "order"
+    order.write_text("follow")
+    policy = command(tmp_path, OBEDIENT, order)
+    folder = tmp_path / "protocols"
+    folder.mkdir()
+    protocol = made_up.PROTOCOL.replace('"mgm-hill-climber", "parfocal"', json.dumps(policy))
+    (folder / "three-policies.toml").write_text(protocol)
+
+    with Server(policy=policy, protocols=folder, fps=10) as server, server.client() as client:
+        client.operator.focus(policy=policy)
+        assert next(frame for frame in client.frames() if frame.focal_power == 0.75)
+        client.operator.focus(policy=policy)
+        client.operator.add_participant(code="S-01")
+        assert client.operator.create(participant="S-01", protocol="three-policies") is not None
+        # Whether it can run is known without a second process, which could take long to start.
+        assert len(running(str(order))) == 1
+
+
+def test_a_process_that_fails_again_and_again_is_said_to_fail(tmp_path: Path) -> None:
+    order = tmp_path / "order"
+    order.write_text("follow")
+    source = OBEDIENT.replace("order = open", "seen.append(1)\n    order = len(seen) > 2 and open")
+    policy = command(tmp_path, "seen = []\n" + source, order)
+    with Server(policy=policy, fps=10) as server, server.client() as client:
+        client.operator.focus(policy=policy)
+        frames = client.frames()
+        next(frame for frame in frames if frame.focal_power == 0.75)
+        order.write_text("end")
+        next(frame for frame in frames if is_held("policy-panicked", frame))
+        # It starts well each time and ends at its first frame, after longer and longer breaks.
+        held = [frame.status for _, frame in zip(range(30), frames, strict=False)]
+        assert {status["held"] for status in held} == {"policy-panicked"}
+        assert all("failed" in status["message"] for status in held)
+
+
 def test_no_process_is_left_by_a_server_that_is_killed(tmp_path: Path) -> None:
     (tmp_path / "order").write_text("hang")
     # It passes the test pictures, and hangs where nothing reaches it.

@@ -47,13 +47,17 @@ pub enum PolicyError {
         reason: String,
     },
     /// The policy runs in another process, which is being started.
-    #[error("policy '{name}' {}", failed.as_ref().map_or("is starting".into(), |why| format!("did not start: {why}")))]
+    #[error("policy '{name}' is starting{}", again(failed.as_deref()))]
     Starting {
         /// The policy.
         name: PolicyName,
-        /// Why the last start failed; `None` if it did not.
+        /// Why its last process failed; `None` if it did not.
         failed: Option<String>,
     },
+}
+
+fn again(failed: Option<&str>) -> String {
+    failed.map_or_else(String::new, |why| format!(" again, because it failed: {why}"))
 }
 
 /// All policies. Cheap to clone: the clones share the learned weights.
@@ -68,9 +72,12 @@ pub struct Registry {
 struct Registered {
     entry: PolicyEntry,
     build: Option<Build>,
+    /// Tells whether it can run now, where building an instance would disturb one that runs.
+    check: Option<Check>,
 }
 
 type Build = Arc<dyn Fn() -> Result<Box<dyn Policy>, PolicyError> + Send + Sync>;
+type Check = Arc<dyn Fn() -> Result<(), PolicyError> + Send + Sync>;
 
 impl Registry {
     /// Adds policy `name`, made by `build`. Replaces a policy of that name, or appends it at the end.
@@ -127,7 +134,7 @@ impl Registry {
             Err(reason) => (None, Some(reason)),
         };
         let entry = PolicyEntry { name, summary, weights: None, available: build.is_some(), reason };
-        let new = Registered { entry, build };
+        let new = Registered { entry, build, check: None };
 
         match self.policies.iter_mut().find(|old| old.entry.name == new.entry.name) {
             Some(old) => *old = new,
@@ -141,6 +148,19 @@ impl Registry {
     pub fn identified(mut self, name: &str, hash: Option<String>) -> Self {
         if let Some(policy) = self.policies.iter_mut().find(|policy| policy.entry.name.as_str() == name) {
             policy.entry.weights = hash;
+        }
+        self
+    }
+
+    /// Lets `check` tell whether policy `name` can run now. By default an instance is built and dropped.
+    #[must_use]
+    pub fn checked_by(
+        mut self,
+        name: &str,
+        check: impl Fn() -> Result<(), PolicyError> + Send + Sync + 'static,
+    ) -> Self {
+        if let Some(policy) = self.policies.iter_mut().find(|policy| policy.entry.name.as_str() == name) {
+            policy.check = Some(Arc::new(check));
         }
         self
     }
@@ -168,15 +188,23 @@ impl Registry {
         self.policies.iter().map(|policy| policy.entry.clone()).collect()
     }
 
+    /// Checks that policy `name` can run now.
+    ///
+    /// # Errors
+    /// If there is no such policy or it cannot run.
+    pub fn check(&self, name: &PolicyName) -> Result<(), PolicyError> {
+        match &self.find(name)?.check {
+            Some(check) => check(),
+            None => self.build(name).map(drop),
+        }
+    }
+
     /// Builds a new instance of policy `name`, with an empty memory.
     ///
     /// # Errors
     /// If there is no such policy or it cannot run.
     pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
-        let Some(Registered { entry, build }) = self.policies.iter().find(|policy| policy.entry.name == *name) else {
-            let known: Vec<_> = self.policies.iter().map(|policy| policy.entry.name.as_str()).collect();
-            return Err(PolicyError::Unknown { name: name.clone(), known: known.join(", ") });
-        };
+        let Registered { entry, build, .. } = self.find(name)?;
         let Some(build) = build else {
             let reason = entry.reason.clone().unwrap_or_default();
             return Err(PolicyError::Unavailable { name: name.clone(), reason });
@@ -187,6 +215,13 @@ impl Registry {
             policy.learn_of(blur);
         }
         Ok(policy)
+    }
+
+    fn find(&self, name: &PolicyName) -> Result<&Registered, PolicyError> {
+        self.policies.iter().find(|policy| policy.entry.name == *name).ok_or_else(|| {
+            let known: Vec<_> = self.policies.iter().map(|policy| policy.entry.name.as_str()).collect();
+            PolicyError::Unknown { name: name.clone(), known: known.join(", ") }
+        })
     }
 }
 

@@ -13,7 +13,7 @@ pub use settings::{ProcessSettings, Times};
 use std::sync::Arc;
 
 use self::command::Command;
-use self::pool::{Pool, Shared};
+use self::pool::{Missing, Pool, Shared};
 use self::process::Process;
 use super::{Decision, Fault, FieldOfView, Observation, Policy, PolicyError, Registry};
 use parfocal_base::{BlurRate, PolicyName};
@@ -32,9 +32,12 @@ pub fn with_command(registry: Registry, name: &PolicyName, settings: &ProcessSet
 
     match prepare(text, settings) {
         Ok((pool, hash)) => {
-            let own = name.clone();
+            let pool = Arc::new(pool);
+            let (own, checked, checked_pool) = (name.clone(), name.clone(), Arc::clone(&pool));
             let build = move || instance(&pool, &own).map(|policy| Box::new(policy) as Box<dyn Policy>);
-            registry.trying(name.as_str(), SUMMARY, build).identified(name.as_str(), hash)
+            let check = move || checked_pool.check().map_err(|failed| starting(&checked, failed));
+            let registry = registry.trying(name.as_str(), SUMMARY, build);
+            registry.checked_by(name.as_str(), check).identified(name.as_str(), hash)
         }
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }
@@ -49,13 +52,16 @@ fn prepare(text: &str, settings: &ProcessSettings) -> Result<(Pool, Option<Strin
     // It comes back at once: what counts is that there is one.
     let late = || format!("it was not ready within {} s", settings.start.as_secs());
     let (process, shared) = pool.take(settings.start, true).map_err(|failed| failed.unwrap_or_else(late))?;
-    shared.give_back(process, false);
+    shared.give_back(process, None);
     Ok((pool, hash))
 }
 
+fn starting(name: &PolicyName, failed: Missing) -> PolicyError {
+    PolicyError::Starting { name: name.clone(), failed }
+}
+
 fn instance(pool: &Pool, name: &PolicyName) -> Result<External, PolicyError> {
-    let starting = |failed| PolicyError::Starting { name: name.clone(), failed };
-    let (process, shared) = pool.take_for_instance().map_err(starting)?;
+    let (process, shared) = pool.take_for_instance().map_err(|failed| starting(name, failed))?;
     let wide = process.is_wide();
     Ok(External { process: Some(process), shared, wide, blur: None, frames: 0, anew: true, fault: None })
 }
@@ -104,10 +110,10 @@ impl Policy for External {
         match self.ask(seen) {
             Ok(decision) => decision,
             Err(fault) => {
-                self.fault = Some(fault);
                 if let Some(process) = self.process.take() {
-                    self.shared.give_back(process, true);
+                    self.shared.give_back(process, Some(&fault));
                 }
+                self.fault = Some(fault);
                 Decision { target: f64::NAN, ..Decision::default() }
             }
         }
@@ -129,7 +135,7 @@ impl Policy for External {
 impl Drop for External {
     fn drop(&mut self) {
         if let Some(process) = self.process.take() {
-            self.shared.give_back(process, false);
+            self.shared.give_back(process, None);
         }
     }
 }

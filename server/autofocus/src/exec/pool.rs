@@ -10,6 +10,7 @@ use std::time::Duration;
 use super::command::Command;
 use super::process::Process;
 use super::settings::ProcessSettings;
+use crate::Fault;
 use parfocal_base::clock::Moment;
 use parfocal_base::priority;
 
@@ -22,8 +23,8 @@ const LONGEST_BACKOFF: Duration = Duration::from_secs(10);
 /// A process that ran so long did not fail at its start.
 const SETTLED: Duration = Duration::from_secs(10);
 
-/// Why there is no process now: why the last start failed, after which another one follows; `None` if one is being
-/// started.
+/// Why there is no process now: why the last one failed, at its start or later, after which another one follows; `None`
+/// if one is being started.
 pub type Missing = Option<String>;
 
 /// The processes. Dropping the pool ends those that nobody uses; the others end when they come back.
@@ -49,7 +50,7 @@ struct State {
     ordered: usize,
     /// Failures in a row.
     failures: u32,
-    /// Why the last start failed.
+    /// Why the last process failed, until another one is ready.
     refused: Option<String>,
     closed: bool,
 }
@@ -82,6 +83,20 @@ impl Pool {
     pub fn take_for_instance(&self) -> Result<(Process, Arc<Shared>), Missing> {
         // Where many work, nobody drives a lens, and a failure ends the work.
         self.take(self.0.settings.build, self.0.settings.many)
+    }
+
+    /// Checks that a new instance would get a process. One that an instance uses will do: where one lens is driven,
+    /// that instance gives it back when another takes its place. So nobody who only asks starts a second process.
+    ///
+    /// # Errors
+    /// If there is none in the time that the settings leave.
+    pub fn check(&self) -> Result<(), Missing> {
+        if self.0.lock().used > 0 {
+            return Ok(());
+        }
+        let (process, shared) = self.take_for_instance()?;
+        shared.give_back(process, None);
+        Ok(())
     }
 }
 
@@ -142,17 +157,21 @@ impl Shared {
         outcome
     }
 
-    /// Gives a process back. One that failed is ended.
-    pub fn give_back(&self, process: Process, failed: bool) {
+    /// Gives a process back. One that `failed` is ended.
+    pub fn give_back(&self, process: Process, failed: Option<&Fault>) {
         let ended = {
             let mut state = self.lock();
             state.used = state.used.saturating_sub(1);
-            if failed {
+            if let Some(fault) = failed {
                 state.failures = self.failures_after(&state, process.ready_since);
+                // Where many work, each says by itself why it failed.
+                if !self.settings.many {
+                    state.refused = Some(fault.to_string());
+                }
             }
 
             // One process is enough where one lens is driven.
-            if failed || state.closed || (!self.settings.many && !state.idle.is_empty()) {
+            if failed.is_some() || state.closed || (!self.settings.many && !state.idle.is_empty()) {
                 Some(process)
             } else {
                 state.idle.push_back(process);

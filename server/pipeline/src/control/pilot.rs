@@ -103,7 +103,7 @@ impl Pilot {
         }
         self.clear_late_answer(now)?;
 
-        let Some(runner) = &mut self.runner else { return Err(starting()) };
+        let Some(runner) = &mut self.runner else { return Err(self.starting()) };
         let proven = runner.proven;
         runner.ask(now, seen, std::mem::take(&mut self.forgets));
 
@@ -112,8 +112,8 @@ impl Pilot {
                 self.failed = None;
                 Ok(advice)
             }
-            Some(Err(failure)) => Err(self.fail(now, hold_reason(&failure))),
-            None => Err(if proven { slow() } else { starting() }),
+            Some(Err(failure)) => Err(self.fail(now, &failure)),
+            None => Err(if proven { slow() } else { self.starting() }),
         }
     }
 
@@ -122,13 +122,14 @@ impl Pilot {
     fn clear_late_answer(&mut self, now: Moment) -> Result<(), HoldReason> {
         let Some(runner) = &mut self.runner else { return Ok(()) };
         let Some(since) = runner.open_since() else { return Ok(()) };
-        let (limit, reason) = if runner.proven { (HUNG, slow()) } else { (STARTING, starting()) };
+        let proven = runner.proven;
+        let limit = if proven { HUNG } else { STARTING };
 
         match runner.answer(Duration::ZERO) {
             Some(Ok(_late)) => Ok(()),
-            Some(Err(failure)) => Err(self.fail(now, hold_reason(&failure))),
-            None if now.since(since) < limit => Err(reason),
-            None => Err(self.fail(now, slow())),
+            Some(Err(failure)) => Err(self.fail(now, &failure)),
+            None if now.since(since) < limit => Err(if proven { slow() } else { self.starting() }),
+            None => Err(self.give_up(now, slow())),
         }
     }
 
@@ -138,7 +139,7 @@ impl Pilot {
         {
             return Err(reason.clone());
         }
-        self.start(MOST_HUNG).map_err(|reason| self.fail(now, reason))
+        self.start(MOST_HUNG).map_err(|reason| self.give_up(now, reason))
     }
 
     fn start(&mut self, most_hung: usize) -> Result<(), HoldReason> {
@@ -161,10 +162,22 @@ impl Pilot {
         Ok(())
     }
 
-    fn fail(&mut self, now: Moment, reason: HoldReason) -> HoldReason {
+    /// Gives up the instance in charge after `failure`.
+    fn fail(&mut self, now: Moment, failure: &Failure) -> HoldReason {
+        let reason = hold_reason(failure).unwrap_or_else(|| self.starting());
+        self.give_up(now, reason)
+    }
+
+    fn give_up(&mut self, now: Moment, reason: HoldReason) -> HoldReason {
         self.dismiss();
         self.failed = Some((now, reason.clone()));
         reason
+    }
+
+    /// The reason for a hold while an instance starts: why the one before failed, which it may do again, or else that
+    /// it is starting.
+    fn starting(&self) -> HoldReason {
+        self.failed.as_ref().map_or_else(starting, |(_, reason)| reason.clone())
     }
 
     fn dismiss(&mut self) {
@@ -175,27 +188,29 @@ impl Pilot {
     }
 }
 
-/// The reason for a hold after `failure`. Only the debug log gets the details: the operator of a blinded session may
-/// read the log, and only some policies fail in these ways. Outside a session the status shows the kind of failure.
-fn hold_reason(failure: &Failure) -> HoldReason {
+/// The reason for a hold after `failure`; `None` if the policy is only starting. Only the debug log gets the details:
+/// the operator of a blinded session may read the log, and only some policies fail in these ways. Outside a session
+/// the status shows the kind of failure.
+fn hold_reason(failure: &Failure) -> Option<HoldReason> {
     tracing::debug!(%failure, "the policy gave no advice");
-    match failure {
-        Failure::Unavailable(PolicyError::Starting { failed: None, .. }) => starting(),
-        Failure::Outside(Fault::Late) => slow(),
+    let (hold, message) = match failure {
+        Failure::Unavailable(PolicyError::Starting { failed: None, .. }) => return None,
+        Failure::Outside(Fault::Late) => return Some(slow()),
         Failure::Panicked(_)
         | Failure::Outside(Fault::Ended(_))
         | Failure::Unavailable(PolicyError::Starting { failed: Some(_), .. }) => {
-            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
+            (Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
         }
-        Failure::Outside(Fault::Nonsense(_)) | Failure::InvalidTarget(_) => HoldReason::new(
+        Failure::Outside(Fault::Nonsense(_)) | Failure::InvalidTarget(_) => (
             Hold::PolicyNonsense,
             "the policy returned an invalid focal power and is being restarted; the lens is held",
         ),
-        Failure::Unavailable(_) => HoldReason::new(
+        Failure::Unavailable(_) => (
             Hold::PolicyUnavailable,
             "the policy cannot run here; the lens is held. `parfocal policies` shows the reason",
         ),
-    }
+    };
+    Some(HoldReason::new(hold, message))
 }
 
 fn slow() -> HoldReason {

@@ -156,7 +156,7 @@ impl Shared {
         for policy in &protocol.policies {
             let name = &protocol.name;
             self.registry
-                .build(policy)
+                .check(policy)
                 .map_err(|error| ConductError::Conflict(format!("protocol '{name}' cannot run: {error}")))?;
         }
         Ok(())

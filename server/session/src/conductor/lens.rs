@@ -57,8 +57,8 @@ impl Shared {
             Focus::FocalPower(value) => Ok(Drive::Manual(power(*value)?)),
             Focus::Policy(name) => {
                 let name = PolicyName::new(name);
-                match self.registry.build(&name) {
-                    Ok(_) => Ok(Drive::Policy { name, start: None }),
+                match self.registry.check(&name) {
+                    Ok(()) => Ok(Drive::Policy { name, start: None }),
                     Err(error @ PolicyError::Unknown { .. }) => Err(ConductError::NotFound(error.to_string())),
                     Err(error) => Err(ConductError::Conflict(error.to_string())),
                 }
