@@ -14,6 +14,7 @@ use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{Notify, watch};
 use tokio::time::timeout;
 
+use super::disconnections::Disconnections;
 use super::frame_messages::{self, FrameMessages};
 use super::message::{HEADER_BYTES, Header, Version};
 use super::{LinkSource, condition};
@@ -57,6 +58,7 @@ pub async fn serve(
     peer: SocketAddr,
     messages: watch::Receiver<Option<Arc<FrameMessages>>>,
     source: &LinkSource,
+    disconnections: &Disconnections,
 ) {
     // A picture must not wait for the acknowledgement of the one before.
     let _ = stream.set_nodelay(true);
@@ -70,10 +72,8 @@ pub async fn serve(
     };
     match end {
         End::Closed => tracing::debug!(%peer, "an OpenIGTLink client left"),
-        End::Stranger(why) => {
-            tracing::warn!("OpenIGTLink: {peer} was disconnected, because it does not speak OpenIGTLink: {why}");
-        }
-        End::Stuck => tracing::warn!("OpenIGTLink: {peer} was disconnected, because it took nothing for 10 s"),
+        End::Stranger(why) => disconnections.log(source.clock.now(), peer, why),
+        End::Stuck => disconnections.log(source.clock.now(), peer, "it took nothing for 10 s"),
     }
 }
 

@@ -5,6 +5,7 @@
 //! one when it can take it, so a slow one delays nobody.
 
 mod client;
+mod disconnections;
 mod frame_messages;
 mod message;
 
@@ -19,6 +20,7 @@ use tokio::runtime::Handle;
 use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
+use self::disconnections::Disconnections;
 use self::frame_messages::FrameMessages;
 use crate::control::{ControlStatus, ControlledFrame};
 use crate::live::LiveHandle;
@@ -96,13 +98,14 @@ async fn accept(
     arrived: &Notify,
 ) {
     let clients = Arc::new(AtomicUsize::new(0));
+    let disconnections = Arc::new(Disconnections::default());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
             sleep(REFUSED).await;
             continue;
         };
         if clients.load(Ordering::Relaxed) >= MOST_CLIENTS {
-            tracing::warn!("OpenIGTLink: {peer} was disconnected, because {MOST_CLIENTS} clients are connected");
+            disconnections.log(source.clock.now(), peer, "as many others are connected as can be");
             continue;
         }
 
@@ -113,10 +116,11 @@ async fn accept(
         arrived.notify_one();
 
         let (source, clients) = (Arc::clone(source), Arc::clone(&clients));
+        let disconnections = Arc::clone(&disconnections);
         tokio::spawn(async move {
             let mut shutdown = source.shutdown.clone();
             tokio::select! {
-                () = client::serve(stream, peer, latest, &source) => {}
+                () = client::serve(stream, peer, latest, &source, &disconnections) => {}
                 _ = shutdown.wait_for(|ended| *ended) => {}
             }
             clients.fetch_sub(1, Ordering::Relaxed);
