@@ -20,7 +20,9 @@ use parfocal_base::clock::{Clock, ManualClock, Moment, SystemClock};
 use parfocal_devices::camera::{self, Camera, CameraSettings, FrameImage};
 use parfocal_devices::lens::{Lens, SimulatedLens};
 use parfocal_imaging::{BANDS, Calibration, MosaicFrame, Reference};
-use parfocal_recording::{CALIBRATION, CapturedFrame, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, Writer};
+use parfocal_recording::{
+    CALIBRATION, CapturedFrame, Ended, FORMAT, Header, PatchRow, Recorder, Recording, VERSION, Writer,
+};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -410,4 +412,27 @@ fn what_does_not_fit_into_a_recorder_is_lost_and_counted() {
     let stored = Recording::open(&path).unwrap();
     assert_eq!(stored.header().frames_lost, progress.lost);
     assert_eq!(stored.rows().len() as u64, progress.frames);
+}
+
+#[test]
+fn a_recording_whose_folder_is_deleted_meanwhile_is_not_begun_anew_without_its_first_frames() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("recording");
+    let writer = Writer::create(&path, header(), SIZE, &Calibration::default()).unwrap();
+    let recorder = Recorder::start(writer, Moment::default()).unwrap();
+    std::fs::remove_dir_all(&path).unwrap();
+    recorder.intake().offer(CapturedFrame {
+        number: 1,
+        exposed_at: Moment::from_nanos(1),
+        exposure: Duration::ZERO,
+        asked: FocalPower::MIDDLE,
+        measured: None,
+        optimal: None,
+        patch: PatchRow::default(),
+        mosaic: Arc::new(mosaic(1)),
+    });
+
+    let ended = recorder.stop().ended;
+    assert!(matches!(&ended, Some(Ended::Failed(why)) if why.contains("deleted or moved away")), "{ended:?}");
+    assert!(!path.exists());
 }

@@ -50,6 +50,11 @@ impl RecordingError {
         })
     }
 
+    /// The error for `folder`, which was deleted or moved while it was recorded into.
+    pub(crate) fn moved(folder: &Path) -> Self {
+        Self::Failed(format!("{} was deleted or moved away while it was recorded", folder.display()))
+    }
+
     /// Turns a system's error into the one for `path` that could not be read.
     pub(crate) fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Failed(format!("cannot read {}: {error}", path.display()))

@@ -124,14 +124,33 @@ impl Writer {
     /// If it cannot be written. [`Writer::stored`] is then the number of frames that a reader finds.
     pub fn finish(&mut self, ended: Ended) -> Result<(), RecordingError> {
         self.header.ended = Some(ended);
-        if self.waiting.is_empty() { self.describe() } else { self.store() }
+        if !self.waiting.is_empty() {
+            return self.store();
+        }
+        self.check_in_place()?;
+        self.describe()
+    }
+
+    /// Checks that the folder still is where it was made. To make it anew would give a recording without its first
+    /// frames, which counts them as saved.
+    fn check_in_place(&mut self) -> Result<(), RecordingError> {
+        match self.folder.join(DESCRIPTION).try_exists() {
+            Ok(true) => Ok(()),
+            Ok(false) => {
+                self.stored = 0;
+                Err(RecordingError::moved(&self.folder))
+            }
+            Err(error) => Err(RecordingError::unwritable(&self.folder, self.stored, &error)),
+        }
     }
 
     /// Writes the waiting frames as a shard, then makes the arrays longer by them.
     fn store(&mut self) -> Result<(), RecordingError> {
         let frames = std::mem::take(&mut self.waiting);
         let lengths: Vec<usize> = frames.iter().map(Vec::len).collect();
-        let stored = self.index.encode(&lengths).and_then(|index| self.store_shard(&frames, &index));
+        let in_place = self.check_in_place();
+        let encoded = in_place.and_then(|()| self.index.encode(&lengths));
+        let stored = encoded.and_then(|index| self.store_shard(&frames, &index));
 
         if let Err(error) = stored {
             // The rows of the lost frames must not become those of later ones.
