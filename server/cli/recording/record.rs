@@ -12,9 +12,9 @@ use crate::cli::output::{Failure, print, word};
 use parfocal_autofocus::Registry;
 use parfocal_base::clock::{Clock, SystemClock};
 use parfocal_base::files::remove;
-use parfocal_base::{PolicyName, SOFTWARE};
+use parfocal_base::{PolicyName, SOFTWARE, notices};
 use parfocal_devices::camera::{self, CameraSettings, calibration};
-use parfocal_devices::lens;
+use parfocal_devices::lens::{self, LensHealth};
 use parfocal_imaging::{Calibration, Reconstructor};
 use parfocal_pipeline::control::{self, Command, ControlHandle, ControlLoop, Drive, LoopSettings, Rig};
 use parfocal_recording::{
@@ -167,9 +167,16 @@ fn watch(
     // Of a disk that hangs, frames are lost; only the camera can keep both numbers from rising.
     let mut seen = ((0, 0), clock.now());
     let mut first = None;
+    let mut lens_worked = true;
 
     loop {
         std::thread::sleep(TICK);
+        let lens = control.status.borrow().lens.clone();
+        if lens.working != lens_worked {
+            lens_worked = lens.working;
+            spinner.suspend(|| report(&lens));
+        }
+
         let progress = recorder.progress();
         let now = clock.now();
         spinner.set_message(format!("{} frames, {} lost", progress.frames, progress.lost));
@@ -190,6 +197,15 @@ fn watch(
             let message = control.status.borrow().camera.message.clone();
             bail!("no frame comes from the camera {}: {message}", arguments.camera);
         }
+    }
+}
+
+/// Reports that the lens stopped working, or works again. The recording alone shows only that the focus stays the same.
+fn report(lens: &LensHealth) {
+    if lens.working {
+        notices::tell("the lens works again");
+    } else {
+        notices::tell(format!("the lens stays where it is, and recording goes on: {}", lens.message));
     }
 }
 
