@@ -22,7 +22,7 @@ use parfocal_base::guarded;
 use parfocal_base::priority::{self, Scheduling, ThreadRole};
 use parfocal_base::step::Hold;
 use parfocal_base::step::StepRecord;
-use parfocal_devices::camera::{Camera, Controls, Frame, LEAST_FPS};
+use parfocal_devices::camera::{Camera, CameraHealth, Controls, Frame, LEAST_FPS};
 use parfocal_devices::lens::{Lens, MeasuredDynamics};
 use parfocal_imaging::Reconstructor;
 
@@ -230,7 +230,13 @@ impl Worker {
         self.stepper.idle();
         if self.clock.now().since(self.last_frame_at) >= NO_FRAME {
             self.lock.see(None, self.stepper.focal_power(), self.clock.now());
-            let message = format!("no frame comes from the camera; the lens is held: {}", self.source.health().message);
+            let CameraHealth { working, simulated, message, .. } = self.source.health();
+            let message = if working && !simulated {
+                // It has not noticed that it stopped, so this is how it worked before.
+                format!("no frame comes from the camera; the lens is held. Check cable and power. Before: {message}")
+            } else {
+                format!("no frame comes from the camera; the lens is held: {message}")
+            };
             self.camera_fault = Some(HoldReason::new(Hold::CameraFailed, &message));
         }
     }
