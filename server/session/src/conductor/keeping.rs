@@ -29,8 +29,9 @@ impl Conductor {
 
         // A separate loop, because recording waits for the disk and the time does not.
         let recording = async {
+            let mut clock_fails = false;
             loop {
-                if self.record().await {
+                if self.record(&mut clock_fails).await {
                     sleep(BEAT).await;
                 } else {
                     self.shared.to_record.notified().await;
@@ -44,7 +45,7 @@ impl Conductor {
     /// Does what is due now, and records what waits for the disk.
     pub async fn tick(&self) {
         self.keep_time().await;
-        self.record().await;
+        self.record(&mut false).await;
     }
 
     /// Records what is not on disk yet; the last chance before the server ends.
@@ -78,7 +79,8 @@ impl Conductor {
     }
 
     /// Records the stops, and how far the segment's clock is. Returns whether there will be more to record soon.
-    async fn record(&self) -> bool {
+    /// `clock_fails` says whether noting the clock failed the last time: only the first failure in a row is logged.
+    async fn record(&self, clock_fails: &mut bool) -> bool {
         {
             let mut pen = self.shared.pen.lock().await;
             // The screens show a failure, and recording is tried again.
@@ -95,10 +97,14 @@ impl Conductor {
             (clock, live.course.as_ref().is_some_and(Course::is_unrecorded))
         };
 
-        if let Some((session, segment, inspected)) = clock
-            && let Err(error) = self.shared.store.note_clock(session, segment, inspected).await
-        {
-            tracing::warn!("the time inspected could not be noted: {error}");
+        if let Some((session, segment, inspected)) = clock {
+            let noted = self.shared.store.note_clock(session, segment, inspected).await;
+            if let Err(error) = &noted
+                && !*clock_fails
+            {
+                tracing::warn!("the time inspected could not be noted: {error}; it is tried again every second");
+            }
+            *clock_fails = noted.is_err();
         }
         clock.is_some() || unrecorded
     }
