@@ -64,7 +64,7 @@ pub fn failed(checks: &[Check]) -> Vec<&str> {
 }
 
 pub fn is_its_owners_alone(folder: &Path) -> bool {
-    folder.metadata().unwrap().permissions().mode() & 0o077 == 0
+    folder.metadata().unwrap().permissions().mode() & 0o777 == 0o700
 }
 
 #[tokio::test]
