@@ -91,8 +91,8 @@ class Recording(xr.Dataset):  # type: ignore[no-untyped-call]
         except (OSError, RuntimeError, ValueError) as error:
             folder = self.encoding.get("source", "The recording")
             raise BadRecording(
-                f"{folder} cannot be read: {str(error).rstrip('.')}. 'parfocal recording info' says which frames are damaged; copy "
-                "the recording again, or leave them out."
+                f"{folder} cannot be read: {str(error).rstrip('.')}. 'parfocal recording info' says which frames are "
+                "damaged; copy the recording again, or leave them out."
             ) from error
 
     def _frame(self, frame: int) -> xr.DataArray:

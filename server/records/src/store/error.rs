@@ -78,7 +78,8 @@ pub enum StoreError {
     /// The file cannot be opened.
     #[error(
         "the database cannot be opened; you must be able to write to it and to its folder: \
-         run this as the user that runs the server, change their permissions, or copy the data folder to a place where you can write and name it with --data-dir"
+         run this as the user that runs the server, change their permissions, or copy the data folder to a place where \
+         you can write and name it with --data-dir"
     )]
     Shut,
     /// Words were erased from their records, but not yet from the files.

@@ -86,8 +86,8 @@ struct Writer {
 }
 
 impl Writer {
-    /// Gathers the next batch, until it is large or old enough or somebody waits for it. Returns `false` once the sender
-    /// is gone. If an earlier batch could not be written, returns after a while even without a new record, as when the
+    /// Gathers the next batch, until it is large or old enough, or somebody waits for it. Returns `false` once the
+    /// sender is gone. If an earlier batch could not be written, returns after a while even without a new record, as when the
     /// camera is silent, so that it is tried again.
     async fn collect(&mut self, steps: &mut Receiver<StepRecord>, waiters: &mut UnboundedReceiver<Waiter>) -> bool {
         let failed_before = !self.waiting.is_empty();
@@ -187,8 +187,8 @@ impl Writer {
 }
 
 impl Store {
-    /// Waits until the steps that the loop has taken so far are in the database, unless the disk takes long. Until then,
-    /// the telemetry of a session that has just ended lacks its last steps.
+    /// Waits until the steps that the loop has taken so far are in the database, unless the disk takes long. Until
+    /// then, the telemetry of a session that has just ended lacks its last steps.
     pub async fn settle_telemetry(&self) {
         let (waiter, written) = oneshot::channel();
         let asked = {

@@ -44,8 +44,8 @@ pub enum Sessions {
     Copied,
     /// They are moved into the package, which must be on the same disk. If writing the package fails, they are lost.
     Moved,
-    /// They stay where they are, and the package has symbolic links to them: for a check, which compares the package and
-    /// removes it.
+    /// They stay where they are, and the package has symbolic links to them: for a check, which compares the package
+    /// and removes it.
     Linked,
 }
 

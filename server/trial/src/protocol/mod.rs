@@ -144,8 +144,8 @@ impl Protocol {
     }
 }
 
-/// The first of `policies` that `text` names, in upper or lower case, and with dashes, spaces or other signs between the
-/// words. A name of letters alone ("fixed") is also an ordinary word, which texts may use.
+/// The first of `policies` that `text` names, in upper or lower case, and with dashes, spaces or other signs between
+/// the words. A name of letters alone ("fixed") is also an ordinary word, which texts may use.
 pub(crate) fn named_policy<'a>(
     text: &str,
     policies: impl IntoIterator<Item = &'a PolicyName>,
