@@ -103,3 +103,26 @@ fn a_damaged_picture_is_named_and_the_others_are_read() {
     assert!(told.contains("picture 3 is cut off, or is not a JPEG picture") && !told.contains("more)"), "{told}");
     assert!(opened.picture(3).is_err() && opened.picture(4).unwrap() == picture(64, 32, 40));
 }
+
+#[test]
+fn a_copy_that_lacks_the_end_of_a_file_is_not_called_whole() {
+    let folder = TempDir::new().unwrap();
+    let (path, writer) = view(&folder);
+    writer.finish(Ended::Stopped).unwrap();
+
+    for (name, lacks) in [("view.mjpeg", "it lacks 5 of 10 pictures"), ("view.csv", "the places of the last pictures")]
+    {
+        let file = path.join(name);
+        let whole = fs::read(&file).unwrap();
+        let cut = if name == "view.mjpeg" {
+            ViewRecording::open(&path).unwrap().rows()[5].offset as usize + 9
+        } else {
+            whole.len() / 2
+        };
+        fs::write(&file, &whole[..cut]).unwrap();
+        let told = complaint(&parfocal(&["recording", "info", text(&path)]));
+        assert!(told.contains(&format!("{name} is cut off")) && told.contains(lacks), "{told}");
+        fs::write(&file, whole).unwrap();
+    }
+    assert_eq!(info(&path)["damaged"], serde_json::json!([]));
+}

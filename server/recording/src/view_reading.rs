@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::error::RecordingError;
+use super::header::Ended;
 use super::view::{HEADER, INDEX, PICTURES, VIEW_FORMAT, VIEW_VERSION, ViewHeader};
 
 /// The first and the last two bytes of a JPEG picture.
@@ -109,9 +110,36 @@ impl ViewRecording {
         Err(RecordingError::damaged(&path, damage))
     }
 
-    /// Reads every picture, and returns what is wrong with those that are not whole.
+    /// Reads every picture, and returns what is wrong with those that are not whole, and which file is cut off.
     pub fn check(&self) -> Vec<String> {
-        (0..self.rows.len()).filter_map(|number| self.picture(number).err()).map(|error| error.to_string()).collect()
+        let pictures = (0..self.rows.len()).filter_map(|number| self.picture(number).err());
+        pictures.map(|error| error.to_string()).chain(self.cut_off()).collect()
+    }
+
+    /// Which file lacks its end. Of a recording that was stopped as it should, everything had reached the disk: then
+    /// index and pictures agree, unless a copy was cut short.
+    fn cut_off(&self) -> Option<String> {
+        if !matches!(self.header.ended, Some(Ended::Stopped | Ended::DiskNearlyFull)) {
+            return None;
+        }
+        let index = self.folder.join(INDEX);
+        let pictures = self.folder.join(PICTURES);
+        let (text, bytes) = match (fs::read_to_string(&index), fs::metadata(&pictures)) {
+            (Ok(text), Ok(about)) => (text, about.len()),
+            // Opening it has told that.
+            _ => return None,
+        };
+
+        let listed = text.matches('\n').count().saturating_sub(1);
+        let end = self.rows.last().map_or(0, |row| row.offset.saturating_add(row.length));
+        let (file, lacks) = if listed > self.rows.len() {
+            (pictures, format!("{} of {listed} pictures", listed - self.rows.len()))
+        } else if !text.ends_with('\n') || bytes > end {
+            (index, "the places of the last pictures".to_owned())
+        } else {
+            return None;
+        };
+        Some(format!("{} is cut off: it lacks {lacks}; restore it from a copy", file.display()))
     }
 }
 
