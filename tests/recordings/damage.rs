@@ -278,3 +278,22 @@ fn a_recording_for_which_the_disk_has_no_room_leaves_no_folder() {
     let told = complaint(&parfocal(&["recording", "record", "--out", text(&out), "--seconds", "1"]));
     assert!(told.contains("no space is left") && !out.exists(), "{told}");
 }
+
+#[test]
+fn a_video_for_whose_end_the_disk_has_no_room_is_not_called_done() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 150);
+    let whole = folder.path().join("whole.mp4");
+    done(&["recording", "video", text(&recording), "--out", text(&whole), "--size", "full"]);
+    assert!(fs::metadata(&whole).unwrap().len() > 4096, "more than is left on the disk");
+
+    let Some(disk) = SmallDisk::mount(1) else { return };
+    let mut filler = File::create(disk.0.path().join("filler")).unwrap();
+    while filler.write_all(&[0; 4096]).is_ok() {}
+    filler.set_len(filler.metadata().unwrap().len() - 4096).unwrap();
+
+    let out = disk.0.path().join("video.mp4");
+    let told = complaint(&parfocal(&["recording", "video", text(&recording), "--out", text(&out), "--size", "full"]));
+    assert!(told.contains("No space left on device"), "{told}");
+    assert_eq!(fs::read_dir(disk.0.path()).unwrap().count(), 1, "nothing but what was there");
+}

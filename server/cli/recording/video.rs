@@ -172,10 +172,13 @@ fn save_video(
         errors.read_to_string(&mut complaint)?;
     }
 
-    if encoder.0.wait()?.success() {
-        return Ok(());
+    // It calls it a success, too, when the disk gets full while it writes the last part, without which nothing plays.
+    // Of several errors, the first is the cause of the others.
+    let ended = encoder.0.wait()?;
+    match complaint.lines().find(|line| !line.trim().is_empty()) {
+        None if ended.success() => Ok(()),
+        reason => Err(format!("ffmpeg: {}", reason.unwrap_or("no reason given")).into()),
     }
-    Err(format!("ffmpeg: {}", complaint.lines().last().unwrap_or("no reason given")).into())
 }
 
 /// Pictures a second by the usual time between two frames. The mean would leave out frames of a recording with gaps.
