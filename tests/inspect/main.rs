@@ -275,7 +275,7 @@ fn bad_files_are_named_and_the_others_still_inspected() {
         (write(&folder, "short.raw", &[0; 1000]), "a raw mosaic is 2048x1088 samples"),
         (write(&folder, "empty.jpg", b""), "the file is empty"),
         (folder.path().join("absent.png"), "cannot be read"),
-        (folder.path().to_owned(), "cannot be read"),
+        (folder.path().to_owned(), "this is a folder"),
     ];
 
     let tiny = folder.path().join("tiny.png");

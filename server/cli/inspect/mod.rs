@@ -128,6 +128,9 @@ impl<'a> Inspector<'a> {
 
     fn inspect(&mut self, path: &Path) -> Result<Report, Failure> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
+        if path.is_dir() {
+            return Err(named(&"this is a folder; name the pictures in it, as with FOLDER/*").into());
+        }
         let seen = self.see(path)?;
 
         let content_area = content_area::detect(&seen.gray);
