@@ -25,7 +25,11 @@ async fn a_lead_makes_an_account_and_its_person_chooses_a_passphrase() {
     server.add_account("lead", "lead", "Dr Lead");
     let lead = driver.browser().await;
     sign_in(&lead, &server, "lead", PASSPHRASE).await;
-    lead.sees("nav", "People").await;
+    lead.sees(".person", "Dr Lead").await;
+    for page in ["/researcher", "/researcher/studies", "/researcher/dictionary"] {
+        lead.open(&server.url(page)).await;
+        lead.sees("nav", "People").await;
+    }
     lead.open(&server.url("/researcher/accounts")).await;
     lead.sees("#people", "Dr Lead").await;
 
@@ -54,7 +58,10 @@ async fn a_lead_makes_an_account_and_its_person_chooses_a_passphrase() {
     person.type_into("#new-again", "analytical engine").await;
     person.click("#sign-in-go").await;
     person.sees(".person", "Dr Ada Lovelace").await;
-    assert!(!person.text("nav").await.contains("People"), "the page is for leads");
+    for page in ["/researcher", "/researcher/studies", "/researcher/dictionary"] {
+        person.open(&server.url(page)).await;
+        assert!(!person.text("nav").await.contains("People"), "the page is for leads");
+    }
 
     lead.reload().await;
     lead.sees("#people", "in use").await;

@@ -14,10 +14,11 @@ use utoipa::IntoParams;
 
 use super::AppState;
 use super::error::Error;
-use super::people::Acting;
+use super::people::{Acting, SignedIn};
 use super::roles::Researcher;
 use parfocal_base::ids::SessionId;
 use parfocal_records::store::export::{Export, ExportError, TABLES, TEXTS_IN_CSV, Table, ZipStream, folder_name};
+use parfocal_trial::account::Account;
 
 impl From<ExportError> for Error {
     fn from(error: ExportError) -> Self {
@@ -80,6 +81,8 @@ pub(super) fn zip_download<E: Display>(
 #[derive(Template)]
 #[template(path = "dictionary.html")]
 struct Dictionary {
+    /// The account that is signed in, if any.
+    person: Option<Account>,
     tables: &'static [Table],
     texts: &'static str,
 }
@@ -87,6 +90,7 @@ struct Dictionary {
 /// The data dictionary: every table and column of an export, with its unit.
 #[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-pub(super) async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
-    Dictionary { tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
+pub(super) async fn dictionary(_: Researcher, SignedIn(person): SignedIn) -> Result<Html<String>, Error> {
+    let person = person.map(|person| person.account);
+    Dictionary { person, tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
 }

@@ -37,11 +37,6 @@ struct ListPage {
 }
 
 impl ListPage {
-    /// Whether the reader is a lead, who may make accounts.
-    fn leads(&self) -> bool {
-        self.person.as_ref().is_some_and(|account| account.role.leads())
-    }
-
     const fn now(&self) -> &'static str {
         now::on_studies(self.has_accounts, self.person.is_some())
     }
