@@ -210,6 +210,7 @@ fn merge(merge: &Merge) -> Result<(), Failure> {
     let mut sources = Vec::new();
     let mut left_out = Vec::new();
     for site in without_systems_own(&merge.sites) {
+        package::check_outside(&merge.out, site)?;
         left_out.extend(package::left_out(site)?);
         for export in package::exports_of(site)? {
             sources.push(PackageSource::open(&export)?);

@@ -40,6 +40,9 @@ pub struct Arguments {
 /// written.
 pub async fn run(arguments: &Arguments) -> Result<(), Failure> {
     let analysis = if let Some(folder) = package_of(arguments).await? {
+        if let Some(out) = &arguments.out {
+            package::check_outside(out, folder)?;
+        }
         verified(folder)?
     } else {
         let reader = Reader::open(folder_of(arguments)).await?;

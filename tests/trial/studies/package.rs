@@ -476,6 +476,18 @@ async fn a_package_whose_place_is_taken_meanwhile_leaves_nothing_behind() {
     assert_eq!(out.read_dir().unwrap().count(), 1, "what was there stays");
 }
 
+#[tokio::test]
+async fn nothing_is_written_into_a_package_because_it_would_not_verify_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = package(folder.path()).await;
+    let within = made.join("more/analysis");
+    for command in ["merge", "analyse"] {
+        let told = refused(&["study", command, text(&made), "--out", text(&within)]);
+        assert!(told.contains("lies within") && told.contains("name another folder"), "{told}");
+    }
+    done(&["verify", text(&made)]);
+}
+
 #[test]
 fn a_file_that_is_no_package_is_named_with_what_to_give_instead() {
     let folder = tempfile::tempdir().unwrap();

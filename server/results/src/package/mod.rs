@@ -19,5 +19,5 @@ mod writing;
 
 pub use self::check::{check, is_package};
 pub use self::error::PackageError;
-pub use self::source::{LeftOut, PackageSource, exports_of, left_out, may_read};
+pub use self::source::{LeftOut, PackageSource, check_outside, exports_of, left_out, may_read};
 pub use self::writing::{Sessions, Summary, write};

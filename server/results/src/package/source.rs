@@ -125,6 +125,24 @@ pub fn may_read(path: &Path) -> Result<(), PackageError> {
     }
 }
 
+/// Fails if `out` lies within `folder`, an export or a package. What is written there would be an added file to whoever
+/// verifies it.
+///
+/// # Errors
+/// As it says.
+pub fn check_outside(out: &Path, folder: &Path) -> Result<(), PackageError> {
+    // `out` may not exist yet.
+    let out_or_above = std::path::absolute(out).unwrap_or_else(|_| out.to_owned());
+    let there = out_or_above.ancestors().find_map(|path| path.canonicalize().ok());
+    match (there, folder.canonicalize()) {
+        (Some(there), Ok(folder)) if there.starts_with(&folder) => Err(PackageError::of(
+            out,
+            format_args!("lies within {}, which would not verify any more; name another folder", folder.display()),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// The folders of the exports in `path`: `path` itself if it is an export, or those of a package.
 ///
 /// # Errors
