@@ -27,4 +27,5 @@ DROP TABLE events;
 DROP TABLE segments;
 DROP TABLE sessions;
 DROP TABLE participants;
+DROP TABLE run_ends;
 DROP TABLE runs;

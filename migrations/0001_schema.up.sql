@@ -17,6 +17,12 @@ CREATE TABLE runs (
     seed INTEGER
 ) STRICT;
 
+-- When the last step of a run was taken. The next start of the server notes it.
+CREATE TABLE run_ends (
+    run INTEGER PRIMARY KEY,
+    monotonic_ns INTEGER NOT NULL
+) STRICT;
+
 CREATE TABLE participants (
     code TEXT PRIMARY KEY CHECK (length(code) BETWEEN 2 AND 16 AND code NOT GLOB '*[^A-Z0-9-]*'),
     wall TEXT NOT NULL

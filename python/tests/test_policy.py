@@ -310,7 +310,7 @@ def test_a_process_that_fails_again_and_again_is_said_to_fail(tmp_path: Path) ->
         order.write_text("end")
         next(frame for frame in frames if is_held("policy-panicked", frame))
         # It starts well each time and ends at its first frame, after longer and longer breaks.
-        held = [frame.status for _, frame in zip(range(30), frames, strict=False)]
+        held = [frame.status or {} for _, frame in zip(range(30), frames, strict=False)]
         assert {status["held"] for status in held} == {"policy-panicked"}
         assert all("failed" in status["message"] for status in held)
 

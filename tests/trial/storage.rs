@@ -237,6 +237,38 @@ async fn who_waits_for_the_telemetry_finds_every_step_so_far() {
 }
 
 #[tokio::test]
+async fn a_clock_set_back_while_the_server_is_down_lets_no_step_come_before_an_earlier_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    let write = async |trial: &Trial, frames: u64| {
+        let (sender, receiver) = tokio::sync::mpsc::channel(4096);
+        let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
+        for frame in 1..=frames {
+            let exposed_at = trial.clock.now() + Duration::from_millis(20 * frame);
+            sender.send(StepRecord { exposed_at, ..step(frame, Some(segment)) }).await.unwrap();
+        }
+        drop(sender);
+        writer.await.unwrap();
+    };
+    // For 20 s the surgeon looks and says nothing, then the server is killed.
+    write(&trial, 1000).await;
+    drop(trial);
+
+    // Both clocks of the server begin again where they were. The second start takes no step.
+    drop(Trial::start(folder.path()).await);
+    let trial = Trial::start(folder.path()).await;
+    write(&trial, 50).await;
+
+    let path = trial.store.reader().focal_path(session, 10_000).await.unwrap();
+    let clocks = trial.store.reader().run_clocks().await.unwrap();
+    assert_eq!(path.len(), 1050);
+    assert!(path.is_sorted_by_key(|point| clocks.wall(point.run, point.exposed)));
+}
+
+#[tokio::test]
 async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;

@@ -324,13 +324,18 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before that, chains the telemetry that the run before left unchained.
+/// Records the start of a run. Before that, chains the telemetry that the run before left unchained, and notes when it
+/// took its last step.
 async fn begin_run(trial: &SqlitePool, run: &ServerRun) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();
 
     write_on(trial, async |connection| {
         seal_what_was_left(connection, &wall).await?;
+        // After a run without steps, the last step is of one whose end was noted before.
+        let end = "INSERT OR IGNORE INTO run_ends (run, monotonic_ns)
+             SELECT run, exposed_ns FROM telemetry ORDER BY number DESC LIMIT 1";
+        sqlx::query(end).execute(&mut *connection).await?;
 
         let number = Insert::into("runs")
             .set("wall", &wall)

@@ -190,7 +190,7 @@ impl Reader {
             "SELECT run, wall, monotonic_ns, coalesce(last_ns, monotonic_ns) AS last_ns FROM runs LEFT JOIN (
                  SELECT run, max(monotonic_ns) AS last_ns FROM (
                      SELECT run, monotonic_ns FROM events UNION ALL SELECT run, monotonic_ns FROM comments
-                     UNION ALL SELECT run, monotonic_ns FROM answers)
+                     UNION ALL SELECT run, monotonic_ns FROM answers UNION ALL SELECT run, monotonic_ns FROM run_ends)
                  GROUP BY run) USING (run)
              ORDER BY run",
         )
