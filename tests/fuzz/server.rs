@@ -445,9 +445,12 @@ fn seeds_are_let_in_and_understood() {
 
 #[test]
 fn requests_in_http2_are_let_in_and_understood() {
-    let answered = |seed: &Vec<u8>| http2::statuses(&ask(inside_tls, seed)).first().copied().flatten();
-    let statuses: Vec<_> = http2_requests().iter().map(answered).collect();
+    let once = |seed: &Vec<u8>| http2::statuses(&ask(inside_tls, seed)).first().copied().flatten();
+    // While other tests run, an answer may take longer than fuzzing waits for one.
+    let answered = |seed: &Vec<u8>| (0..100).find_map(|_| once(seed));
     // A page, a request that is not allowed during a session, and frames that are not a request.
-    assert_eq!(statuses[0], Some(http2::STATUS_200));
-    assert!(statuses[1].is_some() && statuses[2].is_none(), "{statuses:?}");
+    let requests = http2_requests();
+    assert_eq!(answered(&requests[0]), Some(http2::STATUS_200));
+    assert!(answered(&requests[1]).is_some());
+    assert_eq!(once(&requests[2]), None);
 }
