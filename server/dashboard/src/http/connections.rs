@@ -41,10 +41,6 @@ const BREATHER: Duration = Duration::from_millis(50);
 /// Time limit for the TLS handshake. It takes a browser two round trips, once it trusts the certificate.
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(10);
 
-/// A client that takes nothing of what is sent to it for this long is disconnected. A stream that nobody reads would
-/// keep its permit for ever, and a host has a limited number.
-const STUCK: Duration = Duration::from_mins(2);
-
 /// Over HTTP/2, a browser is asked at this interval whether it is still there, and has as long to answer.
 const STILL_THERE: Duration = Duration::from_secs(20);
 
@@ -83,7 +79,10 @@ async fn serve_one(
     transport: Transport,
     mut shutdown: watch::Receiver<bool>,
 ) {
-    tune(&stream);
+    // A socket that cannot be tuned still works.
+    let _ = stream.set_nodelay(true);
+    let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
+
     let (permit, mut give_way) = permits.take(peer.ip());
     let permit = Arc::new(permit);
 
@@ -132,14 +131,6 @@ async fn serve_one(
     if let Err(error) = outcome {
         tracing::debug!(%error, "a connection broke");
     }
-}
-
-/// Sets the socket's options. A socket that cannot be tuned still works.
-fn tune(stream: &TcpStream) {
-    let _ = stream.set_nodelay(true);
-    let socket = SockRef::from(stream);
-    let _ = socket.set_tcp_notsent_lowat(UNSENT);
-    let _ = socket.set_tcp_user_timeout(Some(STUCK));
 }
 
 /// How requests are read and answered. A WebSocket always comes over HTTP/1, even from a browser that uses HTTP/2 for
