@@ -73,10 +73,10 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
 #[derive(Default)]
 struct Writer {
     waiting: Vec<StepRecord>,
-    /// Who waits for these steps to be written.
-    waiters: Vec<Waiter>,
     /// For each of them the width of the picture on the surgeon's tablet.
     seen: Vec<Option<u32>>,
+    /// Who waits for these steps to be written.
+    waiters: Vec<Waiter>,
     failing: bool,
     names: Names,
     /// Segments with steps that are written and not yet chained.
@@ -87,8 +87,8 @@ struct Writer {
 
 impl Writer {
     /// Gathers the next batch, until it is large or old enough, or somebody waits for it. Returns `false` once the
-    /// sender is gone. If an earlier batch could not be written, returns after a while even without a new record, as when the
-    /// camera is silent, so that it is tried again.
+    /// sender is gone. If an earlier batch could not be written, returns after a while even without a new record, as
+    /// when the camera is silent, so that it is tried again.
     async fn collect(&mut self, steps: &mut Receiver<StepRecord>, waiters: &mut UnboundedReceiver<Waiter>) -> bool {
         let failed_before = !self.waiting.is_empty();
         select! {
